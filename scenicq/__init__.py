@@ -1,0 +1,57 @@
+"""Find the recorded frames that match a Scenic scenario.
+
+>>> import scenicq
+>>> summary = scenicq.ingest("sample_data/crossroads", "dataset")        # doctest: +SKIP
+>>> dataset = scenicq.open_dataset("dataset")                            # doctest: +SKIP
+>>> program = scenicq.read_program("sample_data/scenarios/02_crossing_cars.scenic")  # doctest: +SKIP
+>>> for result in scenicq.Query(dataset, program).results():             # doctest: +SKIP
+...     print(result.frame, result.verdict)
+
+Names are loaded when first used, so that importing the package costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scenicq.compiler.program import compile_scenario
+    from scenicq.errors import ScenicqError, Source, render
+    from scenicq.importers.ingest import ingest
+    from scenicq.match.matcher import Matcher
+    from scenicq.match.options import MatchOptions
+    from scenicq.query.run import Query, QueryOptions, read_program
+    from scenicq.store.dataset import open_dataset
+
+__all__ = [
+    "MatchOptions",
+    "Matcher",
+    "Query",
+    "QueryOptions",
+    "ScenicqError",
+    "Source",
+    "compile_scenario",
+    "ingest",
+    "open_dataset",
+    "read_program",
+    "render",
+]
+
+_HOMES = {
+    "MatchOptions": "scenicq.match.options",
+    "Matcher": "scenicq.match.matcher",
+    "Query": "scenicq.query.run",
+    "QueryOptions": "scenicq.query.run",
+    "ScenicqError": "scenicq.errors",
+    "Source": "scenicq.errors",
+    "compile_scenario": "scenicq.compiler.program",
+    "ingest": "scenicq.importers.ingest",
+    "open_dataset": "scenicq.store.dataset",
+    "read_program": "scenicq.query.run",
+    "render": "scenicq.errors",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

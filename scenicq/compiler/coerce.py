@@ -1,0 +1,176 @@
+"""Reading a value as what an operator needs: a scalar, a heading, a vector, a region (language paper, table 1)."""
+
+from __future__ import annotations
+
+import math
+from typing import cast
+
+from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, describe, fail, is_node
+from scenicq.errors import Span
+from scenicq.forest.build import constant, vector
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import Constant, Feature, Kind, Node, Select
+from scenicq.geometry.elements import NetworkElement
+from scenicq.geometry.regions import Everywhere, Region
+
+__all__ = [
+    "OBSERVABLE",
+    "kind_of_model",
+    "property_node",
+    "to_boolean",
+    "to_field",
+    "to_heading",
+    "to_node",
+    "to_region",
+    "to_scalar",
+    "to_vector",
+]
+
+OBSERVABLE: dict[str, Kind] = {
+    "position": "vector",
+    "heading": "scalar",
+    "width": "scalar",
+    "length": "scalar",
+    "height": "scalar",
+    "speed": "scalar",
+    "velocity": "vector",
+}
+"""Properties that a label can observe, by kind: references to them are conditioned on the label."""
+
+
+def property_node(instance: Instance, name: str, span: Span | None) -> ModelValue:
+    """The value of a property of an instance, by reference where a label may observe it."""
+    value = instance.properties[name]
+    if instance.index is None:
+        return value
+    if name in OBSERVABLE:
+        return Feature(instance.index, name, OBSERVABLE[name], span=span)
+    if is_node(value) and not isinstance(value, Constant):
+        return Feature(instance.index, name, kind_of(value), span=span)
+    return value
+
+
+def kind_of_model(value: ModelValue) -> Kind | None:
+    """The kind of value that a program's value can be read as; None for lists, functions and the like."""
+    if isinstance(value, bool):
+        return "boolean"
+    if isinstance(value, int | float):
+        return "scalar"
+    if is_node(value):
+        return kind_of(cast(Node, value))
+    if isinstance(value, NetworkElement):
+        return "region"
+    if isinstance(value, Choice):
+        return kind_of_model(value.options[0])
+    if isinstance(value, str) or value is None:
+        return "other"
+    return None
+
+
+def _need(value: ModelValue, what: str, span: Span | None) -> Exception:
+    shown = describe(value)
+    if is_node(value):
+        shown = {"other": "a value", "boolean": "a truth value"}.get(kind_of(value), f"a {kind_of(value)}")
+    return fail("wrong-type", f"{what} is needed here, not {shown}", span, f"this is {shown}")
+
+
+def to_node(value: ModelValue, span: Span | None) -> Node:
+    """Any value that can be part of an expression."""
+    assert not isinstance(value, Delayed)
+    if is_node(value):
+        return cast(Node, value)
+    if isinstance(value, bool | int | float | str) or value is None:
+        return constant(value, span)
+    if isinstance(value, NetworkElement) or isinstance(value, Region):
+        return to_region(value, span)
+    if isinstance(value, tuple | list) and len(cast("list[ModelValue]", value)) in (2, 3):
+        return to_vector(value, span)
+    if isinstance(value, Instance):
+        return to_vector(value, span)
+    if isinstance(value, Choice):
+        return Select(value.index, tuple(to_node(option, span) for option in value.options), span=span)
+    raise _need(value, "a number, vector, region or string", span)
+
+
+def to_scalar(value: ModelValue, span: Span | None) -> Node:
+    """A number.
+
+    Raises:
+        ScenarioError: wrong-type.
+    """
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        if isinstance(value, int) and abs(value) > 2**1000:
+            raise fail("wrong-value", "this number is too large", span)
+        if not math.isfinite(value):
+            raise fail("wrong-value", "this number is not finite", span)
+        return constant(value, span)
+    if is_node(value) and kind_of(value) in ("scalar", "boolean"):
+        return cast(Node, value)
+    if isinstance(value, Choice):
+        return Select(value.index, tuple(to_scalar(option, span) for option in value.options), span=span)
+    raise _need(value, "a number", span)
+
+
+def to_heading(value: ModelValue, span: Span | None) -> Node:
+    """A heading in radians: a number, or the heading of an oriented point or object."""
+    if isinstance(value, Instance) and value.oriented:
+        return to_scalar(property_node(value, "heading", span), span)
+    if isinstance(value, Choice):
+        return Select(value.index, tuple(to_heading(option, span) for option in value.options), span=span)
+    if isinstance(value, Instance) or (is_node(value) and kind_of(value) not in ("scalar", "boolean")):
+        raise _need(value, "a heading", span)
+    return to_scalar(value, span)
+
+
+def to_vector(value: ModelValue, span: Span | None) -> Node:
+    """A vector: a vector, a pair of numbers, or the position of a point or object."""
+    if isinstance(value, Instance):
+        return to_vector(property_node(value, "position", span), span)
+    if isinstance(value, tuple | list):
+        parts = cast("list[ModelValue]", list(cast("tuple[ModelValue]", value)))
+        flat = len(parts) == 3 and parts[2] in (0, 0.0)
+        if len(parts) == 3 and not flat:
+            raise fail("unsupported-construct", "a position with a height is not supported: labels are matched in 2D",
+                       span, "three coordinates", ("write two coordinates, or make the third 0",))  # fmt: skip
+        if len(parts) == 2 or flat:
+            return vector(to_scalar(parts[0], span), to_scalar(parts[1], span), span)
+    if is_node(value) and kind_of(value) == "vector":
+        return cast(Node, value)
+    if isinstance(value, Choice):
+        return Select(value.index, tuple(to_vector(option, span) for option in value.options), span=span)
+    raise _need(value, "a vector", span)
+
+
+def to_region(value: ModelValue, span: Span | None) -> Node:
+    """A region: a region, or an element of the road network."""
+    if value is None:
+        return constant(Everywhere(), span)
+    if isinstance(value, NetworkElement):
+        return constant(value.region, span)
+    if isinstance(value, Region):
+        return constant(cast(Region, value), span)
+    if is_node(value) and kind_of(value) == "region":
+        return cast(Node, value)
+    if isinstance(value, Choice):
+        return Select(value.index, tuple(to_region(option, span) for option in value.options), span=span)
+    raise _need(value, "a region", span)
+
+
+def to_field(value: ModelValue, span: Span | None) -> Node:
+    """A vector field."""
+    if is_node(value) and kind_of(value) == "field":
+        return cast(Node, value)
+    raise _need(value, "a vector field", span)
+
+
+def to_boolean(value: ModelValue, span: Span | None) -> Node:
+    """A truth value."""
+    if isinstance(value, bool):
+        return constant(value, span)
+    if is_node(value) and kind_of(value) in ("boolean", "scalar"):
+        return cast(Node, value)
+    if isinstance(value, Choice):
+        return Select(value.index, tuple(to_boolean(option, span) for option in value.options), span=span)
+    if isinstance(value, int | float | str | list | tuple | dict) or value is None:
+        return constant(bool(value), span)
+    raise _need(value, "a condition", span)

@@ -1,0 +1,319 @@
+"""Scenic's operators on values (language paper, tables 2-4 and appendix B.4-B.9).
+
+Every function takes evaluated values and the span of the construct; the ego is passed in where an operator refers to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+from scenicq.compiler.coerce import (
+    kind_of_model,
+    property_node,
+    to_boolean,
+    to_field,
+    to_heading,
+    to_node,
+    to_region,
+    to_scalar,
+    to_vector,
+)
+from scenicq.compiler.roots import oriented_point
+from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, describe, fail, is_node
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import (
+    ArithmeticOp,
+    CompareOp,
+    Constant,
+    Contains,
+    DirectionAt,
+    Distance,
+    Encloses,
+    Intersects,
+    LogicOp,
+    Node,
+    RegionDifference,
+    RegionIntersection,
+    RegionUnion,
+    Select,
+)
+from scenicq.forest.compute import fold
+from scenicq.geometry.regions import Region, orientation_of
+
+__all__ = [
+    "along",
+    "angle_to",
+    "apparent_heading",
+    "binary",
+    "can_see",
+    "combine",
+    "compare",
+    "direction_at",
+    "distance_to",
+    "follow",
+    "is_field",
+    "negate",
+    "object_box",
+    "offset",
+    "oriented",
+    "orientation",
+    "relative_heading",
+    "relative_to",
+    "visible_region",
+    "within",
+]
+
+FOLLOW_STEPS = 4
+"""Steps of forward Euler along a field (language paper, appendix B)."""
+
+_BINARY: dict[str, ArithmeticOp] = {op.value: op for op in ArithmeticOp if not op.value[0].isalpha()}
+_COMPARE: dict[str, CompareOp] = {op.value: op for op in CompareOp}
+
+
+def is_field(value: ModelValue) -> bool:
+    """Whether a value is a vector field."""
+    return is_node(value) and kind_of(value) == "field"
+
+
+def _is_vector(value: ModelValue) -> bool:
+    return kind_of_model(value) == "vector" or isinstance(value, Instance)
+
+
+def binary(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    """Python's arithmetic where at least one side is an expression."""
+    if _is_vector(left) or _is_vector(right):
+        if op in "+-":
+            combined = build.vector_sum if op == "+" else build.vector_difference
+            return combined(to_vector(left, span), to_vector(right, span), span)
+        if op == "*" and _is_vector(left) != _is_vector(right):
+            vector, factor = (left, right) if _is_vector(left) else (right, left)
+            return build.scale(to_vector(vector, span), to_scalar(factor, span), span)
+        if op == "/" and not _is_vector(right):
+            one = build.arithmetic(ArithmeticOp.DIV, build.constant(1.0), to_scalar(right, span), span=span)
+            return build.scale(to_vector(left, span), one, span)
+        raise fail("wrong-type", f"`{op}` has no meaning for a vector", span, "on a vector")
+    if op not in _BINARY:
+        raise fail("unsupported-construct", f"`{op}` is not supported on random values", span, "on a random value")
+    return build.arithmetic(_BINARY[op], to_scalar(left, span), to_scalar(right, span), span=span)
+
+
+def negate(value: ModelValue, span: Span) -> ModelValue:
+    """Unary minus of an expression."""
+    if _is_vector(value):
+        return build.scale(to_vector(value, span), build.constant(-1.0), span)
+    return build.arithmetic(ArithmeticOp.NEG, to_scalar(value, span), span=span)
+
+
+def compare(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    """A comparison where at least one side is an expression."""
+    if op in ("==", "!="):
+        return build.compare(_COMPARE[op], to_node(left, span), to_node(right, span), span)
+    return build.compare(_COMPARE[op], to_scalar(left, span), to_scalar(right, span), span)
+
+
+def combine(op: str, values: list[ModelValue], span: Span) -> ModelValue:
+    """`and`, `or`, `not` of expressions."""
+    return build.logic(LogicOp(op), *(to_boolean(value, span) for value in values), span=span)
+
+
+def direction_at(field: ModelValue, point: ModelValue, span: Span | None) -> Node:
+    """`F at V`: the direction of a vector field."""
+    return DirectionAt(to_field(field, span), to_vector(point, span), span=span)
+
+
+def relative_to(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    """`X relative to Y`: headings and fields add up, a vector is offset from an oriented point or another vector."""
+    if is_field(left) or is_field(right):
+
+        def at_object(value: ModelValue, instance: Instance) -> Node:
+            position = property_node(instance, "position", span)
+            return direction_at(value, position, span) if is_field(value) else to_heading(value, span)
+
+        return Delayed(
+            frozenset({"position"}),
+            lambda instance: build.add(at_object(left, instance), at_object(right, instance), span),
+        )
+    vector_like = kind_of_model(left) == "vector" or isinstance(left, tuple | list)
+    if vector_like or (isinstance(left, Instance) and not left.oriented):
+        return offset(right, left, span)
+    if isinstance(left, Instance) and isinstance(right, Instance):
+        raise fail("wrong-type", "`relative to` of two oriented points is ambiguous", span, "a heading or a position?",
+                   ("write `A.heading relative to B.heading` or `A.position relative to B`",))  # fmt: skip
+    return build.add(to_heading(left, span), to_heading(right, span), span)
+
+
+def offset(origin: ModelValue, by: ModelValue, span: Span) -> ModelValue:
+    """`O offset by V`: in the frame of an oriented point, else plain addition."""
+    if isinstance(origin, Instance) and origin.oriented:
+        position = build.offset_local(to_vector(origin, span), to_heading(origin, span), to_vector(by, span), span)
+        return oriented(position, to_heading(origin, span))
+    return build.vector_sum(to_vector(origin, span), to_vector(by, span), span)
+
+
+def along(origin: ModelValue, direction: ModelValue, by: ModelValue, span: Span) -> Node:
+    """`V offset along D by V`, where D is a heading or a field taken at the origin."""
+    start = to_vector(origin, span)
+    heading = direction_at(direction, start, span) if is_field(direction) else to_heading(direction, span)
+    return build.offset_local(start, heading, to_vector(by, span), span)
+
+
+def oriented(position: Node, heading: Node) -> Instance:
+    """An oriented point."""
+    return oriented_point({"position": position, "heading": heading})
+
+
+def relative_heading(target: ModelValue, origin: ModelValue, span: Span) -> Node:
+    """`relative heading of H from H`, normalised."""
+    turned = build.minus(to_heading(target, span), to_heading(origin, span), span)
+    return build.arithmetic(ArithmeticOp.WRAP, turned, span=span)
+
+
+def apparent_heading(target: ModelValue, origin: ModelValue, span: Span) -> Node:
+    """`apparent heading of OP from V`: the heading relative to the line of sight."""
+    if not (isinstance(target, Instance) and target.oriented):
+        raise fail("wrong-type", "`apparent heading of` needs an oriented point", span, f"this is {describe(target)}")
+    line = build.vector_difference(to_vector(target, span), to_vector(origin, span), span)
+    turned = build.minus(to_heading(target, span), build.bearing(line, span), span)
+    return build.arithmetic(ArithmeticOp.WRAP, turned, span=span)
+
+
+def angle_to(target: ModelValue, origin: ModelValue, span: Span) -> Node:
+    """`angle from V to V`: the heading of the line of sight."""
+    return build.bearing(build.vector_difference(to_vector(target, span), to_vector(origin, span), span), span)
+
+
+def distance_to(target: ModelValue, origin: ModelValue, span: Span) -> Node:
+    """`distance from X to Y`: between positions, or to a region (0 inside)."""
+    start = to_vector(origin, span)
+    if kind_of_model(target) == "region":
+        return fold(Distance(to_region(target, span), start, span=span))
+    if kind_of_model(origin) == "region":
+        return fold(Distance(to_region(origin, span), to_vector(target, span), span=span))
+    return build.norm(build.vector_difference(to_vector(target, span), start, span), span)
+
+
+def visible_region(viewer: ModelValue, span: Span | None) -> Node:
+    """What a point, oriented point or object sees (appendix B: visibleRegion)."""
+    if not isinstance(viewer, Instance):
+        raise fail("wrong-type", "only a point, oriented point or object can see", span, f"this is {describe(viewer)}")
+    center = to_vector(viewer, span)
+    radius = to_scalar(property_node(viewer, "visibleDistance", span), span)
+    if not viewer.oriented:
+        return build.sector(center, radius, None, None, span)
+    heading = to_heading(viewer, span)
+    if "cameraOffset" in viewer.properties:
+        camera = to_vector(viewer.properties["cameraOffset"], span)
+        if not (isinstance(camera, Constant) and camera.value == (0.0, 0.0)):
+            center = build.offset_local(center, heading, camera, span)
+    angle = to_scalar(property_node(viewer, "viewAngle", span), span)
+    return build.sector(center, radius, heading, angle, span)
+
+
+def object_box(instance: Instance, span: Span | None) -> Node:
+    """The bounding box of an object."""
+    width, length = (to_scalar(property_node(instance, name, span), span) for name in ("width", "length"))
+    return build.box(to_vector(instance, span), to_heading(instance, span), width, length, span)
+
+
+def _is_object(value: ModelValue) -> bool:
+    return isinstance(value, Instance) and value.index is not None
+
+
+def can_see(viewer: ModelValue, target: ModelValue, span: Span) -> Node:
+    """`X can see Y`: the visible region holds the point or meets the object's box."""
+    seen = visible_region(viewer, span)
+    if _is_object(target):
+        return fold(Intersects(seen, object_box(target, span), span=span))
+    return fold(Contains(seen, to_vector(target, span), span=span))
+
+
+def within(item: ModelValue, region: ModelValue, span: Span) -> Node:
+    """`X in R`: a point in a region; an object with all of its box."""
+    area = to_region(region, span)
+    if _is_object(item):
+        return fold(Encloses(area, object_box(item, span), span=span))
+    return fold(Contains(area, to_vector(item, span), span=span))
+
+
+def intersects(left: ModelValue, right: ModelValue, span: Span) -> Node:
+    """`X intersects Y` of objects and regions."""
+    shapes = [object_box(value, span) if _is_object(value) else to_region(value, span) for value in (left, right)]
+    return fold(Intersects(shapes[0], shapes[1], span=span))
+
+
+def region_union(left: ModelValue, right: ModelValue, span: Span) -> Node:
+    """What lies in either region."""
+    return fold(RegionUnion((to_region(left, span), to_region(right, span)), span=span))
+
+
+def region_intersection(left: ModelValue, right: ModelValue, span: Span) -> Node:
+    """What lies in both regions."""
+    return fold(RegionIntersection((to_region(left, span), to_region(right, span)), span=span))
+
+
+def region_difference(left: ModelValue, right: ModelValue, span: Span) -> Node:
+    """What lies in the left region only."""
+    return fold(RegionDifference(to_region(left, span), to_region(right, span), span=span))
+
+
+def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
+    """The preferred heading of a region at a point; None if it has none."""
+    match region:
+        case Constant():
+            field = orientation_of(cast(Region, region.value))
+            return None if field is None else DirectionAt(build.constant(field, span), point, span=span)
+        case Select():
+            options = [orientation(option, point, span) for option in region.options]
+            if any(option is None for option in options):
+                return None
+            fields = tuple(cast(DirectionAt, option).field for option in options)
+            if len({id(cast(Constant, field).value) for field in fields}) == 1:
+                return options[0]
+            return DirectionAt(Select(region.index, fields, span=span), point, span=span)
+        case RegionIntersection() | RegionUnion():
+            found = (orientation(part, point, span) for part in region.parts)
+            return next((heading for heading in found if heading is not None), None)
+        case RegionDifference():
+            return orientation(region.base, point, span)
+        case _:
+            return None
+
+
+def follow(field: ModelValue, start: ModelValue, distance: ModelValue, span: Span) -> Instance:
+    """`follow F from V for S`: forward Euler in four steps, and the field's heading at the end (appendix B)."""
+    point = to_vector(start, span)
+    step = build.arithmetic(
+        ArithmeticOp.DIV, to_scalar(distance, span), build.constant(float(FOLLOW_STEPS)), span=span
+    )
+    for _ in range(FOLLOW_STEPS):
+        ahead = build.vector(build.constant(0.0), step, span)
+        point = build.vector_sum(point, build.rotate(ahead, direction_at(field, point, span), span), span)
+    return oriented(point, direction_at(field, point, span))
+
+
+def degrees(value: ModelValue, span: Span) -> ModelValue:
+    """`S deg`."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return math.radians(value)
+    return build.arithmetic(ArithmeticOp.MUL, to_scalar(value, span), build.constant(math.pi / 180), span=span)
+
+
+def map_choice(value: ModelValue, function: Callable[[Any], ModelValue], span: Span | None) -> ModelValue:
+    """Apply a function to each option of a random choice; an expression if all results can be one."""
+    if not isinstance(value, Choice):
+        return function(value)
+    return make_choice(value.index, [function(option) for option in value.options], span)
+
+
+def make_choice(index: Any, options: list[ModelValue], span: Span | None) -> ModelValue:
+    """A random choice as an expression where all options are numbers, vectors or regions of one kind."""
+    kinds = {kind_of_model(option) for option in options}
+    plain = all(not isinstance(option, Instance) and kind_of_model(option) is not None for option in options)
+    elements = any(kind_of_model(option) == "region" and not is_node(option) for option in options)
+    if plain and len(kinds) == 1 and not elements:
+        return Select(index, tuple(to_node(option, span) for option in options), span=span)
+    return Choice(index, tuple(options))

@@ -1,0 +1,168 @@
+"""Specifiers, and how an object is built from them (language paper, section 5.2, algorithm 1 and appendix B.3).
+
+A specifier gives properties, some of them only if nothing else does (optionally), and needs others. `construct` puts
+explicit specifiers, optional ones and class defaults in an order in which everything needed is there, and evaluates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, ScenicClass, fail
+from scenicq.errors import Note, Span
+
+__all__ = ["BoundSpecifier", "Evaluator", "construct"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoundSpecifier:
+    """A specifier whose arguments are evaluated.
+
+    Attributes:
+        gives: Properties that it specifies.
+        optionally: Properties that it specifies unless another specifier does.
+        needs: Properties of the object that it needs.
+        evaluate: Values of the properties, given the object so far.
+        span: The specifier in the program.
+        explicit: Whether the user's program rather than a library says it.
+    """
+
+    gives: frozenset[str]
+    optionally: frozenset[str]
+    needs: frozenset[str]
+    evaluate: Callable[[Instance], Mapping[str, ModelValue]]
+    span: Span | None
+    explicit: bool = True
+
+
+class Evaluator(Protocol):
+    """What construction asks of the interpreter."""
+
+    def default(self, definition: PropertyDefinition, instance: Instance) -> ModelValue:
+        """The value of a property's default for an instance."""
+        ...
+
+
+def _default_specifier(
+    name: str, chain: list[PropertyDefinition], evaluator: Evaluator
+) -> BoundSpecifier:
+    first = chain[0]
+    additive = "additive" in first.modifiers
+    used = chain if additive else chain[:1]
+
+    def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
+        values = [evaluator.default(definition, instance) for definition in used]
+        return {name: tuple(values) if additive else values[0]}
+
+    needs = frozenset[str]().union(*(definition.needs for definition in used))
+    return BoundSpecifier(frozenset({name}), frozenset(), needs, evaluate, first.span, not first.library)
+
+
+def _definitions(cls: ScenicClass) -> dict[str, list[PropertyDefinition]]:
+    found: dict[str, list[PropertyDefinition]] = {}
+    for ancestor in cls.ancestry():
+        for name, definition in ancestor.definitions.items():
+            found.setdefault(name, []).append(definition)
+    return found
+
+
+def _conflict(name: str, first: BoundSpecifier, second: BoundSpecifier) -> Exception:
+    notes = (Note(first.span, f"specifies `{name}` first"),) if first.span else ()
+    return fail(
+        "specifier-conflict",
+        f"`{name}` is specified twice",
+        second.span,
+        f"also specifies `{name}`",
+        ("keep one of the two specifiers",),
+        notes,
+    )
+
+
+def _choose(specifiers: Iterable[BoundSpecifier]) -> dict[str, BoundSpecifier]:
+    """Which specifier gives each property: the outright one, else the only optional one."""
+    specifiers = tuple(specifiers)
+    chosen: dict[str, BoundSpecifier] = {}
+    for specifier in specifiers:
+        for name in sorted(specifier.gives):
+            if name in chosen:
+                raise _conflict(name, chosen[name], specifier)
+            chosen[name] = specifier
+    optional: dict[str, BoundSpecifier] = {}
+    for specifier in specifiers:
+        for name in sorted(specifier.optionally - chosen.keys()):
+            if name in optional:
+                raise _conflict(name, optional[name], specifier)
+            optional[name] = specifier
+    return chosen | optional
+
+
+def construct(
+    instance: Instance,
+    specifiers: tuple[BoundSpecifier, ...],
+    evaluator: Evaluator,
+) -> None:
+    """Fill an instance's properties (language paper, algorithm 1).
+
+    Args:
+        instance: The instance, without properties.
+        specifiers: What the program says, in order.
+        evaluator: Evaluates class defaults.
+
+    Raises:
+        ScenarioError: specifier-conflict, specifier-missing or specifier-cycle.
+    """
+    definitions = _definitions(instance.cls)
+    chosen = _choose(specifiers)
+    for name, specifier in chosen.items():
+        final = next((d for d in definitions.get(name, ()) if "final" in d.modifiers), None)
+        if final is not None:
+            raise fail("specifier-conflict", f"`{name}` is final in `{instance.cls.name}`", specifier.span,
+                       "cannot be specified", ("remove this specifier",))  # fmt: skip
+    for name, chain in definitions.items():
+        if name not in chosen:
+            chosen[name] = _default_specifier(name, chain, evaluator)
+    for name in _order(chosen, instance):
+        specifier = chosen[name]
+        if name in instance.properties:
+            continue
+        for given, value in specifier.evaluate(instance).items():
+            if chosen.get(given) is specifier:
+                instance.properties[given] = value
+                instance.spans[given] = specifier.span
+                if specifier.explicit:
+                    instance.explicit.add(given)
+
+
+def _order(chosen: Mapping[str, BoundSpecifier], instance: Instance) -> list[str]:
+    """Properties in an order in which each comes after what its specifier needs."""
+    order: list[str] = []
+    state: dict[str, int] = {}
+    path: list[str] = []
+    stack: list[tuple[str, bool]] = [(name, False) for name in sorted(chosen, reverse=True)]
+    while stack:
+        name, leaving = stack.pop()
+        if leaving:
+            state[name] = 2
+            path.pop()
+            order.append(name)
+            continue
+        if state.get(name) == 2:
+            continue
+        if state.get(name) == 1:
+            circle = [*path[path.index(name) :], name]
+            shown = " -> ".join(f"`{step}`" for step in circle)
+            raise fail("specifier-cycle", f"specifiers depend on each other: {shown}", chosen[name].span,
+                       f"`{name}` is needed to compute itself",
+                       (f"give `{name}` a value that does not depend on the others",))  # fmt: skip
+        state[name] = 1
+        path.append(name)
+        stack.append((name, True))
+        for needed in sorted(chosen[name].needs, reverse=True):
+            if needed not in chosen:
+                raise fail("specifier-missing", f"`{needed}` is needed here but `{instance.cls.name}` has no such property",
+                           chosen[name].span, f"needs `{needed}`")  # fmt: skip
+            if state.get(needed) != 2:
+                stack.append((needed, False))
+    return order

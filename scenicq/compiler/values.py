@@ -1,0 +1,231 @@
+"""What names stand for while a program is evaluated.
+
+A value is a plain Python value (number, string, list, function ...), a forest node (anything random, every vector and
+region), or one of the classes below. Nothing here evaluates syntax.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+from scenicq.errors import Diagnostic, Note, ScenarioError, Span
+from scenicq.forest.nodes import Index, Node
+from scenicq.syntax import ast
+
+__all__ = [
+    "Builtin",
+    "Choice",
+    "Delayed",
+    "Function",
+    "Instance",
+    "ModelValue",
+    "Module",
+    "PropertyDefinition",
+    "ScenicClass",
+    "describe",
+    "fail",
+    "is_node",
+    "lift",
+]
+
+ModelValue: TypeAlias = Any
+"""A value of the program; `Any` because programs are dynamically typed."""
+
+
+def is_node(value: ModelValue) -> bool:
+    """Whether a value is an expression of the forest."""
+    return isinstance(value, Node)
+
+
+def fail(
+    code: str,
+    message: str,
+    span: Span | None,
+    label: str = "",
+    hints: tuple[str, ...] = (),
+    notes: tuple[Note, ...] = (),
+) -> ScenarioError:
+    """The error to raise for a fault of the program."""
+    return ScenarioError(Diagnostic(code, message, span, label, notes, hints))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PropertyDefinition:
+    """A property line of a class.
+
+    Attributes:
+        name: The property.
+        default: Its expression, evaluated for every instance; None for built-in properties.
+        computed: The value for an instance where there is no expression.
+        needs: Properties of `self` that the expression uses.
+        modifiers: "additive", "final" or "dynamic".
+        environment: Variables that the expression sees.
+        library: Whether a library rather than the user's program defines it.
+    """
+
+    name: str
+    default: ast.Expression | None
+    computed: Callable[[Instance], ModelValue]
+    needs: frozenset[str]
+    modifiers: tuple[str, ...]
+    environment: Any
+    library: bool
+    span: Span | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScenicClass:
+    """A class of points, oriented points or objects.
+
+    Attributes:
+        name: Its name.
+        base: Its superclass; None for `Point`.
+        definitions: Its own property lines.
+        attributes: Other names that its body defines.
+        category: The name in the class tree that label objects are compared with.
+    """
+
+    name: str
+    base: ScenicClass | None
+    definitions: Mapping[str, PropertyDefinition]
+    attributes: Mapping[str, ModelValue]
+    category: str
+    span: Span | None = None
+
+    def ancestry(self) -> list[ScenicClass]:
+        """The class and its superclasses, most derived first."""
+        chain: list[ScenicClass] = []
+        current: ScenicClass | None = self
+        while current is not None:
+            chain.append(current)
+            current = current.base
+        return chain
+
+    def derives_from(self, name: str) -> bool:
+        """Whether the class or a superclass has a name."""
+        return any(ancestor.name == name for ancestor in self.ancestry())
+
+
+@dataclass(slots=True, eq=False)
+class Instance:
+    """A point, oriented point or object that the program creates.
+
+    Attributes:
+        cls: Its class.
+        index: Its index among the scenario's objects; None for points and oriented points.
+        properties: Values by name.
+        explicit: Names of properties that the program itself sets.
+        spans: Where each property comes from.
+        label: The name that the program gives it.
+        mutation: Scale of `mutate`, None if not mutated.
+        span: The expression that creates it.
+    """
+
+    cls: ScenicClass
+    index: int | None
+    span: Span | None
+    properties: dict[str, ModelValue] = field(default_factory=dict[str, Any])
+    explicit: set[str] = field(default_factory=set[str])
+    spans: dict[str, Span | None] = field(default_factory=dict[str, "Span | None"])
+    label: str = ""
+    mutation: ModelValue = None
+
+    @property
+    def oriented(self) -> bool:
+        """Whether it has a heading."""
+        return self.cls.derives_from("OrientedPoint")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Delayed:
+    """A value that needs properties of the object being specified, such as `10 deg relative to roadDirection`.
+
+    Attributes:
+        needs: The properties.
+        evaluate: The value, given the object.
+    """
+
+    needs: frozenset[str]
+    evaluate: Callable[[Instance], ModelValue]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Choice:
+    """One of several values that are not numbers, vectors or regions: which one is random."""
+
+    index: Index
+    options: tuple[ModelValue, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Function:
+    """A function of the program."""
+
+    name: str
+    parameters: tuple[ast.Parameter, ...]
+    defaults: Mapping[str, ModelValue]
+    body: tuple[ast.Statement, ...] | ast.Expression
+    environment: Any
+    span: Span
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Builtin:
+    """A function that the language provides.
+
+    Attributes:
+        name: What programs call it.
+        call: Takes the span of the call, positional and keyword arguments.
+        lifted: Whether the call waits for delayed arguments.
+    """
+
+    name: str
+    call: Callable[..., ModelValue]
+    lifted: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Module:
+    """An imported module: names and their values."""
+
+    name: str
+    names: Mapping[str, ModelValue]
+
+
+def lift(needed: Callable[..., ModelValue], *args: ModelValue) -> ModelValue:
+    """Apply a function now, or, if an argument is delayed, as soon as the object's properties are known."""
+    delayed = [arg for arg in args if isinstance(arg, Delayed)]
+    if not delayed:
+        return needed(*args)
+    needs = frozenset[str]().union(*(arg.needs for arg in delayed))
+    return Delayed(
+        needs,
+        lambda instance: lift(needed, *(arg.evaluate(instance) if isinstance(arg, Delayed) else arg for arg in args)),
+    )
+
+
+_NAMES: dict[type, str] = {
+    bool: "a truth value",
+    int: "a number",
+    float: "a number",
+    str: "a string",
+    list: "a list",
+    tuple: "a tuple",
+    dict: "a dictionary",
+    set: "a set",
+    type(None): "None",
+    Function: "a function",
+    Builtin: "a function",
+    ScenicClass: "a class",
+    Module: "a module",
+    Choice: "a random choice",
+}
+
+
+def describe(value: ModelValue) -> str:
+    """What a value is, in words for a message."""
+    if isinstance(value, Instance):
+        return f"an instance of `{value.cls.name}`"
+    return _NAMES.get(type(value)) or f"a {type(value).__name__}"

@@ -1,0 +1,236 @@
+"""Diagnostics: what went wrong, where, and what to do about it.
+
+One value (`Diagnostic`), one renderer (`render`), one family of exceptions. This module knows nothing of scenarios,
+datasets or terminals; every other module of the package may import it.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from bisect import bisect_right
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+__all__ = [
+    "CODES",
+    "DataError",
+    "Diagnostic",
+    "Note",
+    "ScenarioError",
+    "ScenicqError",
+    "SolverError",
+    "Source",
+    "Span",
+    "render",
+]
+
+CODES: dict[str, str] = {
+    # the program
+    "parse-error": "the text is not Scenic",
+    "mixed-versions": "one program uses the spellings of two versions of Scenic",
+    "unknown-name": "a name is used that nothing defines",
+    "unknown-attribute": "a value has no attribute of that name",
+    "unknown-specifier": "no specifier is spelled like this",
+    "unknown-property": "an object has no property of that name",
+    "unknown-model": "a world model or module that is not known here",
+    "specifier-conflict": "two specifiers give the same property",
+    "specifier-cycle": "specifiers depend on each other in a circle",
+    "specifier-missing": "a specifier needs a property that nothing gives",
+    "wrong-type": "a value of another type is needed",
+    "wrong-arity": "a call with too many or too few arguments",
+    "wrong-value": "a value outside of what makes sense",
+    "random-branch": "control flow depends on a random value",
+    "no-ego": "the program needs an ego object and defines none",
+    "unsupported-construct": "Scenic, but not part of what can be matched",
+    "unsupported-region": "a region of a kind that cannot be used here",
+    "impossible-requirement": "a requirement that no scene satisfies",
+    "budget-exceeded": "the program takes too many steps or too much memory",
+    "runtime-error": "evaluating the program failed",
+    "map-lacks": "the map of the dataset has no element of the needed kind",
+    "option-invalid": "an option has a value that cannot be used",
+    # the data
+    "unknown-class": "an object class that no taxonomy lists",
+    "dataset-unrecognised": "no importer recognises the source",
+    "dataset-ambiguous": "several importers recognise the source",
+    "dataset-empty": "the source holds no frame",
+    "file-missing": "a file that the source must have is not there",
+    "file-invalid": "a file cannot be read as what it should be",
+    "record-invalid": "one record of the source is not sound",
+    "map-missing": "a map that the labels refer to is not there",
+    "map-invalid": "an element of a map is not sound",
+    "store-missing": "the folder is not a dataset of ours",
+    "store-version": "the dataset was written by another version",
+    "store-damaged": "a file of the dataset is missing or changed",
+    "target-exists": "the target is there already",
+    "target-unwritable": "the target cannot be written",
+    # the solvers
+    "solver-missing": "the solver cannot be loaded",
+    "solver-failed": "the solver cannot be started",
+}
+"""Every diagnostic code with its meaning."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A text that diagnostics point into.
+
+    Attributes:
+        name: What the text is called in messages, usually the file's name as the user gave it.
+        text: The text.
+    """
+
+    name: str
+    text: str
+
+    @cached_property
+    def line_starts(self) -> tuple[int, ...]:
+        """Offsets at which the lines start."""
+        starts = [0]
+        for number, character in enumerate(self.text):
+            if character == "\n":
+                starts.append(number + 1)
+        return tuple(starts)
+
+    def position(self, offset: int) -> tuple[int, int]:
+        """Line and column of an offset, both counted from 1."""
+        line = bisect_right(self.line_starts, offset) - 1
+        return line + 1, offset - self.line_starts[line] + 1
+
+    def line(self, number: int) -> str:
+        """The text of a line (counted from 1), without its end."""
+        start = self.line_starts[number - 1]
+        end = self.line_starts[number] if number < len(self.line_starts) else len(self.text)
+        return self.text[start:end].rstrip("\r\n")
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A half-open range of characters of a source."""
+
+    source: Source = field(repr=False)
+    start: int
+    end: int
+
+    @property
+    def place(self) -> str:
+        """`file:line:column` of the start."""
+        line, column = self.source.position(self.start)
+        return f"{self.source.name}:{line}:{column}"
+
+    @property
+    def text(self) -> str:
+        """The characters of the span."""
+        return self.source.text[self.start : self.end]
+
+    def to(self, other: Span) -> Span:
+        """The span from the start of this one to the end of the other."""
+        return Span(self.source, self.start, max(self.end, other.end))
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A second place that explains a diagnostic."""
+
+    span: Span
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One fact that the user must know.
+
+    Attributes:
+        code: A key of `CODES`.
+        message: The fact, one line, no full stop.
+        span: The smallest text that must change, if the fact is about a text.
+        label: Why this place, printed beside the caret.
+        notes: Other places.
+        hints: Statements that one can act on.
+        severity: "error" or "warning".
+    """
+
+    code: str
+    message: str
+    span: Span | None = None
+    label: str = ""
+    notes: tuple[Note, ...] = ()
+    hints: tuple[str, ...] = ()
+    severity: str = "error"
+
+    def __post_init__(self) -> None:
+        assert self.code in CODES, self.code
+
+
+class ScenicqError(Exception):
+    """Base of all errors that are the input's fault.
+
+    Attributes:
+        diagnostics: What is wrong, at least one.
+    """
+
+    def __init__(self, diagnostics: Diagnostic | Iterable[Diagnostic]) -> None:
+        """Take one or several diagnostics."""
+        single = isinstance(diagnostics, Diagnostic)
+        self.diagnostics: tuple[Diagnostic, ...] = (diagnostics,) if single else tuple(diagnostics)
+        super().__init__("\n".join(render(diagnostic) for diagnostic in self.diagnostics))
+
+    def __reduce__(self) -> tuple[type[ScenicqError], tuple[tuple[Diagnostic, ...]]]:
+        """Rebuild from the diagnostics: errors cross process boundaries."""
+        return type(self), (self.diagnostics,)
+
+
+class ScenarioError(ScenicqError):
+    """The Scenic program is wrong or uses what is not supported."""
+
+
+class DataError(ScenicqError):
+    """A source, a map or a dataset on disk is wrong."""
+
+
+class SolverError(ScenicqError):
+    """A solver is missing or cannot be started."""
+
+
+def _columns(text: str) -> int:
+    """Width of a text on a terminal: wide characters take two columns, combining ones none."""
+    return sum(
+        0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1
+        for c in text
+    )
+
+
+def _excerpt(span: Span, label: str, mark: str, margin: int) -> list[str]:
+    source = span.source
+    line, column = source.position(span.start)
+    whole = source.line(line)
+    end = min(span.end - source.line_starts[line - 1], len(whole))
+    before = whole[: column - 1].expandtabs(4)
+    marked = whole[: max(end, column - 1)].expandtabs(4)
+    width = max(1, _columns(marked) - _columns(before))
+    last, _ = source.position(max(span.start, span.end - 1))
+    more = f" (to line {last})" if last > line else ""
+    carets = f"{' ' * _columns(before)}{mark * width} {label}{more}".rstrip()
+    return [f"{line:>{margin}} | {whole.expandtabs(4)}", f"{' ' * margin} | {carets}"]
+
+
+def render(diagnostic: Diagnostic) -> str:
+    """Show a diagnostic as text: one headline, the place with carets, notes, hints."""
+    lines = [f"{diagnostic.severity}[{diagnostic.code}]: {diagnostic.message}"]
+    spans = [diagnostic.span] if diagnostic.span else []
+    spans += [note.span for note in diagnostic.notes]
+    numbers = [span.source.position(span.start)[0] for span in spans]
+    margin = len(str(max(numbers, default=1)))
+    pad = " " * margin
+    if diagnostic.span:
+        lines += [f"{pad}--> {diagnostic.span.place}", f"{pad} |"]
+        lines += _excerpt(diagnostic.span, diagnostic.label, "^", margin)
+    elif diagnostic.label:
+        lines.append(f"{pad} = note: {diagnostic.label}")
+    for note in diagnostic.notes:
+        if diagnostic.span is None or note.span.source is not diagnostic.span.source:
+            lines.append(f"{pad}::: {note.span.place}")
+        lines.append(f"{pad} |")
+        lines += _excerpt(note.span, note.text, "-", margin)
+    lines += [f"{pad} = hint: {hint}" for hint in diagnostic.hints]
+    return "\n".join(lines)

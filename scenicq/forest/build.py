@@ -1,0 +1,148 @@
+"""Building expressions: small constructors that fold what is already known.
+
+The vocabulary of the language paper's appendix B: `offset_local`, `rotate`, `heading_toward`, `visible_region` and so on.
+"""
+
+from __future__ import annotations
+
+import math
+
+from scenicq.errors import Span
+from scenicq.forest.compute import fold
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Bearing,
+    Compare,
+    CompareOp,
+    Constant,
+    Coordinate,
+    DiscAt,
+    Logic,
+    LogicOp,
+    Node,
+    Norm,
+    RectangleAt,
+    Rotate,
+    Scale,
+    SectorAt,
+    Value,
+    VectorOf,
+    VectorSum,
+)
+
+__all__ = [
+    "add",
+    "arithmetic",
+    "bearing",
+    "box",
+    "compare",
+    "constant",
+    "coordinate",
+    "logic",
+    "minus",
+    "norm",
+    "offset_local",
+    "rotate",
+    "scale",
+    "sector",
+    "vector",
+    "vector_difference",
+    "vector_sum",
+]
+
+
+def constant(value: Value, span: Span | None = None) -> Constant:
+    """A known value; integers become floats."""
+    return Constant(float(value) if isinstance(value, int) and not isinstance(value, bool) else value, span=span)
+
+
+def arithmetic(op: ArithmeticOp, *args: Node, span: Span | None = None) -> Node:
+    """An operation on scalars."""
+    return fold(Arithmetic(op, args, span=span))
+
+
+def _is(node: Node, value: float) -> bool:
+    return isinstance(node, Constant) and node.value == value
+
+
+def add(left: Node, right: Node, span: Span | None = None) -> Node:
+    """The sum of two scalars."""
+    if _is(left, 0.0):
+        return right
+    return left if _is(right, 0.0) else arithmetic(ArithmeticOp.ADD, left, right, span=span)
+
+
+def minus(left: Node, right: Node, span: Span | None = None) -> Node:
+    """The difference of two scalars."""
+    return left if _is(right, 0.0) else arithmetic(ArithmeticOp.SUB, left, right, span=span)
+
+
+def compare(op: CompareOp, left: Node, right: Node, span: Span | None = None) -> Node:
+    """A comparison."""
+    return fold(Compare(op, left, right, span=span))
+
+
+def logic(op: LogicOp, *args: Node, span: Span | None = None) -> Node:
+    """A connective."""
+    return fold(Logic(op, args, span=span))
+
+
+def vector(x: Node, y: Node, span: Span | None = None) -> Node:
+    """A vector from its coordinates."""
+    return fold(VectorOf(x, y, span=span))
+
+
+def coordinate(value: Node, axis: int, span: Span | None = None) -> Node:
+    """The x (0) or y (1) of a vector."""
+    if isinstance(value, VectorOf):
+        return value.y if axis else value.x
+    return fold(Coordinate(value, axis, span=span))
+
+
+def vector_sum(left: Node, right: Node, span: Span | None = None) -> Node:
+    """The sum of two vectors."""
+    return fold(VectorSum(left, right, span=span))
+
+
+def vector_difference(left: Node, right: Node, span: Span | None = None) -> Node:
+    """The difference of two vectors."""
+    return vector_sum(left, scale(right, constant(-1.0), span), span)
+
+
+def scale(value: Node, factor: Node, span: Span | None = None) -> Node:
+    """A vector times a scalar."""
+    return fold(Scale(value, factor, span=span))
+
+
+def rotate(value: Node, angle: Node, span: Span | None = None) -> Node:
+    """A vector turned counter-clockwise by an angle (appendix B: rotate)."""
+    return value if _is(angle, 0.0) else fold(Rotate(value, angle, span=span))
+
+
+def norm(value: Node, span: Span | None = None) -> Node:
+    """The length of a vector."""
+    return fold(Norm(value, span=span))
+
+
+def bearing(value: Node, span: Span | None = None) -> Node:
+    """The heading in which a vector points (appendix B: arctan of the vector)."""
+    return fold(Bearing(value, span=span))
+
+
+def offset_local(origin: Node, heading: Node, offset: Node, span: Span | None = None) -> Node:
+    """A position offset in a local frame (appendix B: offsetLocal): x to the right, y ahead."""
+    return vector_sum(origin, rotate(offset, heading, span), span)
+
+
+def box(position: Node, heading: Node, width: Node, length: Node, span: Span | None = None) -> Node:
+    """The bounding box of an object (appendix B: boundingBox)."""
+    return fold(RectangleAt(position, heading, width, length, span=span))
+
+
+def sector(center: Node, radius: Node, heading: Node | None, angle: Node | None, span: Span | None = None) -> Node:
+    """A visible region (appendix B: visibleRegion): a sector, or a disc where there is no view angle below 2 pi."""
+    full = angle is None or (isinstance(angle, Constant) and isinstance(angle.value, float) and angle.value >= math.tau)
+    if heading is None or angle is None or full:
+        return fold(DiscAt(center, radius, span=span))
+    return fold(SectorAt(center, radius, heading, angle, span=span))

@@ -1,0 +1,279 @@
+"""The meaning of every node that is not random: its value from the values of its children.
+
+The formulas are those of the language paper's appendix B. A value that does not exist (the road's direction far from
+roads, a division by zero) is `Undefined` and spreads to whatever uses it; a question that geometry cannot answer
+raises `CannotEvaluate`, which the matcher reports as unknown, never as no.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import cast
+
+import shapely
+
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Bearing,
+    Compare,
+    CompareOp,
+    Constant,
+    Contains,
+    Coordinate,
+    DirectionAt,
+    DiscAt,
+    Distance,
+    Encloses,
+    Intersects,
+    Logic,
+    LogicOp,
+    Node,
+    Norm,
+    RectangleAt,
+    RegionDifference,
+    RegionIntersection,
+    RegionUnion,
+    Rotate,
+    Scale,
+    SectorAt,
+    Select,
+    Undefined,
+    Value,
+    Vector,
+    VectorOf,
+    VectorSum,
+)
+from scenicq.forest.walk import children, is_leaf
+from scenicq.geometry.angles import heading_of, normalize, rotate
+from scenicq.geometry.boxes import box_polygon
+from scenicq.geometry.fields import VectorField
+from scenicq.geometry.meeting import meets
+from scenicq.geometry.membership import contains, distance
+from scenicq.geometry.regions import (
+    Disc,
+    Everywhere,
+    IntersectionOf,
+    PolygonSet,
+    Rectangle,
+    Region,
+    Sector,
+    UnionOf,
+    difference,
+    intersection,
+    union,
+)
+
+__all__ = ["CannotEvaluate", "compute", "directions", "fold"]
+
+
+class CannotEvaluate(Exception):
+    """A question that plain evaluation cannot answer; the message says which."""
+
+
+def _divide(a: float, b: float) -> float:
+    return a / b
+
+
+_SCALAR: dict[ArithmeticOp, Callable[..., float]] = {
+    ArithmeticOp.ADD: lambda *args: math.fsum(args) if len(args) > 2 else args[0] + args[1],
+    ArithmeticOp.SUB: lambda a, b: a - b,
+    ArithmeticOp.MUL: lambda a, b: a * b,
+    ArithmeticOp.DIV: _divide,
+    ArithmeticOp.FLOORDIV: lambda a, b: a // b,
+    ArithmeticOp.MOD: lambda a, b: a % b,
+    ArithmeticOp.POW: lambda a, b: a**b,
+    ArithmeticOp.NEG: lambda a: -a,
+    ArithmeticOp.ABS: abs,
+    ArithmeticOp.MIN: min,
+    ArithmeticOp.MAX: max,
+    ArithmeticOp.SQRT: math.sqrt,
+    ArithmeticOp.SIN: math.sin,
+    ArithmeticOp.COS: math.cos,
+    ArithmeticOp.TAN: math.tan,
+    ArithmeticOp.ASIN: math.asin,
+    ArithmeticOp.ACOS: math.acos,
+    ArithmeticOp.ATAN: math.atan,
+    ArithmeticOp.ATAN2: math.atan2,
+    ArithmeticOp.EXP: math.exp,
+    ArithmeticOp.LOG: math.log,
+    ArithmeticOp.FLOOR: lambda a: float(math.floor(a)),
+    ArithmeticOp.CEIL: lambda a: float(math.ceil(a)),
+    ArithmeticOp.WRAP: normalize,
+}
+
+_ORDER: dict[CompareOp, Callable[[float, float], bool]] = {
+    CompareOp.LT: lambda a, b: a < b,
+    CompareOp.LE: lambda a, b: a <= b,
+    CompareOp.GT: lambda a, b: a > b,
+    CompareOp.GE: lambda a, b: a >= b,
+}
+
+
+def _arithmetic(op: ArithmeticOp, args: tuple[Value, ...]) -> Value:
+    try:
+        result = _SCALAR[op](*args)
+    except (ZeroDivisionError, ValueError, OverflowError):
+        return Undefined(f"`{op.value}` has no value at {', '.join(f'{arg:.6g}' for arg in cast('tuple[float]', args))}")
+    if isinstance(result, complex) or not math.isfinite(result):
+        return Undefined(f"`{op.value}` has no finite value here")
+    return result
+
+
+def _logic(op: LogicOp, args: tuple[Value, ...]) -> Value:
+    if op is LogicOp.NOT:
+        return args[0] if isinstance(args[0], Undefined) else not args[0]
+    decisive = op is LogicOp.OR
+    known = [bool(arg) for arg in args if not isinstance(arg, Undefined)]
+    if decisive in known:
+        return decisive
+    return next((arg for arg in args if isinstance(arg, Undefined)), not decisive)
+
+
+def _intersects(left: Region, right: Region) -> bool:
+    for one, other in ((left, right), (right, left)):
+        match one:
+            case Rectangle():
+                shape = box_polygon(*one.center, one.heading, one.width, one.length)
+                answer = meets(other, shape)
+            case Disc():
+                answer = meets(other, shapely.Point(one.center), one.radius)
+            case PolygonSet():
+                answers = [meets(other, polygon) for polygon in one.polygons]
+                answer = True if True in answers else None if None in answers else False
+            case _:
+                continue
+        if answer is not None:
+            return answer
+    raise CannotEvaluate(f"whether a {type(left).__name__} and a {type(right).__name__} intersect")
+
+
+def _encloses(outer: Region, inner: Region) -> bool:
+    if not isinstance(inner, Rectangle):
+        raise CannotEvaluate(f"whether a {type(inner).__name__} lies inside a region")
+    box = box_polygon(*inner.center, inner.heading, inner.width, inner.length)
+    return covers(outer, box)
+
+
+def covers(outer: Region, box: shapely.Polygon) -> bool:
+    """Whether a region holds all of a convex polygon (up to slivers of 1e-9 of its area).
+
+    Raises:
+        CannotEvaluate: For kinds of region where that is not decided.
+    """
+    match outer:
+        case PolygonSet():
+            near = [polygon for polygon in outer.polygons if polygon.intersects(box)]
+            return bool(box.difference(shapely.union_all(near)).area <= 1e-9 * box.area)
+        case Disc():
+            return all(math.dist(outer.center, corner) <= outer.radius for corner in box.exterior.coords)
+        case Rectangle():
+            frame = box_polygon(*outer.center, outer.heading, outer.width, outer.length)
+            return bool(box.difference(frame).area <= 1e-9 * box.area)
+        case IntersectionOf():
+            return all(covers(part, box) for part in outer.parts)
+        case UnionOf() if all(isinstance(part, PolygonSet) for part in outer.parts):
+            polygons = (polygon for part in outer.parts if isinstance(part, PolygonSet) for polygon in part.polygons)
+            return covers(PolygonSet(tuple(polygons), "union"), box)
+        case Everywhere():
+            return True
+        case _:
+            raise CannotEvaluate(f"whether a {type(outer).__name__} holds a box")
+
+
+def directions(field: Value, point: Value) -> tuple[float, ...]:
+    """The headings that a vector field allows at a point; empty where it is undefined."""
+    return cast(VectorField, field).values(*cast(Vector, point))
+
+
+def compute(node: Node, args: tuple[Value, ...]) -> Value:
+    """The value of a node that is neither random nor a feature nor a `DirectionAt`.
+
+    Args:
+        node: The node.
+        args: The values of its children, in their order.
+
+    Raises:
+        CannotEvaluate: If geometry cannot decide.
+    """
+    match node:
+        case Constant():
+            return node.value
+        case Select():
+            picked = args[0]
+            return picked if isinstance(picked, Undefined) else args[1 + int(cast(float, picked))]
+        case Logic():
+            return _logic(node.op, args)
+        case _:
+            pass
+    for arg in args:
+        if isinstance(arg, Undefined):
+            return arg
+    return _compute(node, args)
+
+
+def _compute(node: Node, args: tuple[Value, ...]) -> Value:  # noqa: PLR0911, PLR0912
+    given = cast("tuple[object, ...]", args)
+    match node, given:
+        case Arithmetic(), _:
+            return _arithmetic(node.op, args)
+        case Coordinate(), ((float() as x, float() as y),):
+            return y if node.axis else x
+        case Norm(), ((float() as x, float() as y),):
+            return math.hypot(x, y)
+        case Bearing(), ((float() as x, float() as y),):
+            return heading_of(x, y)
+        case VectorOf(), (float() as x, float() as y):
+            return (x, y)
+        case VectorSum(), ((float() as x, float() as y), (float() as u, float() as v)):
+            return (x + u, y + v)
+        case Scale(), ((float() as x, float() as y), float() as factor):
+            return (x * factor, y * factor)
+        case Rotate(), ((float() as x, float() as y), float() as angle):
+            return rotate(x, y, angle)
+        case Compare(), (left, right):
+            if node.op in _ORDER:
+                return _ORDER[node.op](cast(float, left), cast(float, right))
+            return (left == right) == (node.op is CompareOp.EQ)
+        case _:
+            return _compute_region(node, args)
+
+
+def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
+    given = cast("tuple[object, ...]", args)
+    match node, given:
+        case DiscAt(), ((float(), float()) as center, float() as radius):
+            return Disc(center, radius)
+        case SectorAt(), ((float(), float()) as center, float() as radius, float() as heading, float() as angle):
+            return Sector(center, radius, heading, angle)
+        case RectangleAt(), ((float(), float()) as center, float() as heading, float() as width, float() as length):
+            return Rectangle(center, heading, width, length)
+        case RegionUnion(), _:
+            return union(*cast("tuple[Region, ...]", args))
+        case RegionIntersection(), _:
+            return intersection(*cast("tuple[Region, ...]", args))
+        case RegionDifference(), (base, removed):
+            return difference(cast(Region, base), cast(Region, removed))
+        case Contains(), (region, (float() as x, float() as y)):
+            return contains(cast(Region, region), x, y)
+        case Distance(), (region, (float() as x, float() as y)):
+            return distance(cast(Region, region), x, y)
+        case Intersects(), (left, right):
+            return _intersects(cast(Region, left), cast(Region, right))
+        case Encloses(), (outer, inner):
+            return _encloses(cast(Region, outer), cast(Region, inner))
+        case _:
+            raise AssertionError(f"no value for {type(node).__name__} of {args!r}")
+
+
+def fold(node: Node) -> Node:
+    """The constant that a node amounts to if its children are constants and nothing about it is random."""
+    below = children(node)
+    if not below or not all(isinstance(child, Constant) for child in below):
+        return node
+    from_constants = cast("tuple[Constant, ...]", below)
+    if is_leaf(node) or isinstance(node, DirectionAt):
+        return node
+    return Constant(compute(node, tuple(child.value for child in from_constants)), span=node.span)
+

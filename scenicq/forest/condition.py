@@ -1,0 +1,135 @@
+"""Conditioning: put what the label observes into an expression and fold what has become known.
+
+Line 11 of algorithm 1 of the query paper. What is left over holds random variables only. A vector field that allows
+several headings at a known point becomes a choice, an `Index` of its own: which of them a generator would have picked
+is an accident, so any will do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import cast
+
+from scenicq.forest.compute import compute, directions
+from scenicq.forest.evaluate import Observation
+from scenicq.forest.nodes import (
+    Constant,
+    DirectionAt,
+    Feature,
+    Identity,
+    Index,
+    Leaf,
+    Logic,
+    LogicOp,
+    Node,
+    Select,
+    Undefined,
+    Value,
+    Vector,
+)
+from scenicq.forest.walk import children, is_leaf, transform
+
+__all__ = ["condition", "expand"]
+
+
+def expand(root: Node, definition: Callable[[Feature], Node | None]) -> Node:
+    """Replace features by their expressions, again and again, until only those without one are left.
+
+    Args:
+        root: The expression.
+        definition: The expression of a feature that is not observed, None for one that is.
+    """
+    pending = True
+
+    def step(node: Node) -> Node:
+        nonlocal pending
+        found = definition(node) if isinstance(node, Feature) else None
+        if found is None:
+            return node
+        pending = True
+        return found
+
+    while pending:
+        pending = False
+        root = transform(root, step)
+    return root
+
+
+def condition(
+    root: Node,
+    observed: Observation,
+    assignment: Mapping[Identity, Value] | None = None,
+    memo: dict[int, Node] | None = None,
+) -> Node:
+    """The expression given observed features and, possibly, values of some random variables.
+
+    Args:
+        root: The expression.
+        observed: Values of features.
+        assignment: Values of random variables to put in.
+        memo: Results by the id of the original node, to share between expressions of one constraint.
+    """
+    given = assignment or {}
+
+    def step(node: Node) -> Node:
+        if is_leaf(node):
+            leaf = cast(Leaf, node)
+            return Constant(given[leaf.identity], span=node.span) if leaf.identity in given else node
+        if isinstance(node, Constant):
+            return node
+        if isinstance(node, Feature):
+            key = (node.object, node.property)
+            return Constant(observed[key], span=node.span) if key in observed else node
+        return _fold(node)
+
+    return transform(root, step, memo)
+
+
+def _fold(node: Node) -> Node:
+    below = children(node)
+    if isinstance(node, Select) and isinstance(node.index, Constant):
+        picked = node.index.value
+        return Constant(picked) if isinstance(picked, Undefined) else node.options[int(cast(float, picked))]
+    if isinstance(node, Logic) and node.op is not LogicOp.NOT:
+        return _fold_logic(node)
+    if not all(isinstance(child, Constant) for child in below):
+        return node
+    args = tuple(cast(Constant, child).value for child in below)
+    if isinstance(node, DirectionAt):
+        return _fold_direction(node, args)
+    return Constant(compute(node, args), span=node.span)
+
+
+def _fold_logic(node: Logic) -> Node:
+    decisive = node.op is LogicOp.OR
+    left: list[Node] = []
+    undefined: Node | None = None
+    for arg in node.args:
+        if not isinstance(arg, Constant):
+            left.append(arg)
+        elif isinstance(arg.value, Undefined):
+            undefined = arg
+        elif bool(arg.value) == decisive:
+            return Constant(decisive, span=node.span)
+    if undefined is not None:
+        if not left or not decisive:
+            return undefined
+        left.append(Constant(False, span=node.span))
+    if not left:
+        return Constant(not decisive, span=node.span)
+    return Logic(node.op, tuple(left), span=node.span)
+
+
+def _fold_direction(node: DirectionAt, args: tuple[Value, ...]) -> Node:
+    for arg in args:
+        if isinstance(arg, Undefined):
+            return Constant(arg, span=node.span)
+    allowed = directions(*args)
+    if len(allowed) == 1:
+        return Constant(allowed[0], span=node.span)
+    if not allowed:
+        x, y = cast(Vector, args[1])
+        name = getattr(args[0], "name", "the field")
+        return Constant(Undefined(f"`{name}` is undefined at ({x:.2f}, {y:.2f})"), span=node.span)
+    index = Index((1.0,) * len(allowed), span=node.span)
+    return Select(index, tuple(Constant(heading, span=node.span) for heading in allowed), span=node.span)

@@ -1,0 +1,104 @@
+"""Dependency analysis: what must be decided together (query paper, section 5.2.1; algorithm 1, line 2).
+
+Constraints are jointly dependent if they share an unobserved random variable, transitively. The analysis cuts at
+observed features: those are the label's values, not variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from scenicq.errors import Span
+from scenicq.forest.nodes import Leaf, Node
+from scenicq.forest.scenario import Requirement
+from scenicq.forest.walk import features, leaves
+
+__all__ = ["PARAMS", "Comparison", "Condition", "Constraint", "Group", "group_constraints"]
+
+PARAMS = -1
+"""The object index under which global parameters are compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """A feature that the label observes and the scenario defines: its expression must equal the label's value.
+
+    Attributes:
+        object: Index of the object, or `PARAMS`.
+        property: The property.
+        expression: Over random variables and observed features of other objects.
+        span: Where the program defines it.
+    """
+
+    object: int
+    property: str
+    expression: Node
+    span: Span | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Condition:
+    """A requirement that must hold."""
+
+    requirement: Requirement
+    expression: Node
+
+    @property
+    def span(self) -> Span | None:
+        """Where the program states it."""
+        return self.requirement.span
+
+
+Constraint = Comparison | Condition
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """A maximal jointly dependent set of constraints: the unit of one decision.
+
+    Attributes:
+        constraints: In program order.
+        variables: The random variables of all of them.
+        objects: The objects whose features are compared or referred to, ascending.
+    """
+
+    constraints: tuple[Constraint, ...]
+    variables: tuple[Leaf, ...]
+    objects: tuple[int, ...]
+
+
+def group_constraints(constraints: Iterable[Constraint]) -> tuple[Group, ...]:
+    """Partition constraints into groups, in dependency order: a group comes once its last object is there."""
+    items = tuple(constraints)
+    parent = list(range(len(items)))
+
+    def find(i: int) -> int:
+        while parent[i] != i:
+            parent[i] = parent[parent[i]]
+            i = parent[i]
+        return i
+
+    owner: dict[object, int] = {}
+    for number, item in enumerate(items):
+        for leaf in leaves(item.expression):
+            first = owner.setdefault(leaf.identity, number)
+            parent[find(number)] = find(first)
+    members: dict[int, list[Constraint]] = {}
+    for number, item in enumerate(items):
+        members.setdefault(find(number), []).append(item)
+    groups = [_group(tuple(chosen)) for chosen in members.values()]
+    return tuple(sorted(groups, key=lambda group: group.objects[-1] if group.objects else -1))
+
+
+def _group(constraints: tuple[Constraint, ...]) -> Group:
+    used: set[int] = set()
+    for item in constraints:
+        used.update(index for index, _ in features(item.expression))
+        if isinstance(item, Comparison):
+            used.add(item.object)
+    found: dict[object, Leaf] = {}
+    for item in constraints:
+        for leaf in leaves(item.expression):
+            found.setdefault(leaf.identity, leaf)
+    return Group(constraints, tuple(found.values()), tuple(sorted(used - {PARAMS})))

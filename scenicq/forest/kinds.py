@@ -1,0 +1,81 @@
+"""What kind of value an expression has."""
+
+from __future__ import annotations
+
+from typing import assert_never
+
+from scenicq.forest.nodes import (
+    Arithmetic,
+    Bearing,
+    Compare,
+    Constant,
+    Contains,
+    Coordinate,
+    DirectionAt,
+    DiscAt,
+    DiscreteRange,
+    Distance,
+    Encloses,
+    Feature,
+    Index,
+    Intersects,
+    Kind,
+    Logic,
+    Node,
+    Norm,
+    Normal,
+    PointIn,
+    Range,
+    RectangleAt,
+    RegionDifference,
+    RegionIntersection,
+    RegionUnion,
+    Rotate,
+    Scale,
+    SectorAt,
+    Select,
+    TruncatedNormal,
+    Undefined,
+    Value,
+    VectorOf,
+    VectorSum,
+)
+from scenicq.geometry.regions import Region
+
+__all__ = ["kind_of", "kind_of_value"]
+
+
+def kind_of_value(value: Value) -> Kind:
+    """The kind of a known value."""
+    if isinstance(value, bool):
+        return "boolean"
+    if isinstance(value, float):
+        return "scalar"
+    if isinstance(value, tuple):
+        return "vector"
+    if value is None or isinstance(value, str | Undefined):
+        return "other"
+    return "region" if isinstance(value, Region) else "field"
+
+
+def kind_of(node: Node) -> Kind:
+    """The kind of value that an expression has."""
+    while isinstance(node, Select):
+        node = node.options[0]
+    match node:
+        case Constant():
+            return kind_of_value(node.value)
+        case Feature():
+            return node.kind
+        case Range() | Normal() | TruncatedNormal() | DiscreteRange() | Index() | Arithmetic() | Coordinate():
+            return "scalar"
+        case Norm() | Bearing() | Distance() | DirectionAt():
+            return "scalar"
+        case PointIn() | VectorOf() | VectorSum() | Scale() | Rotate():
+            return "vector"
+        case DiscAt() | SectorAt() | RectangleAt() | RegionUnion() | RegionIntersection() | RegionDifference():
+            return "region"
+        case Compare() | Logic() | Contains() | Intersects() | Encloses():
+            return "boolean"
+        case _:
+            assert_never(node)

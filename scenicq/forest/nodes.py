@@ -1,0 +1,446 @@
+"""The expression forest on one page: every kind of node that a compiled scenario is made of.
+
+A scenario's features and requirements are expressions over random variables (leaves) and features of other objects
+(query paper, section 2 and figure 4). Nodes are frozen and compared by identity, never by content: one `Range` used
+twice is one random variable, two that look alike are two. Every node knows the place in the program it came from.
+Nothing here computes; passes are functions elsewhere (`walk`, `evaluate`, `condition`, `show`).
+
+Values: a scalar is a float (headings in radians, lengths in metres), a vector a pair of floats, a region or a vector
+field a value of `scenicq.geometry`; anything else (a string, None) is only ever compared for equality.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Literal, TypeAlias
+
+from scenicq.errors import Span
+from scenicq.geometry.fields import VectorField
+from scenicq.geometry.regions import Region
+
+__all__ = [
+    "Arithmetic",
+    "ArithmeticOp",
+    "Bearing",
+    "Compare",
+    "CompareOp",
+    "Constant",
+    "Contains",
+    "Coordinate",
+    "DirectionAt",
+    "DiscAt",
+    "DiscreteRange",
+    "Distance",
+    "Encloses",
+    "Feature",
+    "Identity",
+    "Index",
+    "Intersects",
+    "Kind",
+    "Leaf",
+    "Logic",
+    "LogicOp",
+    "Node",
+    "Norm",
+    "Normal",
+    "PointIn",
+    "Range",
+    "RectangleAt",
+    "RegionDifference",
+    "RegionIntersection",
+    "RegionUnion",
+    "Rotate",
+    "Scale",
+    "SectorAt",
+    "Select",
+    "TruncatedNormal",
+    "Undefined",
+    "Value",
+    "Vector",
+    "VectorOf",
+    "VectorSum",
+]
+
+Vector: TypeAlias = tuple[float, float]
+Kind: TypeAlias = Literal["scalar", "boolean", "vector", "region", "field", "other"]
+
+
+@dataclass(frozen=True, slots=True)
+class Undefined:
+    """The value of an expression that has none here, such as the road's direction far from any road.
+
+    Attributes:
+        reason: Why, as a fact for the user.
+    """
+
+    reason: str
+
+
+Value: TypeAlias = float | bool | str | None | Vector | Region | VectorField | Undefined
+
+
+class ArithmeticOp(StrEnum):
+    """Operations on scalars; `WRAP` normalises an angle to (-pi, pi]."""
+
+    ADD = "+"
+    SUB = "-"
+    MUL = "*"
+    DIV = "/"
+    FLOORDIV = "//"
+    MOD = "%"
+    POW = "**"
+    NEG = "neg"
+    ABS = "abs"
+    MIN = "min"
+    MAX = "max"
+    SQRT = "sqrt"
+    SIN = "sin"
+    COS = "cos"
+    TAN = "tan"
+    ASIN = "asin"
+    ACOS = "acos"
+    ATAN = "atan"
+    ATAN2 = "atan2"
+    EXP = "exp"
+    LOG = "log"
+    FLOOR = "floor"
+    CEIL = "ceil"
+    WRAP = "wrap"
+
+
+class CompareOp(StrEnum):
+    """Comparisons of scalars; `EQ` and `NE` also of other values."""
+
+    LT = "<"
+    LE = "<="
+    GT = ">"
+    GE = ">="
+    EQ = "=="
+    NE = "!="
+
+
+class LogicOp(StrEnum):
+    """Connectives."""
+
+    AND = "and"
+    OR = "or"
+    NOT = "not"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Node:
+    span: Span | None = field(default=None, kw_only=True, repr=False)
+
+
+class Identity:
+    """What makes a random variable the same one, however its distribution's parameters are rewritten."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Leaf(_Node):
+    identity: Identity = field(default_factory=Identity, kw_only=True, repr=False)
+
+
+# --- known values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Constant(_Node):
+    """A known value."""
+
+    value: Value
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Feature(_Node):
+    """A property of an object of the scenario, by reference: what the label observes of it is put here.
+
+    Attributes:
+        object: Index of the object in the scenario.
+        property: Name of the property.
+        kind: What kind of value the property has.
+    """
+
+    object: int
+    property: str
+    kind: Kind
+
+
+# --- random variables (leaves): identity matters
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Range(_Leaf):
+    """Uniform on an interval (`Range(low, high)`); the ends may come in either order."""
+
+    low: Node
+    high: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Normal(_Leaf):
+    """Normal distribution: its support is the whole line."""
+
+    mean: Node
+    deviation: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TruncatedNormal(_Leaf):
+    """Normal distribution cut to an interval."""
+
+    mean: Node
+    deviation: Node
+    low: Node
+    high: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiscreteRange(_Leaf):
+    """An integer between two, both included."""
+
+    low: Node
+    high: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Index(_Leaf):
+    """Which option of a `Uniform(...)` or `Discrete({...})`: 0 to n - 1, those of positive weight only.
+
+    Attributes:
+        weights: One positive weight per option.
+    """
+
+    weights: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointIn(_Leaf):
+    """A point uniformly at random in a region."""
+
+    region: Node
+
+
+# --- choice
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Select(_Node):
+    """The option that an index picks."""
+
+    index: Node
+    options: tuple[Node, ...]
+
+
+# --- scalars
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arithmetic(_Node):
+    """An operation on scalars."""
+
+    op: ArithmeticOp
+    args: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coordinate(_Node):
+    """The x (axis 0) or y (axis 1) of a vector."""
+
+    vector: Node
+    axis: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Norm(_Node):
+    """The length of a vector."""
+
+    vector: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bearing(_Node):
+    """The heading in which a vector points."""
+
+    vector: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Distance(_Node):
+    """The distance from a point to a region, 0 inside."""
+
+    region: Node
+    point: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DirectionAt(_Node):
+    """The heading of a vector field at a point; where the field allows several, any of them."""
+
+    field: Node
+    point: Node
+
+
+# --- vectors
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VectorOf(_Node):
+    """A vector from its coordinates."""
+
+    x: Node
+    y: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VectorSum(_Node):
+    """The sum of two vectors."""
+
+    left: Node
+    right: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scale(_Node):
+    """A vector times a scalar."""
+
+    vector: Node
+    factor: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rotate(_Node):
+    """A vector turned counter-clockwise."""
+
+    vector: Node
+    angle: Node
+
+
+# --- regions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiscAt(_Node):
+    """A disc."""
+
+    center: Node
+    radius: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectorAt(_Node):
+    """A sector of a disc around a heading, of any full angle up to 2 pi."""
+
+    center: Node
+    radius: Node
+    heading: Node
+    angle: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RectangleAt(_Node):
+    """A rectangle: its width is across the heading, its length along it."""
+
+    center: Node
+    heading: Node
+    width: Node
+    length: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegionUnion(_Node):
+    """What lies in any of the parts."""
+
+    parts: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegionIntersection(_Node):
+    """What lies in all parts."""
+
+    parts: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegionDifference(_Node):
+    """What lies in the base but not in what is removed."""
+
+    base: Node
+    removed: Node
+
+
+# --- booleans
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compare(_Node):
+    """A comparison."""
+
+    op: CompareOp
+    left: Node
+    right: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Logic(_Node):
+    """A connective over truth values."""
+
+    op: LogicOp
+    args: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contains(_Node):
+    """Whether a point lies in a region, boundary included."""
+
+    region: Node
+    point: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Intersects(_Node):
+    """Whether two regions have a point in common."""
+
+    left: Node
+    right: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Encloses(_Node):
+    """Whether a region holds all of another (of a box)."""
+
+    outer: Node
+    inner: Node
+
+
+Leaf: TypeAlias = Range | Normal | TruncatedNormal | DiscreteRange | Index | PointIn
+Node: TypeAlias = (
+    Constant
+    | Feature
+    | Leaf
+    | Select
+    | Arithmetic
+    | Coordinate
+    | Norm
+    | Bearing
+    | Distance
+    | DirectionAt
+    | VectorOf
+    | VectorSum
+    | Scale
+    | Rotate
+    | DiscAt
+    | SectorAt
+    | RectangleAt
+    | RegionUnion
+    | RegionIntersection
+    | RegionDifference
+    | Compare
+    | Logic
+    | Contains
+    | Intersects
+    | Encloses
+)

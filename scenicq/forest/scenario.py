@@ -1,0 +1,105 @@
+"""A compiled scenario: its objects, requirements and parameters, all of them expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from scenicq.errors import Diagnostic, Source, Span
+from scenicq.forest.nodes import Node
+
+__all__ = ["BuiltIn", "Property", "Requirement", "Scenario", "ScenarioObject"]
+
+
+class BuiltIn(StrEnum):
+    """The requirements that Scenic adds by itself; visibility is in force by default, the others when asked for."""
+
+    VISIBILITY = "visibility"
+    CONTAINMENT = "containment"
+    COLLISION = "collision"
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """A property of an object.
+
+    Attributes:
+        value: Its expression.
+        explicit: Whether the program itself sets it, rather than a library's default.
+        span: The specifier or default that gives it.
+    """
+
+    value: Node
+    explicit: bool
+    span: Span | None
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioObject:
+    """An object of the scenario.
+
+    Attributes:
+        index: Position in `Scenario.objects`.
+        name: The variable that the program gives it, else `Class#n` in program order.
+        category: Its class in the class tree.
+        properties: Its properties by name.
+        mutated: Whether noise of unbounded support is added to position and heading at the end.
+        span: The expression that creates it.
+    """
+
+    index: int
+    name: str
+    category: str
+    properties: Mapping[str, Property]
+    mutated: bool
+    span: Span | None
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """A condition on scenes.
+
+    Attributes:
+        condition: A boolean expression.
+        span: Where the program says it.
+        built_in: Which built-in requirement it is; None if the author wrote it.
+        objects: Indices of the objects that a built-in requirement is about.
+    """
+
+    condition: Node
+    span: Span | None
+    built_in: BuiltIn | None = None
+    objects: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A scenario compiled against one map.
+
+    Attributes:
+        source: The program.
+        version: The version of Scenic it is read as: 1, 2 or 3.
+        map: The name of the map.
+        objects: The objects in program order.
+        ego: Index of the ego.
+        requirements: Hard requirements, the author's first.
+        params: Global parameters with the places that set them.
+        solid: Indices of the objects that do not allow collisions: no two of their boxes may overlap (requirements of
+            all pairs are made only where they are enforced: there are many).
+        soft: Places of requirements with a probability below 1, which exclude nothing.
+        ignored: Dynamic parts that were left out.
+        warnings: What the author should know.
+    """
+
+    source: Source
+    version: int
+    map: str
+    objects: tuple[ScenarioObject, ...]
+    ego: int
+    requirements: tuple[Requirement, ...]
+    params: Mapping[str, Property]
+    solid: tuple[int, ...] = ()
+    soft: tuple[Span, ...] = ()
+    ignored: tuple[Diagnostic, ...] = ()
+    warnings: tuple[Diagnostic, ...] = field(default=())

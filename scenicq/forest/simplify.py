@@ -1,0 +1,66 @@
+"""Rewriting a scenario into an equivalent one that is cheaper to match.
+
+A point in a region picked from a list is a point in the union of the list, if nothing else depends on the pick: the
+support is the same, and the union has a spatial index.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from typing import cast
+
+from scenicq.forest.nodes import Constant, Index, Node, PointIn, RegionUnion, Select
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.walk import children, postorder, transform
+from scenicq.geometry.fields import VectorField
+from scenicq.geometry.regions import PolygonSet, Region, union
+
+__all__ = ["simplify"]
+
+
+def _roots(scenario: Scenario) -> list[Node]:
+    found = [given.value for thing in scenario.objects for given in thing.properties.values()]
+    return [*found, *(each.condition for each in scenario.requirements), *(p.value for p in scenario.params.values())]
+
+
+def _merged(regions: list[Region]) -> Region:
+    """The union of regions, as one indexed set where all are sets of polygons of one orientation."""
+    sets = [region for region in regions if isinstance(region, PolygonSet)]
+    fields: set[VectorField | None] = {region.orientation for region in sets}
+    if len(sets) != len(regions) or len(fields) != 1:
+        return union(*regions)
+    polygons = tuple(polygon for region in sets for polygon in region.polygons)
+    return PolygonSet(polygons, f"{len(sets)} regions", fields.pop(), tuple(i for region in sets for i in region.ids))
+
+
+def simplify(scenario: Scenario) -> Scenario:
+    """The same scenario with simpler expressions; random variables keep their identity."""
+    roots = _roots(scenario)
+    uses = Counter(id(child) for node in postorder(roots) for child in set(children(node)))
+    uses.update(id(root) for root in roots)
+
+    def step(node: Node) -> Node:
+        if not (isinstance(node, PointIn) and isinstance(node.region, Select)):
+            return node
+        pick = node.region
+        if not isinstance(pick.index, Index) or uses[id(pick.index)] > 1 or uses[id(pick)] > 1:
+            return node
+        if all(isinstance(option, Constant) for option in pick.options):
+            merged = _merged([cast(Region, cast(Constant, option).value) for option in pick.options])
+            return replace(node, region=Constant(merged, span=pick.span))
+        return replace(node, region=RegionUnion(pick.options, span=pick.span))
+
+    memo: dict[int, Node] = {}
+    return _rebuilt(scenario, lambda node: transform(node, step, memo))
+
+
+def _rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
+    objects = tuple(
+        replace(thing, properties={name: replace(p, value=change(p.value)) for name, p in thing.properties.items()})
+        for thing in scenario.objects
+    )
+    requirements = tuple(replace(each, condition=change(each.condition)) for each in scenario.requirements)
+    params = {name: replace(p, value=change(p.value)) for name, p in scenario.params.items()}
+    return replace(scenario, objects=objects, requirements=requirements, params=params)

@@ -1,0 +1,73 @@
+"""Angles and headings: radians, heading 0 along +y, counter-clockwise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "difference",
+    "direction",
+    "distance",
+    "heading_of",
+    "heading_of_array",
+    "normalize",
+    "normalize_array",
+    "rotate",
+]
+
+_TURN = 2 * math.pi
+
+
+def normalize(angle: float) -> float:
+    """The angle in (-pi, pi] that differs from the given one by whole turns.
+
+    `math.remainder` is exact, so no turn is lost to rounding; only its lower end needs moving.
+    """
+    wrapped = math.remainder(angle, _TURN)
+    return math.pi if wrapped <= -math.pi else wrapped
+
+
+def normalize_array(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`normalize` of every angle of an array of any shape."""
+    # fmod is exact, and subtracting a turn from what lies within two of it is exact too
+    wrapped = np.fmod(angles, _TURN)
+    wrapped = np.where(wrapped > math.pi, wrapped - _TURN, wrapped)
+    return np.where(wrapped <= -math.pi, wrapped + _TURN, wrapped)
+
+
+def difference(a: float, b: float) -> float:
+    """The signed smallest turn from b to a, in (-pi, pi]."""
+    return normalize(a - b)
+
+
+def distance(a: float, b: float) -> float:
+    """How far two angles are apart, in [0, pi]."""
+    return abs(normalize(a - b))
+
+
+def heading_of(dx: float, dy: float) -> float:
+    """The heading in (-pi, pi] of a direction; 0 for the null vector."""
+    if dx == 0 and dy == 0:
+        return 0.0
+    heading = math.atan2(-dx, dy)
+    return math.pi if heading == -math.pi else heading
+
+
+def heading_of_array(dx: NDArray[np.float64], dy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`heading_of` of every direction of two arrays of one shape."""
+    headings = np.arctan2(-dx, dy)
+    return np.where((dx == 0) & (dy == 0), 0.0, np.where(headings == -math.pi, math.pi, headings))
+
+
+def direction(heading: float) -> tuple[float, float]:
+    """The unit vector that points along a heading."""
+    return -math.sin(heading), math.cos(heading)
+
+
+def rotate(x: float, y: float, angle: float) -> tuple[float, float]:
+    """The vector turned counter-clockwise by an angle."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    return x * cos - y * sin, x * sin + y * cos

@@ -1,0 +1,68 @@
+"""Vector fields: headings for every point of the plane where they are defined (the language paper's vector fields)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.geometry.shapes import Bounds
+
+__all__ = ["ConstantField", "FieldCell", "VectorField"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FieldCell:
+    """A convex piece of the plane on which a field may have a heading.
+
+    Attributes:
+        polygon: Corners in metres, counter-clockwise, shape (k, 2).
+        heading: Radians.
+        exact: Whether the field allows `heading` at every inner point; if not, the cell covers too much.
+    """
+
+    polygon: NDArray[np.float64]
+    heading: float
+    exact: bool
+
+
+@runtime_checkable
+class VectorField(Protocol):
+    """A field of headings; where several are allowed, each is a choice of its own.
+
+    Attributes:
+        name: What messages call the field.
+    """
+
+    @property
+    def name(self) -> str:
+        """What messages call the field."""
+        ...
+
+    def values(self, x: float, y: float) -> tuple[float, ...]:
+        """The headings allowed at a point, in (-pi, pi]; none where the field is undefined."""
+        ...
+
+    def cells(self, bounds: Bounds) -> list[FieldCell]:
+        """Convex cells that hold every (point, heading) of the field within the bounds."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConstantField:
+    """The same heading everywhere."""
+
+    heading: float
+    name: str = "constant"
+
+    def values(self, x: float, y: float) -> tuple[float, ...]:
+        """The one heading."""
+        return (self.heading,)
+
+    def cells(self, bounds: Bounds) -> list[FieldCell]:
+        """The bounds as one cell."""
+        west, south, east, north = bounds
+        corners = np.array([(west, south), (east, south), (east, north), (west, north)])
+        return [FieldCell(corners, self.heading, exact=True)]

@@ -1,0 +1,230 @@
+"""Where a point is with respect to a region: contains, distance, bounds. Exact, the boundary counts as inside."""
+
+from __future__ import annotations
+
+import math
+from typing import assert_never
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.geometry import shapes
+from scenicq.geometry.angles import direction, rotate
+from scenicq.geometry.boxes import corners
+from scenicq.geometry.closest import closest_point
+from scenicq.geometry.regions import (
+    SLACK,
+    DifferenceOf,
+    Disc,
+    Everywhere,
+    IntersectionOf,
+    Nowhere,
+    PointSet,
+    PolygonSet,
+    PolylineSet,
+    Rectangle,
+    Region,
+    Sector,
+    UnionOf,
+)
+from scenicq.geometry.shapes import XY, Bounds
+from scenicq.geometry.terms import overlap, terms
+
+__all__ = ["bounds", "contains", "contains_many", "distance", "nearest_point"]
+
+_FIRST_REACH = 32.0
+_LAST_REACH = 1e8
+_NEIGHBOURHOOD = 1e-6
+
+
+def contains(region: Region, x: float, y: float) -> bool:
+    """Whether a point lies in a region or within `SLACK` of it."""
+    match region:
+        case Everywhere():
+            return True
+        case Nowhere():
+            return False
+        case Disc() | Sector() | Rectangle():
+            return distance(region, x, y) <= SLACK
+        case PolygonSet() | PolylineSet() | PointSet():
+            return len(shapes.tree_within(region.tree, shapes.point(x, y), SLACK)) > 0
+        case UnionOf():
+            return any(contains(part, x, y) for part in region.parts)
+        case IntersectionOf():
+            return all(contains(part, x, y) for part in region.parts)
+        case DifferenceOf():
+            if not contains(region.base, x, y):
+                return False
+            if not contains(region.removed, x, y):
+                return True
+            # on the boundary of what is removed, or inside of it: the smallest neighbourhood tells
+            return _distance_within(region, x, y, _NEIGHBOURHOOD) <= SLACK
+        case _:
+            assert_never(region)
+
+
+def contains_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """`contains` for points of shape (n, 2); a boolean array (n,)."""
+    match region:
+        case Everywhere() | Nowhere():
+            return np.full(len(xy), isinstance(region, Everywhere))
+        case Disc():
+            return np.hypot(xy[:, 0] - region.center[0], xy[:, 1] - region.center[1]) <= region.radius + SLACK
+        case Sector() | Rectangle():
+            return np.array([contains(region, x, y) for x, y in xy.tolist()], dtype=bool)
+        case PolygonSet() | PolylineSet() | PointSet():
+            result = np.zeros(len(xy), dtype=bool)
+            result[shapes.tree_pairs_within(region.tree, shapes.points(xy), SLACK)[0]] = True
+            return result
+        case UnionOf():
+            return _filtered(xy, region.parts, start=False)
+        case IntersectionOf():
+            return _filtered(xy, region.parts, start=True)
+        case DifferenceOf():
+            result = contains_many(region.base, xy)
+            (doubtful,) = np.nonzero(result)
+            doubtful = doubtful[contains_many(region.removed, xy[doubtful])]
+            result[doubtful] = [contains(region, x, y) for x, y in xy[doubtful].tolist()]
+            return result
+        case _:
+            assert_never(region)
+
+
+def distance(region: Region, x: float, y: float) -> float:
+    """Distance from a point to a region in metres: 0 inside, inf if the region is empty.
+
+    Raises:
+        UndecidedError: The region removes too many separate discs for an exact answer.
+    """
+    match region:
+        case Everywhere():
+            return 0.0
+        case Nowhere():
+            return math.inf
+        case Disc():
+            return _to_disc(math.dist((x, y), region.center), region.radius)
+        case Sector():
+            return _to_sector(region, x, y)
+        case Rectangle():
+            aside, ahead = rotate(x - region.center[0], y - region.center[1], -region.heading)
+            return math.hypot(max(abs(aside) - region.width / 2, 0.0), max(abs(ahead) - region.length / 2, 0.0))
+        case PolygonSet() | PolylineSet() | PointSet():
+            if not region.pieces:
+                return math.inf
+            return float(shapes.tree_nearest(region.tree, shapes.array([shapes.point(x, y)]))[2][0])
+        case UnionOf():
+            return min((distance(part, x, y) for part in region.parts), default=math.inf)
+        case IntersectionOf() | DifferenceOf():
+            found = nearest_point(region, x, y)
+            return math.inf if found is None else math.dist((x, y), found)
+        case _:
+            assert_never(region)
+
+
+def nearest_point(region: Region, x: float, y: float) -> XY | None:
+    """The point of a region that is nearest to (x, y), or None if the region is empty.
+
+    Raises:
+        UndecidedError: The region removes too many separate discs for an exact answer.
+    """
+    if contains(region, x, y):
+        return x, y
+    west, south, east, north = bounds(region)
+    if west > east or south > north:
+        return None
+    span = math.hypot(max(x - west, east - x), max(y - south, north - y)) + 1.0
+    reach = max(_FIRST_REACH, 2 * math.hypot(max(west - x, x - east, 0.0), max(south - y, y - north, 0.0)))
+    while True:
+        found = _nearest_within(region, x, y, reach)
+        if found is not None and math.dist((x, y), found) <= reach:
+            return found
+        if reach >= min(span, _LAST_REACH):
+            return found
+        reach *= 4
+
+
+def bounds(region: Region) -> Bounds:
+    """A box around a region: the smallest one, but for combinations; (inf, inf, -inf, -inf) around nothing."""
+    match region:
+        case Everywhere():
+            return -math.inf, -math.inf, math.inf, math.inf
+        case Nowhere():
+            return math.inf, math.inf, -math.inf, -math.inf
+        case Disc():
+            (x, y), r = region.center, region.radius
+            return x - r, y - r, x + r, y + r
+        case Sector():
+            return _sector_bounds(region)
+        case Rectangle():
+            outline = corners(*region.center, region.heading, region.width, region.length)
+            (west, south), (east, north) = outline.min(axis=0).tolist(), outline.max(axis=0).tolist()
+            return west, south, east, north
+        case PolygonSet() | PolylineSet() | PointSet():
+            return region.extent
+        case UnionOf():
+            boxes = [bounds(part) for part in region.parts]
+            lows, highs = zip(*((box[:2], box[2:]) for box in boxes), strict=True) if boxes else ((), ())
+            west, south = (min((low[i] for low in lows), default=math.inf) for i in (0, 1))
+            east, north = (max((high[i] for high in highs), default=-math.inf) for i in (0, 1))
+            return west, south, east, north
+        case IntersectionOf():
+            box = bounds(Everywhere())
+            for part in region.parts:
+                box = overlap(box, bounds(part))
+            return box if box[0] <= box[2] and box[1] <= box[3] else bounds(Nowhere())
+        case DifferenceOf():
+            return bounds(region.base)
+        case _:
+            assert_never(region)
+
+
+def _filtered(xy: NDArray[np.float64], parts: tuple[Region, ...], *, start: bool) -> NDArray[np.bool_]:
+    """Conjunction (start True) or disjunction over the parts, each looking only at the points still open."""
+    result = np.full(len(xy), start)
+    for part in parts:
+        (still,) = np.nonzero(result == start)
+        result[still] = contains_many(part, xy[still])
+    return result
+
+
+def _to_disc(from_center: float, radius: float) -> float:
+    return max(0.0, from_center - radius) if radius >= 0 else math.inf
+
+
+def _to_sector(sector: Sector, x: float, y: float) -> float:
+    """Folded onto one side of the sector's middle: inside the wedge as to a disc, else as to its bounding radius."""
+    if sector.radius < 0:
+        return math.inf
+    aside, ahead = rotate(x - sector.center[0], y - sector.center[1], -sector.heading)
+    aside = abs(aside)
+    away = math.hypot(aside, ahead)
+    half = max(sector.angle, 0.0) / 2
+    if half >= math.pi or math.atan2(aside, ahead) <= half:
+        return _to_disc(away, sector.radius)
+    dx, dy = math.sin(half), math.cos(half)
+    along = min(max(aside * dx + ahead * dy, 0.0), sector.radius)
+    return math.hypot(aside - along * dx, ahead - along * dy)
+
+
+def _sector_bounds(sector: Sector) -> Bounds:
+    (x, y), r = sector.center, sector.radius
+    half = sector.angle / 2
+    if half >= math.pi:
+        return x - r, y - r, x + r, y + r
+    headings = [sector.heading - half, sector.heading + half]
+    quarter = math.pi / 2
+    first = math.ceil(headings[0] / quarter)
+    headings += [quarter * i for i in range(first, math.floor(headings[1] / quarter) + 1)]
+    tips = [(x + r * dx, y + r * dy) for dx, dy in map(direction, headings)] + [(x, y)]
+    xs, ys = zip(*tips, strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _nearest_within(region: Region, x: float, y: float, reach: float) -> XY | None:
+    found = [closest_point(term, x, y) for term in terms(region, (x - reach, y - reach, x + reach, y + reach))]
+    return min((p for p in found if p is not None), key=lambda p: math.dist(p, (x, y)), default=None)
+
+
+def _distance_within(region: Region, x: float, y: float, reach: float) -> float:
+    found = _nearest_within(region, x, y, reach)
+    return math.inf if found is None else math.dist((x, y), found)

@@ -1,0 +1,245 @@
+"""The road network of one map.
+
+`Network` has the attribute names of Scenic's driving domain, because scenario programs use them; it is built from map
+features, the same values that the store keeps.
+"""
+
+# Scenic's own names, which programs use, are in mixed case.
+# ruff: noqa: N802
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import TypeVar, cast
+
+import numpy as np
+from shapely.geometry import MultiPolygon, Polygon
+
+from scenicq.geometry import shapes
+from scenicq.geometry.elements import (
+    Curb,
+    Intersection,
+    Lane,
+    LaneGroup,
+    LaneSection,
+    NetworkElement,
+    PedestrianCrossing,
+    Road,
+    Shoulder,
+    Sidewalk,
+)
+from scenicq.geometry.features import MapFeature, dangling, read_geojson
+from scenicq.geometry.fields import VectorField
+from scenicq.geometry.linking import centerlines, link
+from scenicq.geometry.regions import SLACK, PolygonSet, PolylineSet, Region
+from scenicq.geometry.road_direction import DirectedLane, RoadDirection
+
+__all__ = ["MapFeature", "Network", "read_geojson"]
+
+_Element = TypeVar("_Element", bound=NetworkElement)
+
+
+class Network:
+    """A map's elements, regions and direction of traffic.
+
+    Attributes:
+        name: The map's name.
+        features: What it was built from.
+        problems: Repeated ids (left out) and dangling references (passed over), as facts for the user.
+        roadDirection: The direction of traffic.
+        elements: All elements that have an area, by id.
+        lanes, laneSections, laneGroups, intersections, crossings, sidewalks, shoulders, curbs: The elements by kind.
+        allRoads: All roads; `roads` are those outside of intersections, `connectingRoads` those inside.
+    """
+
+    def __init__(self, name: str, features: Iterable[MapFeature]) -> None:
+        """Build the network; features with an id that is already taken are left out."""
+        kept: dict[str, MapFeature] = {}
+        problems: list[str] = []
+        for feature in features:
+            if feature.id in kept:
+                problems.append(f"{feature.kind} `{feature.id}`: the id is used before")
+            else:
+                kept[feature.id] = feature
+        self.name = name
+        self.features = tuple(kept.values())
+        self.problems = (*problems, *(message for _, message in dangling(self.features)))
+        self.roadDirection = RoadDirection(
+            tuple(
+                DirectedLane(feature.shape, tuple(shapes.coordinates(line) for line in centerlines(feature)))
+                for feature in self.features
+                if feature.kind == "lane"
+            ),
+            tuple(feature.shape for feature in self.features if feature.kind == "intersection"),
+        )
+        found = link(self.features, self.roadDirection)
+        self.lanes: tuple[Lane, ...] = tuple(found.lanes.values())
+        self.laneSections: tuple[LaneSection, ...] = tuple(found.sections.values())
+        self.laneGroups: tuple[LaneGroup, ...] = tuple(found.groups.values())
+        self.allRoads: tuple[Road, ...] = tuple(found.roads.values())
+        self.roads: tuple[Road, ...] = tuple(road for road in self.allRoads if road.intersection is None)
+        self.connectingRoads: tuple[Road, ...] = tuple(road for road in self.allRoads if road.intersection is not None)
+        self.intersections: tuple[Intersection, ...] = tuple(found.intersections.values())
+        self.crossings: tuple[PedestrianCrossing, ...] = tuple(found.crossings.values())
+        self.sidewalks: tuple[Sidewalk, ...] = tuple(found.sidewalks.values())
+        self.shoulders: tuple[Shoulder, ...] = tuple(found.shoulders.values())
+        self.curbs: tuple[Curb, ...] = tuple(found.curbs.values())
+        areas: tuple[tuple[NetworkElement, ...], ...] = (
+            self.laneSections,
+            self.lanes,
+            self.laneGroups,
+            self.allRoads,
+            self.intersections,
+            self.crossings,
+            self.sidewalks,
+            self.shoulders,
+        )
+        self.elements: dict[str, NetworkElement] = {element.id: element for kind in areas for element in kind}
+
+    def __reduce__(self) -> tuple[type[Network], tuple[str, tuple[MapFeature, ...]]]:
+        """Rebuild from the features: the elements refer to each other too deeply to be pickled."""
+        return type(self), (self.name, self.features)
+
+    def __repr__(self) -> str:
+        """Name and size."""
+        return f"Network({self.name!r}, {len(self.features)} features)"
+
+    # --- regions
+
+    @cached_property
+    def laneRegion(self) -> PolygonSet:
+        """All lanes."""
+        return self._region("lane", ("lane",), self.roadDirection)
+
+    @cached_property
+    def roadRegion(self) -> PolygonSet:
+        """All roads."""
+        return self._region("road", ("road",), self.roadDirection)
+
+    @cached_property
+    def intersectionRegion(self) -> PolygonSet:
+        """All intersections."""
+        return self._region("intersection", ("intersection",), self.roadDirection)
+
+    @cached_property
+    def crossingRegion(self) -> PolygonSet:
+        """All pedestrian crossings."""
+        return self._region("crossing", ("crossing",), None)
+
+    @cached_property
+    def sidewalkRegion(self) -> PolygonSet:
+        """All sidewalks."""
+        return self._region("sidewalk", ("sidewalk",), None)
+
+    @cached_property
+    def shoulderRegion(self) -> PolygonSet:
+        """All shoulders."""
+        return self._region("shoulder", ("shoulder",), self.roadDirection)
+
+    @cached_property
+    def curbRegion(self) -> PolylineSet:
+        """All curbs."""
+        return PolylineSet(tuple(curb.line for curb in self.curbs), "curb", self.roadDirection)
+
+    @cached_property
+    def drivableRegion(self) -> PolygonSet:
+        """Lanes, roads, intersections and what the map calls drivable."""
+        return self._region("drivable", ("lane", "road", "intersection", "drivable"), self.roadDirection)
+
+    @cached_property
+    def walkableRegion(self) -> PolygonSet:
+        """Sidewalks and crossings."""
+        return self._region("walkable", ("sidewalk", "crossing"), None)
+
+    def region(self, kind: str) -> Region | None:
+        """The region of all features of a kind, or None if the map has none."""
+        found = [feature for feature in self.features if feature.kind == kind]
+        if not found:
+            return None
+        named: dict[str, str] = {name: f"{name}Region" for name in ("lane", "road", "intersection", "crossing")}
+        named |= {name: f"{name}Region" for name in ("sidewalk", "shoulder", "curb")}
+        return cast(Region, getattr(self, named[kind])) if kind in named else self._region(kind, (kind,), None)
+
+    # --- what lies at a point
+
+    def laneAt(self, x: float, y: float) -> Lane | None:
+        """The lane at a point: of several the one whose centreline is nearest."""
+        return _nearest(self._at(self.lanes, "lane", x, y), x, y)
+
+    def laneSectionAt(self, x: float, y: float) -> LaneSection | None:
+        """The lane section at a point."""
+        lane = self.laneAt(x, y)
+        here = shapes.point(x, y)
+        inside = [s for s in lane.sections if shapes.distance(s.polygon, here) <= SLACK] if lane else []
+        return inside[0] if inside else None
+
+    def laneGroupAt(self, x: float, y: float) -> LaneGroup | None:
+        """The lane group at a point, that of the lane there if there is one."""
+        lane = self.laneAt(x, y)
+        return lane.group if lane and lane.group else next(iter(self._at(self.laneGroups, "lane_group", x, y)), None)
+
+    def roadAt(self, x: float, y: float) -> Road | None:
+        """The road at a point, that of the lane there if there is one."""
+        lane = self.laneAt(x, y)
+        return lane.road if lane and lane.road else next(iter(self._at(self.allRoads, "road", x, y)), None)
+
+    def intersectionAt(self, x: float, y: float) -> Intersection | None:
+        """The intersection at a point."""
+        return next(iter(self._at(self.intersections, "intersection", x, y)), None)
+
+    def crossingAt(self, x: float, y: float) -> PedestrianCrossing | None:
+        """The pedestrian crossing at a point."""
+        return next(iter(self._at(self.crossings, "crossing", x, y)), None)
+
+    def sidewalkAt(self, x: float, y: float) -> Sidewalk | None:
+        """The sidewalk at a point."""
+        return next(iter(self._at(self.sidewalks, "sidewalk", x, y)), None)
+
+    def elementAt(self, x: float, y: float) -> NetworkElement | None:
+        """The element at a point, in Scenic's order: intersection, road, then the others."""
+        kinds: tuple[tuple[Sequence[NetworkElement], str], ...] = (
+            (self.intersections, "intersection"),
+            (self.allRoads, "road"),
+            (self.lanes, "lane"),
+            (self.shoulders, "shoulder"),
+            (self.sidewalks, "sidewalk"),
+            (self.crossings, "crossing"),
+        )
+        return next((found[0] for elements, kind in kinds if (found := self._at(elements, kind, x, y))), None)
+
+    def nominalDirectionsAt(self, x: float, y: float) -> tuple[float, ...]:
+        """The directions of traffic at a point."""
+        return self.roadDirection.values(x, y)
+
+    # --- how these are made
+
+    @cached_property
+    def _indices(self) -> dict[str, tuple[PolygonSet, list[int]]]:
+        return {}
+
+    def _at(self, elements: Sequence[_Element], kind: str, x: float, y: float) -> list[_Element]:
+        """The elements of a kind whose area holds a point, in the map's order."""
+        if kind not in self._indices:
+            parts = [(piece, i) for i, e in enumerate(elements) for piece in shapes.simple_parts([e.polygon])]
+            self._indices[kind] = PolygonSet(tuple(cast(Polygon, p) for p, _ in parts), kind), [i for _, i in parts]
+        region, owners = self._indices[kind]
+        found: list[int] = shapes.tree_within(region.tree, shapes.point(x, y), SLACK).tolist()
+        return [elements[i] for i in sorted({owners[i] for i in found})]
+
+    def _region(self, name: str, kinds: tuple[str, ...], orientation: VectorField | None) -> PolygonSet:
+        found = [feature for feature in self.features if feature.kind in kinds]
+        polygons = tuple(cast("Polygon | MultiPolygon", feature.shape) for feature in found)
+        return PolygonSet(polygons, name, orientation, tuple(feature.id for feature in found))
+
+
+def _nearest(lanes: list[Lane], x: float, y: float) -> Lane | None:
+    if len(lanes) <= 1:
+        return lanes[0] if lanes else None
+    here = shapes.point(x, y)
+
+    def away(lane: Lane) -> float:
+        lines = lane.centerline.lines if lane.centerline else ()
+        return min((shapes.distance(line, here) for line in lines), default=np.inf)
+
+    return min(lanes, key=away)

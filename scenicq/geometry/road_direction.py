@@ -1,0 +1,244 @@
+"""The direction of traffic as a vector field (`roadDirection` of Scenic's driving domain).
+
+At a point it is the direction of the nearest centreline segment of the lanes that contain the point; in an intersection
+each containing lane's nearest segment gives a direction of its own; off all lanes, the nearest lane within 20 m counts.
+What ties within a nanometre is all allowed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import STRtree
+
+from scenicq.geometry import shapes
+from scenicq.geometry.angles import heading_of_array
+from scenicq.geometry.fields import FieldCell
+from scenicq.geometry.road_cells import lane_cells, segment_distances
+from scenicq.geometry.shapes import Bounds, Coordinates, Shape
+
+__all__ = ["DirectedLane", "RoadDirection"]
+
+REACH = 20.0
+"""Metres within which a point off all lanes takes the direction of the nearest one."""
+_TIE = 1e-9
+_CHUNK = 20_000
+_LARGEST, _SMALLEST = 16.0, 2.0
+"""Metres: sides of the squares that cover the surroundings of lanes, at first and where they are no longer split."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DirectedLane:
+    """A lane as the field sees it.
+
+    Attributes:
+        area: Its polygon.
+        centerline: Polylines (n, 2) in the direction of travel; segments of no length are skipped.
+    """
+
+    area: Shape
+    centerline: tuple[Coordinates, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RoadDirection:
+    """The direction of traffic on some lanes; see the module.
+
+    Attributes:
+        lanes: The lanes; those without a segment have no direction and are passed over.
+        intersections: Polygons of the intersections.
+        name: What messages call the field.
+    """
+
+    lanes: tuple[DirectedLane, ...] = field(repr=False)
+    intersections: tuple[Shape, ...] = field(default=(), repr=False)
+    name: str = "roadDirection"
+
+    def values(self, x: float, y: float) -> tuple[float, ...]:
+        """The headings allowed at a point, in (-pi, pi]; none where the field is undefined."""
+        return self.values_many(np.array([(x, y)]))[0]
+
+    def values_many(self, xy: Coordinates) -> list[tuple[float, ...]]:
+        """`values` for points of shape (n, 2)."""
+        return [value for start in range(0, len(xy), _CHUNK) for value in self._values(xy[start : start + _CHUNK])]
+
+    def cells(self, bounds: Bounds) -> list[FieldCell]:
+        """Convex cells that hold every (point, heading) within the bounds; those of lanes stay whole."""
+        box = shapes.box(*bounds)
+        near = np.sort(shapes.tree_query(self._tree, box)).tolist()
+        return [cell for lane in near for cell in self._lane_cells(lane)] + self._surroundings(bounds)
+
+    @cached_property
+    def _directed(self) -> tuple[tuple[Shape, NDArray[np.float64]], ...]:
+        """Areas and segments (n, 4) of the lanes that have a direction."""
+        pairs = [(lane.area, _segments(lane.centerline)) for lane in self.lanes]
+        return tuple((area, segments) for area, segments in pairs if len(segments))
+
+    @cached_property
+    def _areas(self) -> NDArray[np.object_]:
+        return shapes.array([area for area, _ in self._directed])
+
+    @cached_property
+    def _tree(self) -> STRtree:
+        return STRtree(self._areas)
+
+    @cached_property
+    def _crossroads(self) -> STRtree:
+        return STRtree(self.intersections)
+
+    @cached_property
+    def _all(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+        """Segments of all lanes, their headings, and where each lane's begin (with the end of the last)."""
+        segments = np.concatenate([np.empty((0, 4)), *(segments for _, segments in self._directed)])
+        along = segments[:, 2:] - segments[:, :2]
+        starts = np.cumsum([0, *(len(segments) for _, segments in self._directed)])
+        return segments, heading_of_array(along[:, 0], along[:, 1]), starts
+
+    @cached_property
+    def _cells_of(self) -> dict[int, list[FieldCell]]:
+        return {}
+
+    def _values(self, xy: Coordinates) -> list[tuple[float, ...]]:
+        segments, headings, starts = self._all
+        if not len(segments):
+            return [()] * len(xy)
+        points = shapes.points(xy)
+        point, lane = shapes.tree_pairs_within(self._tree, points, _TIE)
+        # one nearest segment over all lanes, but in intersections and off the lanes one of each lane
+        group = point.copy()
+        crossing = np.zeros(len(xy), dtype=bool)
+        crossing[shapes.tree_pairs_within(self._crossroads, points, _TIE)[0]] = True
+        own = np.arange(len(point)) + len(xy)
+        group[crossing[point]] = own[crossing[point]]
+        off = np.setdiff1d(np.arange(len(xy)), point)
+        if len(off):
+            off_point, off_lane = self._nearest_lanes(points[off])
+            point = np.concatenate([point, off[off_point]])
+            lane = np.concatenate([lane, off_lane])
+            group = np.concatenate([group, np.arange(len(off_point)) + len(xy) + len(own)])
+        counts = starts[lane + 1] - starts[lane]
+        pair = np.repeat(np.arange(len(lane)), counts)
+        segment = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[lane][pair]
+        away = segment_distances(xy[point[pair]], segments[segment])
+        best = np.full(len(xy) + len(group), np.inf)
+        np.minimum.at(best, group[pair], away)
+        chosen = np.nonzero(away <= best[group[pair]] + _TIE)[0]
+        found: list[dict[float, None]] = [{} for _ in range(len(xy))]
+        for index, heading in zip(point[pair[chosen]].tolist(), headings[segment[chosen]].tolist(), strict=True):
+            found[index][heading] = None
+        return [tuple(sorted(values)) for values in found]
+
+    def _nearest_lanes(self, points: NDArray[np.object_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Pairs (point, lane) of the lanes within reach that are nearest, ties included."""
+        index, _, away = shapes.tree_nearest(self._tree, points, max_distance=REACH)
+        index, first = np.unique(index, return_index=True)
+        point, lane = shapes.tree_pairs_within(self._tree, points[index], away[first] + _TIE)
+        return index[point], lane
+
+    def _lane_cells(self, lane: int) -> list[FieldCell]:
+        found = self._cells_of.get(lane)
+        if found is None:
+            _, headings, starts = self._all
+            area, segments = self._directed[lane]
+            found = lane_cells(area, segments, headings[starts[lane] : starts[lane + 1]])
+            shared = self._contested(lane)
+            if shared is not None:
+                # where lanes overlap outside of intersections, another lane's segment may be nearer
+                found = [
+                    FieldCell(c.polygon, c.heading, c.exact and not _overlap(shapes.polygon(c.polygon), shared))
+                    for c in found
+                ]
+            self._cells_of[lane] = found
+        return found
+
+    def _contested(self, lane: int) -> Shape | None:
+        """The part of a lane that lies in others too, outside of intersections."""
+        area = self._directed[lane][0]
+        touching: list[int] = shapes.tree_within(self._tree, area, 0.0).tolist()
+        others = [self._directed[i][0] for i in touching if i != lane]
+        rivals = [other for other in others if _overlap(other, area)]
+        if not rivals:
+            return None
+        shared = shapes.intersection(area, shapes.union_all(rivals))
+        crossing: list[int] = shapes.tree_query(self._crossroads, area).tolist()
+        for index in crossing:
+            shared = shapes.difference(shared, self.intersections[index])
+        return shared if shared.area > 0 else None
+
+    def _surroundings(self, bounds: Bounds) -> list[FieldCell]:
+        """Squares over what lies off the lanes, split until one heading is left or they are small."""
+        west, south, east, north = bounds
+        columns, rows = (max(1, int(np.ceil(span / _LARGEST))) for span in (east - west, north - south))
+        xs, ys = np.linspace(west, east, columns + 1).tolist(), np.linspace(south, north, rows + 1).tolist()
+        todo = [(xs[i], ys[j], xs[i + 1], ys[j + 1]) for i in range(columns) for j in range(rows)]
+        found_in: dict[tuple[float, bool], list[Bounds]] = {}
+        while todo:
+            square = todo.pop()
+            west, south, east, north = square
+            found, within = self._headings_in(square)
+            if len(found) > 1 and max(east - west, north - south) > _SMALLEST:
+                x, y = (west + east) / 2, (south + north) / 2
+                todo += [(west, south, x, y), (x, south, east, y), (x, y, east, north), (west, y, x, north)]
+                continue
+            for heading in found:
+                found_in.setdefault((heading, within and len(found) == 1), []).append(square)
+        return [
+            FieldCell(np.array([(west, south), (east, south), (east, north), (west, north)]), heading, exact)
+            for (heading, exact), squares in found_in.items()
+            for west, south, east, north in _rows_joined(squares)
+        ]
+
+    def _headings_in(self, square: Bounds) -> tuple[list[float], bool]:
+        """The headings that points of a square off the lanes may have, and whether all are near enough to have one."""
+        west, south, east, north = square
+        x, y = (west + east) / 2, (south + north) / 2
+        center, radius = shapes.point(x, y), float(np.hypot(east - west, north - south)) / 2
+        lanes = shapes.tree_within(self._tree, center, REACH + radius)
+        if not len(lanes):
+            return [], False
+        away = shapes.distances(self._areas[lanes], center)
+        near = lanes[away <= away.min() + 2 * radius + _TIE]
+        if away.min() <= radius:
+            touching: list[int] = lanes[away <= radius].tolist()
+            box = shapes.box(*square)
+            if shapes.difference(box, shapes.union_all([self._directed[i][0] for i in touching])).area <= 0:
+                return [], False
+        segments, headings, starts = self._all
+        found: dict[float, None] = {}
+        for lane in near.tolist():
+            own = slice(starts[lane], starts[lane + 1])
+            gaps = segment_distances(np.array((x, y)), segments[own])
+            found.update(dict.fromkeys(headings[own][gaps <= gaps.min() + 2 * radius + _TIE].tolist()))
+        return sorted(found), bool(away.min() + radius <= REACH)
+
+
+def _rows_joined(squares: list[Bounds]) -> list[Bounds]:
+    """The same area in fewer boxes: runs from west to east first, then equal runs from south to north."""
+    runs: list[Bounds] = []
+    for west, south, east, north in sorted(squares, key=lambda box: (box[1], box[3], box[0])):
+        if runs and runs[-1][1:] == (south, west, north):
+            runs[-1] = (runs[-1][0], south, east, north)
+        else:
+            runs.append((west, south, east, north))
+    stacks: list[Bounds] = []
+    for west, south, east, north in sorted(runs, key=lambda box: (box[0], box[2], box[1])):
+        if stacks and (stacks[-1][0], stacks[-1][2], stacks[-1][3]) == (west, east, south):
+            stacks[-1] = (west, stacks[-1][1], east, north)
+        else:
+            stacks.append((west, south, east, north))
+    return stacks
+
+
+def _overlap(a: Shape, b: Shape) -> bool:
+    return shapes.intersection(a, b).area > 1e-6
+
+
+def _segments(lines: Sequence[Coordinates]) -> NDArray[np.float64]:
+    """Segments (n, 4) of positive length."""
+    pairs = [np.concatenate([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
+    segments = np.concatenate([np.empty((0, 4)), *pairs])
+    return segments[np.any(segments[:, :2] != segments[:, 2:], axis=1)]

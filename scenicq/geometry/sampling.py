@@ -1,0 +1,198 @@
+"""Uniform points of a region: by area, length or number, whichever is the region's own measure."""
+
+from __future__ import annotations
+
+import math
+import random
+from bisect import bisect
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import assert_never
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.geometry import shapes
+from scenicq.geometry.angles import direction, rotate
+from scenicq.geometry.membership import bounds, contains
+from scenicq.geometry.regions import (
+    DifferenceOf,
+    Disc,
+    Everywhere,
+    IntersectionOf,
+    Nowhere,
+    PointSet,
+    PolygonSet,
+    PolylineSet,
+    Rectangle,
+    Region,
+    Sector,
+    UnionOf,
+)
+from scenicq.geometry.shapes import XY
+
+__all__ = ["sample"]
+
+_TRIES = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Proposal:
+    """A way to draw from a region: each try gives a point, with the same density 1 / mass everywhere, or nothing."""
+
+    dimension: int
+    mass: float
+    draw: Callable[[random.Random], XY | None]
+
+
+def sample(region: Region, rng: random.Random) -> XY:
+    """A point drawn uniformly from a region (from the parts of highest dimension, where they differ).
+
+    Raises:
+        ValueError: "empty", when the region is empty or too small in its parts to be hit; "unbounded", when it has no
+            uniform distribution.
+    """
+    proposal = _proposal(region)
+    if proposal is None:
+        raise ValueError("empty")
+    for _ in range(_TRIES):
+        point = proposal.draw(rng)
+        if point is not None:
+            return point
+    raise ValueError("empty")
+
+
+def _proposal(region: Region) -> _Proposal | None:
+    match region:
+        case Everywhere():
+            raise ValueError("unbounded")
+        case Nowhere():
+            return None
+        case Disc():
+            return _sector(Sector(region.center, region.radius, 0.0, math.tau))
+        case Sector():
+            return _sector(region)
+        case Rectangle():
+            return _rectangle(region)
+        case PolygonSet():
+            return _polygons(region)
+        case PolylineSet():
+            return _polylines(region)
+        case PointSet():
+            points = region.points
+            return _Proposal(0, len(points), lambda rng: points[rng.randrange(len(points))]) if points else None
+        case UnionOf():
+            return _union(region.parts)
+        case IntersectionOf():
+            return _filtered(min(region.parts, key=_size), region)
+        case DifferenceOf():
+            return _filtered(region.base, region)
+        case _:
+            assert_never(region)
+
+
+def _size(region: Region) -> tuple[bool, float]:
+    """Sort key: lines and points first, then small boxes."""
+    west, south, east, north = bounds(region)
+    area = max(east - west, 0.0) * max(north - south, 0.0)
+    return not isinstance(region, PolylineSet | PointSet), area if math.isfinite(area) else math.inf
+
+
+def _filtered(source: Region, region: Region) -> _Proposal | None:
+    proposal = _proposal(source)
+    if proposal is None:
+        return None
+    draw = proposal.draw
+
+    def attempt(rng: random.Random) -> XY | None:
+        point = draw(rng)
+        return point if point is not None and contains(region, *point) else None
+
+    return _Proposal(proposal.dimension, proposal.mass, attempt)
+
+
+def _union(parts: tuple[Region, ...]) -> _Proposal | None:
+    pairs = [(part, proposal) for part in parts if (proposal := _proposal(part)) is not None]
+    top = max((proposal.dimension for _, proposal in pairs), default=0)
+    pairs = [(part, proposal) for part, proposal in pairs if proposal.dimension == top]
+    if not pairs:
+        return None
+    sums = list(accumulate(proposal.mass for _, proposal in pairs))
+
+    def draw(rng: random.Random) -> XY | None:
+        point = pairs[_chosen(sums, rng)][1].draw(rng)
+        if point is None:
+            return None
+        # a point of several parts is proposed by each of them
+        return point if rng.random() * sum(contains(part, *point) for part, _ in pairs) < 1.0 else None
+
+    return _Proposal(top, sums[-1], draw)
+
+
+def _sector(sector: Sector) -> _Proposal | None:
+    if sector.radius < 0:
+        return None
+    (x, y), r = sector.center, sector.radius
+    angle = min(max(sector.angle, 0.0), math.tau)
+
+    def draw(rng: random.Random) -> XY:
+        away = r * math.sqrt(rng.random())
+        dx, dy = direction(sector.heading + angle * (rng.random() - 0.5))
+        return x + away * dx, y + away * dy
+
+    return _Proposal(2, angle * r * r / 2, draw)
+
+
+def _rectangle(box: Rectangle) -> _Proposal:
+    def draw(rng: random.Random) -> XY:
+        dx, dy = rotate((rng.random() - 0.5) * box.width, (rng.random() - 0.5) * box.length, box.heading)
+        return box.center[0] + dx, box.center[1] + dy
+
+    return _Proposal(2, box.width * box.length, draw)
+
+
+def _polygons(region: PolygonSet) -> _Proposal | None:
+    if not region.pieces:
+        return None
+    sums = _running(shapes.areas(region.pieces))
+
+    def draw(rng: random.Random) -> XY | None:
+        index = _chosen(sums, rng)
+        corners = shapes.triangulate(region.pieces[index])
+        ahead, aside = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        shares = _running(np.abs(ahead[:, 0] * aside[:, 1] - ahead[:, 1] * aside[:, 0]))
+        chosen = _chosen(shares, rng)
+        u, v = rng.random(), rng.random()
+        if u + v > 1.0:
+            u, v = 1.0 - u, 1.0 - v
+        place = corners[chosen, 0] + u * ahead[chosen] + v * aside[chosen]
+        x, y = float(place[0]), float(place[1])
+        several = len(shapes.tree_within(region.tree, shapes.point(x, y), 0.0))
+        return (x, y) if rng.random() * several < 1.0 else None
+
+    return _Proposal(2, sums[-1], draw)
+
+
+def _polylines(region: PolylineSet) -> _Proposal | None:
+    if not region.pieces:
+        return None
+    edges = np.concatenate([shapes.edges(piece) for piece in region.pieces])
+    sums = _running(np.hypot(edges[:, 2] - edges[:, 0], edges[:, 3] - edges[:, 1]))
+
+    def draw(rng: random.Random) -> XY:
+        index = _chosen(sums, rng)
+        x0, y0, x1, y1 = edges[index].tolist()
+        share = rng.random()
+        return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+
+    return _Proposal(1, sums[-1], draw)
+
+
+def _chosen(sums: list[float], rng: random.Random) -> int:
+    """An index, drawn in proportion to the steps of its running sums."""
+    return min(bisect(sums, rng.random() * sums[-1]), len(sums) - 1)
+
+
+def _running(masses: NDArray[np.float64]) -> list[float]:
+    return list(accumulate(float(mass) for mass in masses))

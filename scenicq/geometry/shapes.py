@@ -1,0 +1,259 @@
+"""A typed front for the functions of shapely that this package uses: shapely itself carries no type annotations."""
+
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportUnknownParameterType=false, reportMissingTypeStubs=false
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import STRtree
+from shapely.geometry import Point
+from shapely.geometry import shape as shape_of
+from shapely.geometry.base import BaseGeometry
+
+Shape: TypeAlias = BaseGeometry
+"""Any shapely geometry."""
+XY: TypeAlias = tuple[float, float]
+"""A point, in metres."""
+Bounds: TypeAlias = tuple[float, float, float, float]
+"""A box: xmin, ymin, xmax, ymax."""
+Coordinates: TypeAlias = NDArray[np.float64]
+"""Points, shape (n, 2)."""
+_GRID = 1e-9
+"""Metres to which coordinates are rounded where an overlay of nearly coinciding edges fails without."""
+
+
+def point(x: float, y: float) -> Point:
+    """A point."""
+    return Point(x, y)
+
+
+def box(xmin: float, ymin: float, xmax: float, ymax: float) -> Shape:
+    """An axis-parallel rectangle."""
+    return cast(Shape, shapely.box(xmin, ymin, xmax, ymax))
+
+
+def polygon(corners: Coordinates | Sequence[XY]) -> Shape:
+    """A polygon without holes from its corners."""
+    return cast(Shape, shapely.polygons(np.asarray(corners, dtype=float)))
+
+
+def line(corners: Coordinates | Sequence[XY]) -> Shape:
+    """A polyline."""
+    return cast(Shape, shapely.linestrings(np.asarray(corners, dtype=float)))
+
+
+def points(xy: Coordinates) -> NDArray[Any]:
+    """Array (n,) of points."""
+    return cast("NDArray[Any]", shapely.points(xy))
+
+
+def array(geometries: Sequence[Shape]) -> NDArray[Any]:
+    """Array (n,) of geometries, as the vectorised functions want it."""
+    result = np.empty(len(geometries), dtype=object)
+    result[:] = geometries
+    return result
+
+
+def simple_parts(geometries: Sequence[Shape]) -> tuple[Shape, ...]:
+    """The simple, non-empty parts of geometries, in order."""
+    return tuple(part for part in shapely.get_parts(array(geometries)) if not part.is_empty)
+
+
+def total_bounds(geometries: Sequence[Shape]) -> Bounds:
+    """The box around all of them; (inf, inf, -inf, -inf) for none."""
+    if not geometries:
+        return (np.inf, np.inf, -np.inf, -np.inf)
+    xmin, ymin, xmax, ymax = shapely.total_bounds(array(geometries))
+    return float(xmin), float(ymin), float(xmax), float(ymax)
+
+
+def bounds_of(shape: Shape) -> Bounds:
+    """The box around a geometry."""
+    return shape.bounds
+
+
+def each_bounds(geometries: Sequence[Shape]) -> NDArray[np.float64]:
+    """Boxes (n, 4) around geometries."""
+    return shapely.bounds(array(geometries))
+
+
+def tree_query(tree: STRtree, shape: Shape) -> NDArray[np.intp]:
+    """Indices of the geometries whose boxes meet the box of a shape."""
+    return cast("NDArray[np.intp]", tree.query(shape))
+
+
+def tree_within(tree: STRtree, shape: Shape, distance: float) -> NDArray[np.intp]:
+    """Indices of the geometries within a distance of a shape."""
+    return cast("NDArray[np.intp]", tree.query(shape, predicate="dwithin", distance=distance))
+
+
+def tree_pairs_within(
+    tree: STRtree, geometries: NDArray[Any], distance: float | NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All pairs (index of a geometry, index in the tree) within a distance of each other."""
+    found = tree.query(geometries, predicate="dwithin", distance=distance)
+    return cast("NDArray[np.intp]", found[0]), cast("NDArray[np.intp]", found[1])
+
+
+def tree_nearest(
+    tree: STRtree, geometries: NDArray[Any], max_distance: float | None = None
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+    """For each geometry its nearest ones in the tree, ties included: (index, index in the tree, distance)."""
+    pairs, distances = tree.query_nearest(geometries, max_distance=max_distance, return_distance=True)
+    return cast("NDArray[np.intp]", pairs[0]), cast("NDArray[np.intp]", pairs[1]), distances
+
+
+def distance(a: Shape, b: Shape) -> float:
+    """Distance of two geometries; inf if one is empty."""
+    result = float(shapely.distance(a, b))
+    return np.inf if np.isnan(result) else result
+
+
+def distances(a: NDArray[Any], b: NDArray[Any] | Shape) -> NDArray[np.float64]:
+    """Distances of geometries, pair by pair."""
+    return shapely.distance(a, b)
+
+
+def meet(a: Shape, b: Shape) -> bool:
+    """Whether two geometries share a point."""
+    return bool(shapely.intersects(a, b))
+
+
+def covers(a: Shape, b: Shape) -> bool:
+    """Whether no point of b lies outside of a."""
+    return bool(shapely.covers(a, b))
+
+
+def intersection(a: Shape, b: Shape) -> Shape:
+    """What two geometries share."""
+    try:
+        return shapely.intersection(a, b)
+    except shapely.GEOSException:
+        return shapely.intersection(a, b, grid_size=_GRID)
+
+
+def difference(a: Shape, b: Shape) -> Shape:
+    """The closure of what lies in a and not in b."""
+    try:
+        return shapely.difference(a, b)
+    except shapely.GEOSException:
+        return shapely.difference(a, b, grid_size=_GRID)
+
+
+def union_all(geometries: Sequence[Shape]) -> Shape:
+    """The union."""
+    try:
+        return shapely.union_all(array(geometries))
+    except shapely.GEOSException:
+        return shapely.union_all(array(geometries), grid_size=_GRID)
+
+
+def snapped_union(geometries: Sequence[Shape]) -> Shape:
+    """The union, with coordinates rounded to a nanometre so that slivers close."""
+    return shapely.union_all(array(geometries), grid_size=_GRID)
+
+
+def areas(geometries: Sequence[Shape]) -> NDArray[np.float64]:
+    """Areas in square metres, shape (n,)."""
+    return shapely.area(array(geometries))
+
+
+def lengths(geometries: Sequence[Shape]) -> NDArray[np.float64]:
+    """Lengths in metres, shape (n,)."""
+    return shapely.length(array(geometries))
+
+
+def nearest_point(shape: Shape, x: float, y: float) -> XY:
+    """The point of a non-empty shape that is nearest to (x, y); the point itself if it lies inside."""
+    coordinates = shapely.get_coordinates(shapely.shortest_line(shape, Point(x, y)))
+    return float(coordinates[0, 0]), float(coordinates[0, 1])
+
+
+def inner_point(shape: Shape) -> XY:
+    """A point of a non-empty shape, inside where it has an inside."""
+    found = shapely.get_coordinates(shapely.point_on_surface(shape))
+    return float(found[0, 0]), float(found[0, 1])
+
+
+def disc_polygon(x: float, y: float, radius: float, quarter: int = 16) -> Shape:
+    """A polygon inscribed in a circle."""
+    return cast(Shape, shapely.buffer(Point(x, y), radius, quad_segs=quarter))
+
+
+def coordinates(shape: Shape) -> Coordinates:
+    """All vertices, shape (n, 2)."""
+    return shapely.get_coordinates(shape)
+
+
+def edges(shape: Shape) -> NDArray[np.float64]:
+    """The segments that bound a shape, (n, 4) rows x0, y0, x1, y1; a point is a segment of no length."""
+    parts = simple_parts([shape])
+    while any(part.geom_type.startswith(("Multi", "GeometryCollection")) for part in parts):
+        parts = simple_parts(parts)
+    curves: list[Shape] = []
+    dots: list[Shape] = []
+    for part in parts:
+        if part.geom_type == "Polygon":
+            curves += shapely.get_rings(part).tolist()
+        elif part.geom_type == "Point":
+            dots.append(part)
+        else:
+            curves.append(part)
+    corners, owner = shapely.get_coordinates(array(curves), return_index=True)
+    same = owner[1:] == owner[:-1]
+    segments = np.concatenate([corners[:-1][same], corners[1:][same]], axis=1)
+    single = shapely.get_coordinates(array(dots))
+    return np.concatenate([segments, np.concatenate([single, single], axis=1)])
+
+
+def triangulate(shape: Shape) -> NDArray[np.float64]:
+    """Triangles (n, 3, 2), counter-clockwise, that tile a polygon."""
+    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+    if not len(parts):
+        return np.empty((0, 3, 2))
+    corners = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
+    ahead, aside = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = ahead[:, 0] * aside[:, 1] - ahead[:, 1] * aside[:, 0]
+    corners[area < 0] = corners[area < 0][:, ::-1]
+    return corners[area != 0]
+
+
+def without_straight_corners(shape: Shape) -> Shape:
+    """The same shape without the vertices that lie exactly on a straight edge."""
+    return shapely.simplify(shape, 0.0)
+
+
+def is_polygonal(shape: Shape) -> bool:
+    """Whether it is a Polygon or MultiPolygon."""
+    return shape.geom_type in ("Polygon", "MultiPolygon")
+
+
+def polygonal_part(shape: Shape) -> tuple[Shape, ...]:
+    """The polygons of a geometry."""
+    return tuple(part for part in simple_parts(simple_parts([shape])) if part.geom_type == "Polygon")
+
+
+def corner_count(shape: Shape) -> int:
+    """Number of vertices."""
+    return int(shapely.get_num_coordinates(shape))
+
+
+def from_geojson(geometry: dict[str, Any]) -> Shape:
+    """A geometry from its GeoJSON object, without third coordinates; raises what shapely raises for a malformed one."""
+    return shapely.force_2d(shape_of(geometry))
+
+
+def is_finite(shape: Shape) -> bool:
+    """Whether all coordinates are finite."""
+    return bool(np.isfinite(shapely.get_coordinates(shape)).all())
+
+
+def invalid_reason(shape: Shape) -> str | None:
+    """Why a geometry is not valid, or None if it is."""
+    return None if shapely.is_valid(shape) else str(shapely.is_valid_reason(shape))

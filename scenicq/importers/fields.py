@@ -1,0 +1,181 @@
+"""Reading fields of records that nobody has checked: every value is of the right type and finite, or `InvalidError`."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, cast
+
+__all__ = [
+    "InvalidError",
+    "check_characters",
+    "integer",
+    "items",
+    "number",
+    "optional_items",
+    "optional_number",
+    "optional_record",
+    "optional_text",
+    "parse_json",
+    "positive",
+    "record",
+    "scalars",
+    "text",
+    "vector",
+]
+
+Record = Mapping[str, Any]
+_LARGEST = 2**63 - 1
+
+
+class InvalidError(ValueError):
+    """A field is not what it must be; the message is a fact that lacks only the place."""
+
+
+def parse_json(content: bytes) -> object:
+    """The value of a JSON text.
+
+    Raises:
+        InvalidError: It is none, is nested too deeply, or has half of a character, which no file can hold.
+    """
+    try:
+        value: object = json.loads(content)
+        if b"\\u" in content:
+            check_characters(value)
+        return value
+    except RecursionError as error:
+        raise InvalidError("not JSON: nested too deeply") from error
+    except ValueError as error:
+        raise InvalidError(f"not JSON: {error}") from error
+
+
+def check_characters(value: object) -> None:
+    """Refuse a value with half of a surrogate pair in a text; only an escape can make one.
+
+    Raises:
+        InvalidError: There is one.
+    """
+    try:
+        json.dumps(value, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        raise InvalidError("it has half of a character (a lone surrogate)") from error
+
+
+def record(value: object, what: str) -> Record:
+    """A JSON object."""
+    if not isinstance(value, dict):
+        raise InvalidError(f"{what} is not an object but {_kind(value)}")
+    return cast(Record, value)
+
+
+def items(fields: Record, key: str) -> list[Any]:
+    """A list."""
+    value = _present(fields, key)
+    if not isinstance(value, list):
+        raise InvalidError(f"`{key}` is not a list but {_kind(value)}")
+    return cast(list[Any], value)
+
+
+def optional_record(fields: Record, key: str) -> Record:
+    """A JSON object; an empty one where the field is absent or null."""
+    return record(fields[key], f"`{key}`") if fields.get(key) is not None else {}
+
+
+def optional_items(fields: Record, key: str) -> list[Any]:
+    """A list; an empty one where the field is absent or null."""
+    return items(fields, key) if fields.get(key) is not None else []
+
+
+def text(fields: Record, key: str) -> str:
+    """A text that is not empty."""
+    value = _present(fields, key)
+    if not isinstance(value, str):
+        raise InvalidError(f"`{key}` is not a text but {_kind(value)}")
+    if not value:
+        raise InvalidError(f"`{key}` is empty")
+    return value
+
+
+def optional_text(fields: Record, key: str) -> str | None:
+    """A text; None where the field is absent, null or empty."""
+    return text(fields, key) if fields.get(key) not in (None, "") else None
+
+
+def integer(fields: Record, key: str) -> int:
+    """A whole number that 64 bits hold."""
+    value = _present(fields, key)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InvalidError(f"`{key}` is not a whole number but {_kind(value)}")
+    if abs(value) > _LARGEST:
+        raise InvalidError(f"`{key}` is out of range")
+    return value
+
+
+def number(fields: Record, key: str) -> float:
+    """A finite number."""
+    return _finite(_present(fields, key), key)
+
+
+def optional_number(fields: Record, key: str) -> float | None:
+    """A finite number; None where the field is absent or null."""
+    value = fields.get(key)
+    return None if value is None else _finite(value, key)
+
+
+def positive(fields: Record, key: str) -> float | None:
+    """A finite number above 0; None where the field is absent or null."""
+    value = optional_number(fields, key)
+    if value is not None and value <= 0:
+        raise InvalidError(f"`{key}` is not positive")
+    return value
+
+
+def vector(fields: Record, key: str, size: int) -> tuple[float, ...]:
+    """A list of `size` finite numbers."""
+    value = items(fields, key)
+    if len(value) != size:
+        raise InvalidError(f"`{key}` has {len(value)} numbers, not {size}")
+    return tuple([_finite(element, key) for element in value])
+
+
+def scalars(fields: Record, key: str, on_problem: Callable[[str], None]) -> dict[str, str | float | bool]:
+    """An object of texts, numbers and booleans; null values are absent, others are told and left out."""
+    if fields.get(key) is None:
+        return {}
+    sound: dict[str, str | float | bool] = {}
+    for name, value in record(fields[key], f"`{key}`").items():
+        if isinstance(value, str | bool | int) or (isinstance(value, float) and math.isfinite(value)):
+            sound[name] = value
+        elif isinstance(value, float):
+            on_problem(f"`{name}` of `{key}` is not finite")
+        elif value is not None:
+            on_problem(f"`{name}` of `{key}` is {_kind(value)}, not a text, a number or a boolean")
+    return sound
+
+
+def _present(fields: Record, key: str) -> object:
+    value = fields.get(key)
+    if value is None:
+        raise InvalidError(f"`{key}` is missing")
+    return value
+
+
+def _finite(value: object, key: str) -> float:
+    # By far the most frequent case, decided without the rest.
+    if type(value) is float and math.isfinite(value):
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidError(f"`{key}` is not a number but {_kind(value)}")
+    try:
+        finite = float(value)
+    except OverflowError:
+        finite = math.inf
+    if not math.isfinite(finite):
+        raise InvalidError(f"`{key}` is not finite")
+    return finite
+
+
+def _kind(value: object) -> str:
+    names = ((bool, "a boolean"), (int | float, "a number"), (str, "a text"), (list, "a list"), (dict, "an object"))
+    return next((name for kind, name in names if isinstance(value, kind)), "null")

@@ -1,0 +1,204 @@
+"""The interchange folder: the format that any team can write in an afternoon.
+
+- `dataset.json`: {"name", "interchange": 1, "angle": "heading" | "yaw", "classes": "nuscenes" | "scenic" | FILE};
+- `labels.jsonl`: one label a line; also `labels-*.jsonl`, either with `.gz`, or `labels.parquet`;
+- `maps/NAME.geojson`: metres of the map's frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.geometry.angles import normalize
+from scenicq.importers import fields
+from scenicq.importers.base import (
+    ClassNames,
+    Labels,
+    Options,
+    Source,
+    read_class_map,
+    read_maps,
+)
+from scenicq.importers.fields import InvalidError, Record
+from scenicq.importers.grouped_lines import GroupedLines
+from scenicq.importers.report import Report
+from scenicq.store.classes import taxonomy, taxonomy_names
+from scenicq.store.labels import Label, LabelObject, Recording
+
+__all__ = ["Interchange"]
+
+_VERSION = 1
+_LABEL_FILES = ("labels.jsonl", "labels-*.jsonl", "labels.jsonl.gz", "labels-*.jsonl.gz", "labels.parquet")
+
+
+class Interchange:
+    """Importer of interchange folders."""
+
+    name = "interchange"
+    layout = 'a `dataset.json` with `"interchange": 1`, and `labels.jsonl`'
+
+    def recognises(self, path: Path) -> bool:
+        """Whether `dataset.json` has the key `interchange`."""
+        try:
+            return "interchange" in fields.record(fields.parse_json((path / "dataset.json").read_bytes()), "it")
+        except (OSError, InvalidError):
+            return False
+
+    def read(self, path: Path, options: Options, report: Report) -> Source:
+        """Open an interchange folder.
+
+        Raises:
+            DataError: `file-missing` or `file-invalid`; with a strict report whatever is unsound.
+        """
+        header = _header(path)
+        angle = header.get("angle")
+        if angle not in ("heading", "yaw"):
+            raise _invalid(path, '`angle` must be "heading" or "yaw"')
+        classes = ClassNames(_taxonomy(path, header.get("classes")), options, report)
+        files = sorted({file for pattern in _LABEL_FILES for file in path.glob(pattern)})
+        if not files:
+            raise DataError(Diagnostic("file-missing", f"{path} has none of {', '.join(_LABEL_FILES)}"))
+        found = {file.stem: file for file in path.glob("maps/*.geojson")}
+        maps = read_maps({**found, **options.maps}, report)
+        lines = GroupedLines(files, report)
+        reader = _LabelReader(classes, 0.0 if angle == "heading" else -math.pi / 2, report)
+        name = header.get("name")
+        return Source(
+            name=name if isinstance(name, str) and name else path.resolve().name,
+            maps=maps,
+            recordings=_recordings(lines, reader, maps, report),
+            frames=lines.lines,
+            facts={"source": text} if isinstance(text := header.get("source"), str) else {},
+        )
+
+
+def _recordings(
+    lines: GroupedLines, reader: _LabelReader, maps: Mapping[str, object], report: Report
+) -> Generator[Recording]:
+    checked = Labels(maps, report)
+    try:
+        for name in lines.recordings:
+            labels: list[tuple[Label, str]] = []
+            for content, place in lines.read(name):
+                try:
+                    labels.append((reader.label(content, name, place), place))
+                except InvalidError as error:
+                    report.left_out("label", "record-invalid", f"{place}: {error}")
+            if (recording := checked.recording(name, labels)) is not None:
+                yield recording
+    finally:
+        lines.close()
+
+
+class _LabelReader:
+    """From a parsed line to a label."""
+
+    def __init__(self, classes: ClassNames, turn: float, report: Report) -> None:
+        self._classes = classes
+        self._turn = turn
+        self._angle = "heading" if turn == 0 else "yaw"
+        self._report = report
+
+    def label(self, content: object, recording: str, place: str) -> Label:
+        line = fields.record(content, "the line")
+        frame = fields.text(line, "id")
+        try:
+            if fields.text(line, "recording") != recording:
+                raise InvalidError("`recording` is ambiguous")
+            ego = self._ego(fields.record(line.get("ego"), "`ego`"), f"{place}: ego of label `{frame}`")
+            return Label(
+                frame=frame,
+                recording=recording,
+                timestamp_us=fields.integer(line, "timestamp_us"),
+                map=fields.text(line, "map"),
+                ego=ego,
+                objects=tuple(self._objects(fields.items(line, "objects"), frame, place)),
+                params=fields.scalars(line, "params", self._attribute(f"{place}: label `{frame}`")),
+                sensors=_sensors(line),
+            )
+        except InvalidError as error:
+            raise InvalidError(f"label `{frame}`: {error}") from error
+
+    def _ego(self, entry: Record, place: str) -> LabelObject:
+        try:
+            return self._object(entry, "ego", fields.optional_text(entry, "class"), place)
+        except InvalidError as error:
+            raise InvalidError(f"ego: {error}") from error
+
+    def _objects(self, entries: list[Any], frame: str, place: str) -> Iterator[LabelObject]:
+        for number, value in enumerate(entries):
+            name = f"number {number}"
+            try:
+                entry = fields.record(value, "it")
+                id = fields.text(entry, "id")
+                name = f"`{id}`"
+                where = f"{place}: object {name} of label `{frame}`"
+                yield self._object(entry, id, fields.text(entry, "class"), where)
+            except InvalidError as error:
+                message = f"{place}: object {name} of label `{frame}`: {error}"
+                self._report.left_out("object", "record-invalid", message)
+
+    def _object(self, entry: Record, id: str, source_class: str | None, place: str) -> LabelObject:
+        x, y = fields.vector(entry, "position", 2)
+        heading = fields.number(entry, self._angle)
+        velocity = fields.vector(entry, "velocity", 2) if entry.get("velocity") is not None else None
+        return LabelObject(
+            id=id,
+            source_class=source_class or "",
+            x=x,
+            y=y,
+            heading=normalize(heading + self._turn),
+            width=fields.positive(entry, "width"),
+            length=fields.positive(entry, "length"),
+            height=fields.positive(entry, "height"),
+            velocity=None if velocity is None else (velocity[0], velocity[1]),
+            track=fields.optional_text(entry, "track"),
+            attributes=fields.scalars(entry, "attributes", self._attribute(place)),
+            # Last: an object that is left out must not count as one of unknown class.
+            category="Car" if source_class is None else self._classes.category(source_class),
+        )
+
+    def _attribute(self, place: str) -> Callable[[str], None]:
+        return lambda problem: self._report.left_out("attribute", "record-invalid", f"{place}: {problem}")
+
+
+def _sensors(line: Record) -> dict[str, str]:
+    if line.get("sensors") is None:
+        return {}
+    sensors = fields.record(line["sensors"], "`sensors`")
+    return {channel: fields.text(sensors, channel) for channel in sensors}
+
+
+def _invalid(folder: Path, message: str) -> DataError:
+    return DataError(Diagnostic("file-invalid", f"{folder / 'dataset.json'}: {message}"))
+
+
+def _header(folder: Path) -> Record:
+    try:
+        content = fields.parse_json((folder / "dataset.json").read_bytes())
+    except OSError as error:
+        message = f"{folder / 'dataset.json'} cannot be read: {error.strerror}"
+        raise DataError(Diagnostic("file-missing", message)) from error
+    except InvalidError as error:
+        raise _invalid(folder, str(error)) from error
+    if not isinstance(content, dict):
+        raise _invalid(folder, "not an object")
+    header = cast(Record, content)
+    if header.get("interchange") != _VERSION:
+        raise _invalid(folder, f"`interchange` must be {_VERSION}")
+    return header
+
+
+def _taxonomy(folder: Path, name: object) -> Mapping[str, str]:
+    if not isinstance(name, str) or not name:
+        raise _invalid(folder, '`classes` must be "nuscenes", "scenic" or a file of the folder')
+    if name in taxonomy_names():
+        return taxonomy(name)
+    file = (folder / name).resolve()
+    if not file.is_relative_to(folder.resolve()):
+        raise _invalid(folder, "`classes` names a file outside of the folder")
+    return read_class_map(file)

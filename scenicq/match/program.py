@@ -1,0 +1,99 @@
+"""Linear programs: whether a system of linear bounds over a few variables has a solution (HiGHS)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
+
+from scenicq.match.affine import Affine, Variable
+
+__all__ = ["LinearSystem", "Row"]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """`low <= form <= high`; a strict row must hold with a margin."""
+
+    form: Affine
+    low: float
+    high: float
+    strict: bool = False
+
+
+@dataclass(slots=True)
+class LinearSystem:
+    """Rows that must hold together.
+
+    Attributes:
+        rows: The rows.
+    """
+
+    rows: list[Row] = field(default_factory=list[Row])
+
+    def solve(self, more: list[Row]) -> Mapping[Variable, float] | None:
+        """Values of the variables that satisfy all rows and `more`, or None if there are none.
+
+        Strict rows are satisfied with the largest margin there is; none at all means no solution. Exact up to the
+        feasibility tolerance of the linear program, 1e-9.
+        """
+        rows = [*self.rows, *more]
+        for row in rows:
+            fails = not row.form.terms and not row.low - 1e-9 <= row.form.constant <= row.high + 1e-9
+            if fails or (row.strict and not row.form.terms and row.form.constant in (row.low, row.high)):
+                return None
+        rows = [row for row in rows if row.form.terms]
+        variables = {variable: None for row in rows for variable in row.form.terms}
+        if not rows:
+            return {}
+        return _solve(rows, list(variables))
+
+
+_MARGIN = 1e-7
+
+
+def _solve(rows: list[Row], variables: list[Variable]) -> Mapping[Variable, float] | None:
+    highs: Any = import_module("highspy")  # 0.3 s, and most runs never get here
+    column = {variable: number for number, variable in enumerate(variables)}
+    strict = any(row.strict for row in rows)
+    margin = len(variables)
+    count = margin + strict
+    model = highs.HighsLp()
+    starts, indices, values, lows, highs_ = [0], [], [], [], []
+    for row in rows:
+        sides = [(row.low, row.high, 0.0)]
+        if row.strict:
+            sides = [(row.low, math.inf, -1.0)] * (row.low > -math.inf) + [(-math.inf, row.high, 1.0)] * (
+                row.high < math.inf
+            )
+        for low, high, slack in sides:
+            for variable, coefficient in row.form.terms.items():
+                indices.append(column[variable])
+                values.append(coefficient)
+            if slack:
+                indices.append(margin)
+                values.append(slack)
+            starts.append(len(indices))
+            lows.append(low - row.form.constant)
+            highs_.append(high - row.form.constant)
+    model.num_col_, model.num_row_ = count, len(lows)
+    model.col_cost_ = [0.0] * len(variables) + [-1.0] * strict
+    model.col_lower_ = [-math.inf] * len(variables) + [0.0] * strict
+    model.col_upper_ = [math.inf] * len(variables) + [1.0] * strict
+    model.row_lower_, model.row_upper_ = lows, highs_
+    model.a_matrix_.format_ = highs.MatrixFormat.kRowwise
+    model.a_matrix_.start_, model.a_matrix_.index_, model.a_matrix_.value_ = starts, indices, values
+    solver = highs.Highs()
+    solver.silent()
+    solver.setOptionValue("primal_feasibility_tolerance", 1e-9)
+    solver.setOptionValue("threads", 1)
+    solver.passModel(model)
+    solver.run()
+    if solver.getModelStatus() != highs.HighsModelStatus.kOptimal:
+        return None
+    found = list(solver.getSolution().col_value)
+    if strict and found[margin] <= _MARGIN:
+        return None
+    return {variable: float(found[number]) for variable, number in column.items()}

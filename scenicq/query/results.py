@@ -1,0 +1,104 @@
+"""Results of a query as records, and the funnel that says where the other frames went."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from scenicq.errors import Diagnostic
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
+
+__all__ = ["Funnel", "Result", "record"]
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """The verdict on one frame.
+
+    Attributes:
+        frame, recording, timestamp_us: Which frame.
+        verdict: The verdict.
+        sensors: Path of the sensor file of each channel; empty for frames that the prefilter excluded.
+    """
+
+    frame: str
+    recording: str
+    timestamp_us: int
+    verdict: Verdict
+    sensors: Mapping[str, str] = field(default_factory=dict[str, str])
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    found = {"what": cause.what, "detail": cause.detail, "place": cause.place}
+    return {key: value for key, value in found.items() if value}
+
+
+def record(result: Result) -> dict[str, Any]:
+    """A result as plain values with stable keys in a stable order, ready for JSON."""
+    verdict = result.verdict
+    name = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}[type(verdict)]
+    found: dict[str, Any] = {
+        "frame": result.frame,
+        "recording": result.recording,
+        "timestamp_us": result.timestamp_us,
+        "verdict": name,
+        "correspondence": {},
+        "witness": {},
+    }
+    match verdict:
+        case Match():
+            found["correspondence"] = dict(verdict.correspondence)
+            found["witness"] = {k: list(v) if isinstance(v, tuple) else v for k, v in verdict.witness.items()}
+        case Unknown():
+            found["correspondence"] = dict(verdict.correspondence)
+            found["cause"] = {**_cause(verdict.cause), "reason": verdict.reason}
+        case NoMatch():
+            found["correspondence"] = dict(verdict.partial)
+            found["cause"] = _cause(verdict.cause)
+    found["sensors"] = dict(result.sensors)
+    return found
+
+
+@dataclass(slots=True)
+class Funnel:
+    """How many frames are left after each step, and what the others failed at first.
+
+    Attributes:
+        frames: Frames looked at.
+        candidates: Left after the prefilter.
+        cast: Of those, frames with a label object of the right class for every role.
+        matches, unknowns: Verdicts.
+        excluded: How many frames failed first at which feature or requirement.
+        reasons: Why frames are unknown.
+        warnings: What the user should know, such as a map that the program does not fit.
+    """
+
+    frames: int = 0
+    candidates: int = 0
+    cast: int = 0
+    matches: int = 0
+    unknowns: int = 0
+    excluded: Counter[str] = field(default_factory=Counter[str])
+    reasons: Counter[str] = field(default_factory=Counter[str])
+    warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
+
+    def exclude(self, what: str) -> None:
+        """Count a frame that the prefilter excludes."""
+        self.frames += 1
+        self.excluded[what] += 1
+
+    def count(self, verdict: Verdict) -> None:
+        """Count a verdict of the matcher."""
+        self.frames += 1
+        self.candidates += 1
+        self.cast += not (isinstance(verdict, NoMatch) and verdict.cause.what.endswith(".class"))
+        match verdict:
+            case Match():
+                self.matches += 1
+            case Unknown():
+                self.unknowns += 1
+                self.reasons[verdict.reason] += 1
+            case NoMatch():
+                self.excluded[verdict.cause.what] += 1

@@ -1,0 +1,276 @@
+"""Running a query: compile per map, prefilter, match the candidates, in the order of the store.
+
+Candidates go through the matcher in batches, in this process or in workers; results come out in order either way.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from scenicq.compiler.program import compile_scenario
+from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
+from scenicq.forest.scenario import Scenario
+from scenicq.geometry.network import Network
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
+from scenicq.query.plan import Excluded, Plan, make_plan
+from scenicq.query.results import Funnel, Result
+from scenicq.query.solving import LazySolver
+from scenicq.store.dataset import Dataset, open_dataset
+
+__all__ = ["Query", "QueryOptions", "read_program"]
+
+_BATCH = 256
+
+
+@dataclass(frozen=True, slots=True)
+class QueryOptions:
+    """How to run a query.
+
+    Attributes:
+        match: Options of the matcher.
+        solver: Which solver, as `scenicq.smt.solver.open_solver` takes it.
+        version: The version of Scenic; inferred if None.
+        initial: Whether dynamic parts of the program are ignored.
+        prefilter: Whether SQL narrows the frames first; the results are the same.
+        jobs: Processes that match.
+        limit: Matches after which to stop; None for all.
+        every: Whether frames that do not match are results too.
+    """
+
+    match: MatchOptions = MatchOptions()
+    solver: str = "auto"
+    version: Literal[1, 2, 3] | None = None
+    initial: bool = False
+    prefilter: bool = True
+    jobs: int = 1
+    limit: int | None = None
+    every: bool = False
+
+
+def read_program(path: str | Path) -> Source:
+    """Read a scenario.
+
+    Raises:
+        DataError: file-missing, or file-invalid where it is not UTF-8 text.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror}")) from None
+    try:
+        return Source(str(path), data.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise DataError(Diagnostic("file-invalid", f"{path} is not text in UTF-8")) from None
+
+
+def beside(path: Path) -> Callable[[str], Source | None]:
+    """Reads files that a program imports: those in its own folder, nothing else."""
+    folder = path.resolve().parent
+
+    def load(name: str) -> Source | None:
+        file = (folder / name).resolve()
+        if not file.is_relative_to(folder) or not file.is_file():
+            return None
+        return read_program(file)
+
+    return load
+
+
+@dataclass(eq=False)
+class Query:
+    """A scenario and a dataset, ready to run.
+
+    Attributes:
+        dataset: The dataset.
+        source: The program.
+        options: The options.
+        funnel: Filled while results are taken.
+    """
+
+    dataset: Dataset
+    source: Source
+    options: QueryOptions = QueryOptions()
+    funnel: Funnel = field(default_factory=Funnel)
+
+    def compile(self, map_name: str) -> tuple[Scenario, Network]:
+        """The scenario over one of the dataset's maps.
+
+        Raises:
+            ScenarioError: The program is wrong, or does not fit the map.
+        """
+        network = self.dataset.network(map_name)
+        options = self.options
+        scenario = compile_scenario(
+            self.source,
+            network,
+            version=options.version,
+            initial=options.initial,
+            loader=beside(Path(self.source.name)),
+        )
+        return scenario, network
+
+    def _worlds(self) -> list[tuple[str, Scenario, Network]]:
+        """The scenario over each map that it fits; an error if it fits none."""
+        found: list[tuple[str, Scenario, Network]] = []
+        errors: list[ScenarioError] = []
+        for name in self.dataset.maps:
+            try:
+                found.append((name, *self.compile(name)))
+            except ScenarioError as error:
+                if error.diagnostics[0].code != "map-lacks":
+                    raise
+                errors.append(error)
+                frames = self.dataset.manifest.by_map.get(name)
+                count = frames.frames if frames else 0
+                message = f"{count} frames on map `{name}` cannot match: {error.diagnostics[0].message}"
+                self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
+                self.funnel.frames += count
+                self.funnel.excluded[f"map {name}"] += count
+        if errors and not found:
+            raise errors[0]
+        return found
+
+    def plans(self) -> list[Plan]:
+        """The prefilter on each map."""
+        return [make_plan(scenario, network, self.options.match) for _, scenario, network in self._worlds()]
+
+    def results(self, progress: Callable[[int], None] | None = None) -> Iterator[Result]:
+        """Results in the order of recording, time and frame, map by map.
+
+        Args:
+            progress: Called with the number of frames decided since the last call.
+
+        Raises:
+            ScenarioError: The program is wrong or not supported.
+        """
+        tell = progress or (lambda _: None)
+        worlds = self._worlds()
+        left = self.options.limit
+        with ExitStack() as stack:
+            pool = stack.enter_context(_Pool(self)) if self.options.jobs > 1 else None
+            solver = stack.enter_context(LazySolver(self.options.solver))
+            for name, scenario, network in worlds:
+                matcher = Matcher(scenario, self.options.match, solver)
+                for result, decided in self._on_map(name, matcher, network, pool):
+                    tell(decided)
+                    if result is None:
+                        continue
+                    yield result
+                    if isinstance(result.verdict, Match) and left is not None:
+                        left -= 1
+                        if left <= 0:
+                            return
+
+    def _on_map(
+        self, name: str, matcher: Matcher, network: Network, pool: _Pool | None
+    ) -> Iterator[tuple[Result | None, int]]:
+        connection = self.dataset.connect()
+        try:
+            if self.options.prefilter:
+                rows = make_plan(matcher.scenario, network, self.options.match).run(connection)
+            else:
+                rows = _all_frames(connection, name)
+            batches = _batches(rows)
+            decided = pool.run(name, batches) if pool else ((b, _decide(self.dataset, matcher, b)) for b in batches)
+            for batch, found in decided:
+                yield from self._merge(batch, found)
+        finally:
+            connection.close()
+
+    def _merge(self, batch: list[Excluded], found: dict[str, Result]) -> Iterator[tuple[Result | None, int]]:
+        for row in batch:
+            if row.step is None:
+                result = found[row.frame]
+                self.funnel.count(result.verdict)
+                shown = self.options.every or isinstance(result.verdict, Match | Unknown)
+                yield (result if shown else None), 1
+            else:
+                self.funnel.exclude(row.step.what)
+                excluded = None
+                if self.options.every:
+                    cause = Cause(row.step.what, row.step.detail, row.step.span)
+                    excluded = Result(row.frame, row.recording, row.timestamp_us, NoMatch(cause))
+                yield excluded, 1
+
+
+def _all_frames(connection: object, name: str) -> Iterator[Excluded]:
+    everything = Plan(name, (), "SELECT frame, recording, timestamp_us, NULL::INTEGER AS missed FROM labels "
+                                f"WHERE map = '{name.replace(chr(39), chr(39) * 2)}' "
+                                "ORDER BY recording, timestamp_us, frame")  # fmt: skip
+    return everything.run(connection)
+
+
+def _batches(rows: Iterator[Excluded]) -> Iterator[list[Excluded]]:
+    """Rows in order, cut where enough candidates have come together."""
+    batch: list[Excluded] = []
+    candidates = 0
+    for row in rows:
+        batch.append(row)
+        candidates += row.step is None
+        if candidates >= _BATCH or len(batch) >= 100 * _BATCH:
+            yield batch
+            batch, candidates = [], 0
+    if batch:
+        yield batch
+
+
+def _decide(dataset: Dataset, matcher: Matcher, batch: Sequence[Excluded]) -> dict[str, Result]:
+    frames = [row.frame for row in batch if row.step is None]
+    return {
+        label.frame: Result(label.frame, label.recording, label.timestamp_us, matcher.match(label), label.sensors)
+        for label in (dataset.labels(frames) if frames else ())
+    }
+
+
+class _Pool:
+    """Worker processes that each hold the compiled scenario; batches come back in order."""
+
+    def __init__(self, query: Query) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.jobs = query.options.jobs
+        state = (query.dataset.path, query.source, query.options)
+        self.pool = ProcessPoolExecutor(self.jobs, context, initializer=_start_worker, initargs=state)
+
+    def __enter__(self) -> _Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.pool.shutdown(wait=True, cancel_futures=True)
+
+    def run(self, name: str, batches: Iterator[list[Excluded]]) -> Iterator[tuple[list[Excluded], dict[str, Result]]]:
+        """Decide batches side by side, a bounded number ahead."""
+        pending: deque[tuple[list[Excluded], Future[dict[str, Result]]]] = deque()
+        for batch in batches:
+            frames = [row for row in batch if row.step is None]
+            pending.append((batch, self.pool.submit(_work, name, frames)))
+            if len(pending) > 2 * self.jobs:
+                first, future = pending.popleft()
+                yield first, future.result()
+        for first, future in pending:
+            yield first, future.result()
+
+
+_worker: dict[str, object] = {}
+
+
+def _start_worker(path: Path, source: Source, options: QueryOptions) -> None:
+    _worker["query"] = Query(open_dataset(path), source, options)
+    _worker["solver"] = LazySolver(options.solver)
+    _worker["matchers"] = {}
+
+
+def _work(name: str, frames: Sequence[Excluded]) -> dict[str, Result]:
+    query, solver, matchers = _worker["query"], _worker["solver"], _worker["matchers"]
+    assert isinstance(query, Query) and isinstance(solver, LazySolver) and isinstance(matchers, dict)
+    if name not in matchers:
+        matchers[name] = Matcher(query.compile(name)[0], query.options.match, solver)
+    return _decide(query.dataset, matchers[name], frames)

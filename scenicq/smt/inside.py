@@ -1,0 +1,175 @@
+"""Points in regions as formulas (query paper, appendix A.2, figure 19: On, Disc, Sector, tri)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TypeAlias, cast
+
+import numpy as np
+
+from scenicq.forest.bounds import Box
+from scenicq.forest.nodes import (
+    Constant,
+    DiscAt,
+    Node,
+    RectangleAt,
+    RegionDifference,
+    RegionIntersection,
+    RegionUnion,
+    SectorAt,
+    Select,
+)
+from scenicq.geometry.cells import convex_cells
+from scenicq.geometry.membership import bounds as region_bounds
+from scenicq.geometry.regions import (
+    DifferenceOf,
+    Disc,
+    Everywhere,
+    IntersectionOf,
+    Nowhere,
+    PolygonSet,
+    Rectangle,
+    Region,
+    Sector,
+    UnionOf,
+)
+from scenicq.smt.formula import FALSE, TRUE, Formula, Operator, Term, apply, compare, conjunction, disjunction, negation
+
+__all__ = ["UnsupportedError", "Vector", "convex_cell", "disc", "inside_region"]
+
+Vector: TypeAlias = tuple[Term, Term]
+
+
+class UnsupportedError(Exception):
+    """A construct that has no formula; the message says which."""
+
+
+def disc(dx: Term, dy: Term, radius: Term | float) -> Formula:
+    """An offset of at most a radius (figure 19: Disc)."""
+    squares = apply(Operator.ADD, apply(Operator.POW, dx, 2.0), apply(Operator.POW, dy, 2.0))
+    return compare("<=", squares, apply(Operator.POW, radius, 2.0))
+
+
+def convex_cell(point: Vector, polygon: np.ndarray) -> Formula:
+    """A point in a convex polygon (k, 2) whose corners run counter-clockwise: left of every edge."""
+    x, y = point
+    sides: list[Formula] = []
+    for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        length = math.hypot(bx - ax, by - ay)
+        if length > 0:
+            nx, ny = float(by - ay) / length, float(ax - bx) / length
+            across = apply(Operator.ADD, apply(Operator.MUL, x, nx), apply(Operator.MUL, y, ny))
+            sides.append(compare("<=", across, nx * float(ax) + ny * float(ay)))
+    return conjunction(sides)
+
+
+def _local(dx: Term, dy: Term, heading: Term | float) -> Vector:
+    """An offset in the frame of a heading: right and ahead."""
+    c, s = apply(Operator.COS, heading), apply(Operator.SIN, heading)
+    right = apply(Operator.ADD, apply(Operator.MUL, dx, c), apply(Operator.MUL, dy, s))
+    ahead = apply(Operator.SUB, apply(Operator.MUL, dy, c), apply(Operator.MUL, dx, s))
+    return right, ahead
+
+
+def _wedge(right: Term, ahead: Term, half: float) -> Formula:
+    """An offset within an angle of straight ahead; any half angle from 0 to pi (figure 19's is for less than pi/2)."""
+    if half >= math.pi:
+        return TRUE
+    c, s = math.cos(half), math.sin(half)
+    reach = apply(Operator.MUL, ahead, s)
+    side = apply(Operator.MUL, right, c)
+    left_of = compare("<=", side, reach)
+    right_of = compare("<=", apply(Operator.NEG, side), reach)
+    return conjunction([left_of, right_of]) if half <= math.pi / 2 else disjunction([left_of, right_of])
+
+
+def _sector(dx: Term, dy: Term, radius: Term | float, heading: Term | float, angle: float) -> Formula:
+    right, ahead = _local(dx, dy, heading)
+    return conjunction([disc(dx, dy, radius), _wedge(right, ahead, angle / 2)])
+
+
+def _rectangle(dx: Term, dy: Term, heading: Term | float, width: Term | float, length: Term | float) -> Formula:
+    right, ahead = _local(dx, dy, heading)
+    return conjunction(
+        compare("<=", apply(Operator.ABS, offset), apply(Operator.MUL, size, 0.5))
+        for offset, size in ((right, width), (ahead, length))
+    )
+
+
+def _offset(point: Vector, center: tuple[Term | float, Term | float]) -> Vector:
+    return apply(Operator.SUB, point[0], center[0]), apply(Operator.SUB, point[1], center[1])
+
+
+def _known_region(region: Region, point: Vector, around: Box) -> Formula:
+    match region:
+        case Everywhere():
+            return TRUE
+        case Nowhere():
+            return FALSE
+        case Disc():
+            return disc(*_offset(point, region.center), region.radius)
+        case Sector():
+            return _sector(*_offset(point, region.center), region.radius, region.heading, region.angle)
+        case Rectangle():
+            return _rectangle(*_offset(point, region.center), region.heading, region.width, region.length)
+        case PolygonSet():
+            west, south, east, north = region_bounds(region)
+            (x0, x1), (y0, y1) = around
+            limits = (max(x0, west), max(y0, south), min(x1, east), min(y1, north))
+            if limits[0] > limits[2] or limits[1] > limits[3]:
+                return FALSE
+            return disjunction(convex_cell(point, cell) for cell in convex_cells(region, limits))
+        case UnionOf():
+            return disjunction(_known_region(part, point, around) for part in region.parts)
+        case IntersectionOf():
+            return conjunction(_known_region(part, point, around) for part in region.parts)
+        case DifferenceOf():
+            removed = _known_region(region.removed, point, around)
+            return conjunction([_known_region(region.base, point, around), negation(removed)])
+        case _:
+            raise UnsupportedError(f"a random point on a {type(region).__name__}")
+
+
+def inside_region(region: Node, point: Vector, around: Box, code: Callable[[Node], object]) -> Formula:
+    """A point in a region whose shape may depend on random variables.
+
+    Args:
+        region: The region's expression.
+        point: The point's coordinates as terms.
+        around: Where the point can be; map cells elsewhere are left out.
+        code: Gives the term of a subexpression.
+
+    Raises:
+        UnsupportedError: The region is a line, finitely many points, or a sector of random angle.
+    """
+    match region:
+        case Constant():
+            return _known_region(cast(Region, region.value), point, around)
+        case DiscAt():
+            return disc(*_offset(point, cast(Vector, code(region.center))), cast(Term, code(region.radius)))
+        case SectorAt():
+            if not isinstance(region.angle, Constant):
+                raise UnsupportedError("a view of random angle")
+            offset = _offset(point, cast(Vector, code(region.center)))
+            radius, heading = cast(Term, code(region.radius)), cast(Term, code(region.heading))
+            return _sector(*offset, radius, heading, cast(float, region.angle.value))
+        case RectangleAt():
+            offset = _offset(point, cast(Vector, code(region.center)))
+            sizes = [cast(Term, code(part)) for part in (region.heading, region.width, region.length)]
+            return _rectangle(*offset, *sizes)
+        case RegionUnion():
+            return disjunction(inside_region(part, point, around, code) for part in region.parts)
+        case RegionIntersection():
+            return conjunction(inside_region(part, point, around, code) for part in region.parts)
+        case RegionDifference():
+            removed = inside_region(region.removed, point, around, code)
+            return conjunction([inside_region(region.base, point, around, code), negation(removed)])
+        case Select():
+            index = cast(Term, code(region.index))
+            return disjunction(
+                conjunction([compare("==", index, float(number)), inside_region(option, point, around, code)])
+                for number, option in enumerate(region.options)
+            )
+        case _:
+            raise UnsupportedError(f"a region given as {type(region).__name__}")

@@ -1,0 +1,127 @@
+"""The class tree: what the classes of scenarios and of datasets have in common.
+
+An object of a scenario matches label objects of its class or below. Datasets have names of their own; a taxonomy
+translates them. Nothing here reads a dataset.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from types import MappingProxyType
+from typing import Literal
+
+__all__ = [
+    "ROOT",
+    "Granularity",
+    "ancestors",
+    "class_matches",
+    "fold",
+    "is_class",
+    "is_subclass",
+    "subclasses",
+    "taxonomy",
+    "taxonomy_names",
+]
+
+ROOT = "Object"
+"""The class of everything, and of what no taxonomy knows."""
+
+Granularity = Literal["fine", "coarse"]
+"""`coarse` folds all vehicles into `Car` and all people into `Pedestrian`, as the query paper's experiments did."""
+
+_COARSE = {"Vehicle": "Car", "Pedestrian": "Pedestrian"}
+
+
+def _load(name: str) -> dict[str, str | None]:
+    text = resources.files("scenicq.store").joinpath("taxonomies", f"{name}.json").read_text(encoding="utf-8")
+    return json.loads(text)
+
+
+@cache
+def _tree() -> Mapping[str, str | None]:
+    return MappingProxyType(_load("tree"))
+
+
+def is_class(name: str) -> bool:
+    """Whether the tree has a class of that name."""
+    return name in _tree()
+
+
+@cache
+def ancestors(name: str) -> tuple[str, ...]:
+    """The class itself, its parent, and so on up to `Object`.
+
+    Raises:
+        KeyError: The tree has no such class.
+    """
+    path = [name]
+    while (parent := _tree()[path[-1]]) is not None:
+        path.append(parent)
+    return tuple(path)
+
+
+def is_subclass(category: str, of: str) -> bool:
+    """Whether a class is another one or lies below it in the tree.
+
+    Raises:
+        KeyError: The tree has no class `category`.
+    """
+    return of in ancestors(category)
+
+
+@cache
+def subclasses(name: str) -> tuple[str, ...]:
+    """The class itself and everything below it, in the tree's order.
+
+    Raises:
+        KeyError: The tree has no such class.
+    """
+    if not is_class(name):
+        raise KeyError(name)
+    return tuple(category for category in _tree() if is_subclass(category, name))
+
+
+@cache
+def fold(category: str, granularity: Granularity) -> str:
+    """The class that stands for `category` at a granularity.
+
+    Raises:
+        KeyError: The tree has no such class.
+    """
+    path = ancestors(category)
+    if granularity == "fine":
+        return category
+    return next((_COARSE[name] for name in path if name in _COARSE), category)
+
+
+def taxonomy_names() -> tuple[str, ...]:
+    """Names that `taxonomy` knows."""
+    return ("nuscenes", "scenic")
+
+
+@cache
+def taxonomy(name: str) -> Mapping[str, str]:
+    """Translation of a dataset's class names into the tree.
+
+    Args:
+        name: "nuscenes", or "scenic" for the tree's own names.
+
+    Raises:
+        KeyError: There is no such taxonomy.
+    """
+    if name == "scenic":
+        return MappingProxyType({category: category for category in _tree()})
+    if name != "nuscenes":
+        raise KeyError(name)
+    return MappingProxyType({source: category for source, category in _load(name).items() if category is not None})
+
+
+@cache
+def class_matches(wanted: str, category: str, granularity: Granularity) -> bool:
+    """Whether a label object's class plays a role of class `wanted`: it is that class or below, once folded."""
+    own = fold(category, granularity) if is_class(category) else category
+    role = fold(wanted, granularity) if is_class(wanted) else wanted
+    return own == role or (is_class(own) and role in ancestors(own))

@@ -1,0 +1,83 @@
+"""A label as the matcher sees it: plain values, no files.
+
+Units: metres, radians, seconds; positions in the frame of the label's map; heading 0 along +y, counter-clockwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+__all__ = ["Label", "LabelObject", "Recording"]
+
+
+@dataclass(frozen=True, slots=True)
+class LabelObject:
+    """One annotated object of a label.
+
+    A property that the source does not have is None: it is unobserved, never invented.
+
+    Attributes:
+        id: The source's own identifier, unique within the label; "ego" for the ego.
+        category: The class of the class tree (`scenicq.store.classes`), such as "Car".
+        source_class: What the source calls the class, verbatim.
+        x, y: Position of the centre, metres, map frame.
+        heading: Radians in (-pi, pi], 0 along +y, counter-clockwise; None if unknown.
+        width, length, height: Extents, metres.
+        velocity: (vx, vy) in metres per second, map frame.
+        track: Identifier of the same physical object along the recording.
+        attributes: Everything else that the source says of the object.
+    """
+
+    id: str
+    category: str
+    source_class: str
+    x: float
+    y: float
+    heading: float | None = None
+    width: float | None = None
+    length: float | None = None
+    height: float | None = None
+    velocity: tuple[float, float] | None = None
+    track: str | None = None
+    attributes: Mapping[str, str | float | bool] = field(default_factory=dict[str, str | float | bool])
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """The annotated scene of one frame.
+
+    Attributes:
+        frame: Identifier of the frame, the source's own, unique in the dataset.
+        recording: The series of labels that the frame belongs to.
+        timestamp_us: Microseconds.
+        map: Name of the map in the dataset.
+        ego: The vehicle that records.
+        objects: The other annotated objects, in the order of the source.
+        params: Global parameters (weather, time of day ...).
+        sensors: Path of the sensor file of each channel, as the source gives it.
+    """
+
+    frame: str
+    recording: str
+    timestamp_us: int
+    map: str
+    ego: LabelObject
+    objects: tuple[LabelObject, ...] = ()
+    params: Mapping[str, str | float | bool] = field(default_factory=dict[str, str | float | bool])
+    sensors: Mapping[str, str] = field(default_factory=dict[str, str])
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A series of labels with one ego and one map.
+
+    Attributes:
+        name: Unique in the dataset.
+        map: Name of the map that all its labels refer to.
+        labels: In order of time, then of frame.
+    """
+
+    name: str
+    map: str
+    labels: tuple[Label, ...]

@@ -1,0 +1,169 @@
+"""`dataset.json`: what a dataset holds, where it came from and what was left out.
+
+Everything but `provenance` is a function of the source alone, so two runs over one source differ only there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS
+
+__all__ = ["MANIFEST", "Counts", "LeftOut", "Manifest", "Part", "is_dataset", "read_manifest"]
+
+MANIFEST = "dataset.json"
+"""Name of the manifest's file."""
+
+_FORMAT = "scenicq"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One Parquet file of a table: its path relative to the dataset, size, checksum and number of rows."""
+
+    path: str
+    bytes: int
+    sha256: str
+    rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """How much there is of something."""
+
+    frames: int = 0
+    objects: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """What is not in the dataset as the source has it.
+
+    Attributes:
+        what: "recording", "label", "object", "map element" ...
+        code: A key of `scenicq.errors.CODES`.
+        count: How many.
+        name: What they have in common, such as the unknown class; "" where it does not matter.
+        kept: Whether it is in the dataset nevertheless, such as an object of unknown class as `Object`.
+    """
+
+    what: str
+    code: str
+    count: int
+    name: str = ""
+    kept: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """The content of `dataset.json`.
+
+    Attributes:
+        name: What the source calls itself.
+        importer: Name of the importer that read the source.
+        tables: The files of each table.
+        maps: Number of elements of each map.
+        total: Frames and label objects of the dataset.
+        tracks: Distinct tracks, counted within each recording.
+        span_us: First and last timestamp; None without frames.
+        by_class: Label objects of each class of the tree (exactly, not below it).
+        by_source_class: Label objects of each class name of the source.
+        by_map: Frames and label objects of each map that a label refers to.
+        by_recording: Frames and label objects of each recording.
+        left_out: What the importer left out or kept with a defect.
+        provenance: Versions, options, time: all that may differ between two runs over one source.
+        schema: Version of the tables.
+    """
+
+    name: str
+    importer: str
+    tables: Mapping[str, tuple[Part, ...]]
+    maps: Mapping[str, int]
+    total: Counts
+    tracks: int
+    span_us: tuple[int, int] | None
+    by_class: Mapping[str, int]
+    by_source_class: Mapping[str, int]
+    by_map: Mapping[str, Counts]
+    by_recording: Mapping[str, Counts]
+    left_out: tuple[LeftOut, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    schema: int = SCHEMA_VERSION
+
+    def to_json(self) -> str:
+        """The text of `dataset.json`."""
+        fields = {"format": _FORMAT, "schema": self.schema} | asdict(self)
+        return json.dumps(fields, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def is_dataset(folder: Path) -> bool:
+    """Whether a folder is a dataset of ours, of any version, sound or not."""
+    try:
+        content = json.loads((folder / MANIFEST).read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and cast(dict[str, object], content).get("format") == _FORMAT
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Read a dataset's manifest.
+
+    Raises:
+        DataError: `store-missing`, `store-version` or `store-damaged`.
+    """
+    path = folder / MANIFEST
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise _damaged(path, "is not UTF-8 text") from error
+    except OSError as error:
+        hint = "`scenicq ingest SOURCE DATASET` makes a dataset"
+        raise DataError(Diagnostic("store-missing", f"{folder} has no {MANIFEST}", hints=(hint,))) from error
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise _damaged(path, f"is not JSON: {error}") from error
+    if not isinstance(content, dict) or cast(dict[str, object], content).get("format") != _FORMAT:
+        hint = "`scenicq ingest SOURCE DATASET` makes a dataset from a source"
+        raise DataError(Diagnostic("store-missing", f"{folder} is not a dataset of scenicq", hints=(hint,)))
+    fields = cast(dict[str, Any], content)
+    if (found := fields.get("schema")) != SCHEMA_VERSION:
+        message = f"{folder} has tables of version {found}; this program reads version {SCHEMA_VERSION}"
+        raise DataError(Diagnostic("store-version", message, hints=("ingest the source again",)))
+    try:
+        return _manifest(fields)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise _damaged(path, f"lacks or has an unsound {error}") from error
+
+
+def _damaged(path: Path, what: str) -> DataError:
+    return DataError(Diagnostic("store-damaged", f"{path} {what}", hints=("ingest the source again",)))
+
+
+def _manifest(content: dict[str, Any]) -> Manifest:
+    tables = {name: tuple(Part(**part) for part in content["tables"][name]) for name in SCHEMAS}
+    for part in (part for parts in tables.values() for part in parts):
+        steps = Path(part.path)
+        if steps.is_absolute() or ".." in steps.parts:
+            raise ValueError(f"path {part.path}")
+    span = content["span_us"]
+    return Manifest(
+        name=content["name"],
+        importer=content["importer"],
+        tables=tables,
+        maps=content["maps"],
+        total=Counts(**content["total"]),
+        tracks=content["tracks"],
+        span_us=None if span is None else (span[0], span[1]),
+        by_class=content["by_class"],
+        by_source_class=content["by_source_class"],
+        by_map={name: Counts(**counts) for name, counts in content["by_map"].items()},
+        by_recording={name: Counts(**counts) for name, counts in content["by_recording"].items()},
+        left_out=tuple(LeftOut(**entry) for entry in content["left_out"]),
+        provenance=content["provenance"],
+    )

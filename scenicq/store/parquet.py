@@ -1,0 +1,110 @@
+"""Writing one table as one Parquet file: bounded memory, temporary name, checksum."""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from scenicq.store.manifest import Part
+from scenicq.store.regions import GEO_METADATA
+from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS, ArrowTable
+
+__all__ = ["TableWriter", "sync_folder", "write_synced"]
+
+_ROW_GROUP = 122_880
+
+
+class TableWriter:
+    """Collects rows of a table and writes them in row groups of one size, however they come in."""
+
+    def __init__(self, folder: Path, table: str) -> None:
+        """Open `TABLE/part-00000.parquet` under a temporary name.
+
+        Args:
+            folder: Of the dataset.
+            table: A key of `SCHEMAS`.
+
+        Raises:
+            OSError: The folder cannot be written.
+        """
+        metadata = {"scenicq_schema": str(SCHEMA_VERSION)} | ({"geo": GEO_METADATA} if table == "regions" else {})
+        self._schema = SCHEMAS[table].with_metadata(metadata)
+        self._folder = folder
+        self._path = folder / table / "part-00000.parquet"
+        self._temporary = self._path.with_suffix(".tmp")
+        self._path.parent.mkdir()
+        self._pending: list[ArrowTable] = []
+        self._pending_rows = 0
+        self._rows = 0
+        texts = [field.name for field in self._schema if field.type == pa.string()]
+        reals = [field.name for field in self._schema if field.type == pa.float64()]
+        self._writer = pq.ParquetWriter(
+            self._temporary,
+            self._schema,
+            compression="zstd",
+            # A dictionary of floats only costs: they hardly repeat. Splitting their bytes compresses better.
+            use_dictionary=texts,  # pyright: ignore[reportArgumentType]
+            use_byte_stream_split=reals,  # pyright: ignore[reportArgumentType]
+        )
+
+    def add(self, rows: ArrowTable) -> None:
+        """Append rows of the table's schema."""
+        self._pending.append(rows)
+        self._pending_rows += len(rows)
+        self._rows += len(rows)
+        if self._pending_rows >= _ROW_GROUP:
+            self._flush(self._pending_rows // _ROW_GROUP * _ROW_GROUP)
+
+    def finish(self) -> Part:
+        """Write what is left, sync, give the file its name, and describe it."""
+        if self._pending_rows:
+            self._flush(self._pending_rows)
+        self._writer.close()
+        with self._temporary.open("rb+") as file:
+            os.fsync(file.fileno())
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        self._temporary.replace(self._path)
+        sync_folder(self._path.parent)
+        relative = self._path.relative_to(self._folder).as_posix()
+        return Part(relative, self._path.stat().st_size, digest, self._rows)
+
+    def abandon(self) -> None:
+        """Close the file without finishing it."""
+        self._writer.close()
+
+    def _flush(self, rows: int) -> None:
+        table = pa.concat_tables(self._pending).combine_chunks()
+        self._writer.write_table(table.slice(0, rows).cast(self._schema), row_group_size=_ROW_GROUP)
+        rest = table.slice(rows)
+        self._pending = [rest] if len(rest) else []
+        self._pending_rows = len(rest)
+
+
+def write_synced(path: Path, text: str) -> None:
+    """Write a text file so that it is there completely or not at all, even if the machine stops."""
+    temporary = path.with_name(path.name + ".tmp")
+    with temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make renames in a folder last, where the system can."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

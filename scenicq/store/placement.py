@@ -1,0 +1,80 @@
+"""What a map says about positions: regions around them, lane, direction of the road. Computed once, at ingest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from scenicq.geometry.features import MapFeature
+from scenicq.geometry.network import Network
+from scenicq.store.schema import MEMBERSHIP_RADIUS_M
+
+__all__ = ["MapIndex", "Memberships"]
+
+
+@dataclass(frozen=True, slots=True)
+class Memberships:
+    """Pairs of a position and a region near it, by position, then in the order of the map.
+
+    Attributes:
+        point: Number of the position, shape (n,).
+        feature: Number of the map element, shape (n,).
+        distance: Metres; 0 inside and on the boundary, shape (n,).
+    """
+
+    point: NDArray[np.int64]
+    feature: NDArray[np.int64]
+    distance: NDArray[np.float64]
+
+
+class MapIndex:
+    """A map prepared for many positions."""
+
+    def __init__(self, name: str, features: Sequence[MapFeature]) -> None:
+        """Index a map; without elements every answer is empty."""
+        self.ids: list[str] = [feature.id for feature in features]
+        self.kinds: list[str] = [feature.kind for feature in features]
+        self._network = Network(name, features)
+        self._shapes = np.array([feature.shape for feature in features], dtype=object)
+        self._tree = shapely.STRtree(self._shapes)
+        self._is_lane = np.array([kind == "lane" for kind in self.kinds], dtype=bool)
+        self._centerlines = np.array([_centerline(feature) for feature in features], dtype=object)
+
+    def memberships(self, xy: NDArray[np.float64]) -> Memberships:
+        """Regions within `MEMBERSHIP_RADIUS_M` of positions of shape (n, 2)."""
+        points = np.asarray(shapely.points(xy))
+        point, feature = self._tree.query(points, predicate="dwithin", distance=MEMBERSHIP_RADIUS_M)
+        order = np.lexsort((feature, point))
+        point, feature = point[order], feature[order]
+        return Memberships(point, feature, _distance(points[point], self._shapes[feature]))
+
+    def lanes(self, xy: NDArray[np.float64], near: Memberships) -> list[str | None]:
+        """The lane that contains each position; of several, as in intersections, that with the nearest centreline."""
+        chosen = (near.distance == 0) & self._is_lane[near.feature] if len(self.ids) else np.zeros(0, dtype=bool)
+        point, feature = near.point[chosen], near.feature[chosen]
+        lines = self._centerlines[feature]
+        offset = np.nan_to_num(_distance(np.asarray(shapely.points(xy[point])), lines), nan=np.inf)
+        lanes: list[str | None] = [None] * len(xy)
+        # Written from the farthest to the nearest, so that the nearest stays; of equals the first in the map.
+        for number in np.lexsort((-feature, -offset)):
+            lanes[point[number]] = self.ids[feature[number]]
+        return lanes
+
+    def road_directions(self, xy: NDArray[np.float64]) -> list[tuple[float, ...]]:
+        """The headings that the road has at positions of shape (n, 2); none where it has none."""
+        return self._network.roadDirection.values_many(xy)
+
+
+def _distance(points: NDArray[Any], shapes: NDArray[Any]) -> NDArray[np.float64]:
+    """Distance of each pair; nan where there is no shape."""
+    return shapely.distance(points, shapes)  # pyright: ignore[reportUnknownMemberType]
+
+
+def _centerline(feature: MapFeature) -> shapely.MultiLineString | None:
+    lines = [line for line in feature.properties.get("centerline") or () if len(line) >= 2]
+    return shapely.MultiLineString([np.asarray(line)[:, :2] for line in lines]) if lines else None

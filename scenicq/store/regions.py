@@ -1,0 +1,88 @@
+"""Maps as rows: `regions` (everything) and `lanes` (for queries), and back."""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+import shapely
+
+from scenicq.geometry.features import MapFeature, names
+from scenicq.store.schema import SCHEMAS, ArrowTable
+
+__all__ = ["GEO_METADATA", "lane_rows", "read_features", "region_rows"]
+
+GEO_METADATA = json.dumps(
+    {
+        "version": "1.1.0",
+        "primary_column": "geometry",
+        # The frame is the map's own, in metres: no coordinate reference system describes it.
+        "columns": {"geometry": {"encoding": "WKB", "geometry_types": [], "crs": None, "edges": "planar"}},
+    },
+    separators=(",", ":"),
+)
+"""Value of the `geo` key by which GeoParquet readers recognise the geometry column of `regions`."""
+
+
+def region_rows(maps: Mapping[str, Sequence[MapFeature]]) -> ArrowTable:
+    """All elements of all maps, by map name, in the order of the map."""
+    features = [(name, feature) for name in sorted(maps) for feature in maps[name]]
+    return pa.table(
+        {
+            "map": [name for name, _ in features],
+            "id": [feature.id for _, feature in features],
+            "kind": [feature.kind for _, feature in features],
+            "geometry": [shapely.to_wkb(feature.shape) for _, feature in features],
+            "properties": [_to_json(feature.properties) for _, feature in features],
+        },
+        schema=SCHEMAS["regions"],
+    )
+
+
+def lane_rows(maps: Mapping[str, Sequence[MapFeature]]) -> ArrowTable:
+    """The lanes of all maps, by map name, in the order of the map."""
+    lanes = [(name, lane) for name in sorted(maps) for lane in maps[name] if lane.kind == "lane"]
+    return pa.table(
+        {
+            "map": [name for name, _ in lanes],
+            "id": [lane.id for _, lane in lanes],
+            "centerline": [_centerline(lane.properties.get("centerline")) for _, lane in lanes],
+            "left": [next(iter(names(lane, "left")), None) for _, lane in lanes],
+            "right": [next(iter(names(lane, "right")), None) for _, lane in lanes],
+            "predecessors": [names(lane, "predecessors") for _, lane in lanes],
+            "successors": [names(lane, "successors") for _, lane in lanes],
+        },
+        schema=SCHEMAS["lanes"],
+    )
+
+
+def read_features(files: Iterable[Path], map_name: str) -> tuple[MapFeature, ...]:
+    """The elements of one map, equal to those that were written."""
+    features: list[MapFeature] = []
+    for file in files:
+        table = pq.ParquetFile(file).read().filter(pc.field("map") == map_name)
+        shapes = shapely.from_wkb(table["geometry"].to_pylist())
+        columns = (table[name].to_pylist() for name in ("id", "kind", "properties"))
+        features += [
+            MapFeature(id=id, kind=kind, shape=shape, properties=json.loads(properties))
+            for id, kind, properties, shape in zip(*columns, shapes, strict=True)
+        ]
+    return tuple(features)
+
+
+def _to_json(properties: Mapping[str, Any]) -> str:
+    return json.dumps(dict(properties), ensure_ascii=False, separators=(",", ":"))
+
+
+def _centerline(polylines: Any) -> bytes | None:
+    lines = [line for line in polylines or () if len(line) >= 2]
+    return shapely.to_wkb(shapely.multilinestrings([shapely.linestrings(line) for line in lines])) if lines else None

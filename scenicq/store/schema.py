@@ -1,0 +1,126 @@
+"""The tables of a dataset: the one place that names their columns.
+
+Units: metres, radians, seconds, microseconds for time; positions in the frame of the label's map. Rows of `labels`,
+`objects`, `memberships` and `sensors` are sorted by recording, time and frame (`objects` then by `ordinal`), so the
+objects of one frame lie together and in the order of the labels. Columns marked * are computed at ingest.
+"""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import pyarrow as pa
+
+__all__ = ["MEMBERSHIP_RADIUS_M", "SCHEMAS", "SCHEMA_VERSION", "ArrowTable"]
+
+ArrowTable: TypeAlias = Any
+"""A `pyarrow.Table`; pyarrow has no type stubs, so checkers know nothing of it."""
+
+SCHEMA_VERSION = 1
+"""Changes with every change of a table that a reader could notice."""
+
+MEMBERSHIP_RADIUS_M = 2.0
+"""`memberships` lists the regions within this distance: a position tolerance up to it can be prefiltered."""
+
+_TEXT, _REAL, _COUNT = pa.string(), pa.float64(), pa.int32()
+
+
+def _required(name: str, kind: Any) -> Any:
+    return pa.field(name, kind, nullable=False)
+
+
+SCHEMAS: dict[str, Any] = {
+    # One row a frame.
+    "labels": pa.schema(
+        [
+            _required("frame", _TEXT),
+            _required("recording", _TEXT),
+            _required("timestamp_us", pa.int64()),
+            _required("map", _TEXT),
+            _required("ego_class", _TEXT),
+            _required("ego_source_class", _TEXT),
+            _required("ego_x", _REAL),
+            _required("ego_y", _REAL),
+            pa.field("ego_heading", _REAL),
+            pa.field("ego_width", _REAL),
+            pa.field("ego_length", _REAL),
+            pa.field("ego_height", _REAL),
+            pa.field("ego_vx", _REAL),
+            pa.field("ego_vy", _REAL),
+            pa.field("ego_track", _TEXT),
+            pa.field("ego_attributes", _TEXT),  # JSON; null where there is none
+            _required("ego_road_directions", pa.list_(_REAL)),  # * of every lane at the position; empty: undefined
+            pa.field("ego_lane", _TEXT),  # * the lane at the position; of several the one with the nearest centreline
+            pa.field("params", _TEXT),  # JSON; null where there is none
+            _required("object_count", _COUNT),
+            _required("sensor_count", _COUNT),
+            _required("class_counts", pa.map_(_TEXT, _COUNT)),  # * tree class -> label objects of exactly that class
+        ]
+    ),
+    # One row a label object; the ego is in `labels`.
+    "objects": pa.schema(
+        [
+            _required("frame", _TEXT),
+            _required("recording", _TEXT),
+            _required("timestamp_us", pa.int64()),
+            _required("ordinal", _COUNT),  # order in the source
+            _required("id", _TEXT),
+            _required("class", _TEXT),
+            _required("source_class", _TEXT),
+            _required("x", _REAL),
+            _required("y", _REAL),
+            pa.field("heading", _REAL),
+            pa.field("width", _REAL),
+            pa.field("length", _REAL),
+            pa.field("height", _REAL),
+            pa.field("vx", _REAL),
+            pa.field("vy", _REAL),
+            pa.field("track", _TEXT),
+            pa.field("attributes", _TEXT),
+            pa.field("ego_right", _REAL),  # * position in the ego's frame; null where the ego has no heading
+            pa.field("ego_ahead", _REAL),  # *
+            _required("ego_distance", _REAL),  # *
+            pa.field("relative_heading", _REAL),  # * heading minus the ego's, in (-pi, pi]
+            _required("road_directions", pa.list_(_REAL)),  # *
+            pa.field("lane", _TEXT),  # *
+        ]
+    ),
+    # * One row for each region near an object's position; the ego's object id is "ego".
+    "memberships": pa.schema(
+        [
+            _required("frame", _TEXT),
+            _required("object", _TEXT),
+            _required("kind", _TEXT),
+            _required("region", _TEXT),
+            _required("distance", _REAL),  # 0 inside and on the boundary
+        ]
+    ),
+    # One row a map element, in the order of the map.
+    "regions": pa.schema(
+        [
+            _required("map", _TEXT),
+            _required("id", _TEXT),
+            _required("kind", _TEXT),
+            _required("geometry", pa.binary()),  # WKB
+            _required("properties", _TEXT),  # JSON: all that a network is built from
+        ]
+    ),
+    # One row a lane, for queries; `regions` is the truth.
+    "lanes": pa.schema(
+        [
+            _required("map", _TEXT),
+            _required("id", _TEXT),
+            pa.field("centerline", pa.binary()),  # WKB MultiLineString in driving direction
+            pa.field("left", _TEXT),
+            pa.field("right", _TEXT),
+            _required("predecessors", pa.list_(_TEXT)),
+            _required("successors", pa.list_(_TEXT)),
+        ]
+    ),
+    "sensors": pa.schema([_required("frame", _TEXT), _required("channel", _TEXT), _required("path", _TEXT)]),
+}
+"""Name of each table, which is also its folder and its SQL view, with its columns as a `pyarrow.Schema`."""

@@ -1,0 +1,257 @@
+"""The syntax tree: what the text says, without what it means.
+
+Every node is a frozen value whose first field is the `Span` of the text it was read from. Parentheses leave no node.
+The unions at the end (`Expression`, `Specifier`, `Statement`) are closed, so that a `match` over one can end in
+`assert_never`. What cannot describe a single instant (behaviors, `do`, `record`, ...) is kept as a place only.
+
+The nodes themselves stand in `nodes`, which knows the unions for its annotations only.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from scenicq.syntax.nodes.base import Node
+from scenicq.syntax.nodes.expressions import (
+    Argument,
+    Attribute,
+    BinaryOp,
+    BoolOp,
+    Call,
+    Clause,
+    Compare,
+    Comparison,
+    Comprehension,
+    Constant,
+    Dict,
+    DictComprehension,
+    DictItem,
+    FormattedString,
+    IfElse,
+    Lambda,
+    List,
+    Name,
+    Parameter,
+    Replacement,
+    Set,
+    Slice,
+    Starred,
+    Subscript,
+    Tuple,
+    UnaryOp,
+    UnsupportedExpression,
+    Walrus,
+)
+from scenicq.syntax.nodes.operators import (
+    Altitude,
+    Angle,
+    ApparentHeading,
+    CanSee,
+    Deg,
+    Distance,
+    DistancePast,
+    FieldAt,
+    Follow,
+    Implies,
+    InitialScenario,
+    Intersects,
+    New,
+    OffsetAlong,
+    OffsetBy,
+    PartOf,
+    RelativeHeading,
+    RelativePosition,
+    RelativeTo,
+    Temporal,
+    Until,
+    Vector,
+    Visible,
+    VisibleFrom,
+)
+from scenicq.syntax.nodes.program import (
+    DynamicDefinition,
+    DynamicStatement,
+    Evidence,
+    Model,
+    Module,
+    Mutate,
+    Param,
+    ParamItem,
+    Require,
+    RequireMonitor,
+    Simulator,
+)
+from scenicq.syntax.nodes.specifiers import (
+    ApparentlyFacingSpecifier,
+    AtSpecifier,
+    BeyondSpecifier,
+    ContainedInSpecifier,
+    DirectionSpecifier,
+    FacingAwayFromSpecifier,
+    FacingSpecifier,
+    FacingTowardSpecifier,
+    FollowingSpecifier,
+    InSpecifier,
+    NotVisibleSpecifier,
+    OffsetAlongSpecifier,
+    OffsetBySpecifier,
+    OnSpecifier,
+    UsingSpecifier,
+    VisibleSpecifier,
+    WithSpecifier,
+)
+from scenicq.syntax.nodes.statements import (
+    AnnotatedAssign,
+    Assert,
+    Assign,
+    AugmentedAssign,
+    Branch,
+    Break,
+    ClassDef,
+    Continue,
+    Delete,
+    ExceptHandler,
+    ExpressionStatement,
+    For,
+    FunctionDef,
+    Global,
+    If,
+    Import,
+    ImportAlias,
+    ImportFrom,
+    Nonlocal,
+    Pass,
+    PropertyDefault,
+    Raise,
+    Return,
+    Try,
+    UnsupportedStatement,
+    While,
+    WithItem,
+    WithStatement,
+)
+
+__all__ = [
+    "Altitude", "Angle", "AnnotatedAssign", "ApparentHeading", "ApparentlyFacingSpecifier", "Argument", "Assert", "Assign",
+    "AtSpecifier", "Attribute", "AugmentedAssign", "BeyondSpecifier", "BinaryOp", "BoolOp", "Branch", "Break", "Call",
+    "CanSee", "ClassDef", "Clause", "Compare", "Comparison", "Comprehension", "Constant", "ContainedInSpecifier",
+    "Continue", "Deg", "Delete", "Dict", "DictComprehension", "DictItem", "DirectionSpecifier", "Distance",
+    "DistancePast", "DynamicDefinition", "DynamicStatement", "Evidence", "ExceptHandler", "Expression",
+    "ExpressionStatement", "FacingAwayFromSpecifier", "FacingSpecifier", "FacingTowardSpecifier", "FieldAt", "Follow",
+    "FollowingSpecifier", "For", "FormattedString", "FunctionDef", "Global", "If", "IfElse", "Implies", "Import",
+    "ImportAlias", "ImportFrom", "InSpecifier", "InitialScenario", "Intersects", "Lambda", "List", "Model", "Module",
+    "Mutate", "Name", "New", "Node", "Nonlocal", "NotVisibleSpecifier", "OffsetAlong", "OffsetAlongSpecifier",
+    "OffsetBy", "OffsetBySpecifier", "OnSpecifier", "Param", "ParamItem", "Parameter", "PartOf", "Pass",
+    "PropertyDefault", "Raise", "RelativeHeading", "RelativePosition", "RelativeTo", "Replacement", "Require",
+    "RequireMonitor", "Return", "Set", "Simulator", "Slice", "Specifier", "Starred", "Statement", "Subscript",
+    "Temporal", "Try", "Tuple", "UnaryOp", "UnsupportedExpression", "UnsupportedStatement", "Until", "UsingSpecifier",
+    "Vector", "Visible", "VisibleFrom", "VisibleSpecifier", "Walrus", "While", "WithItem", "WithSpecifier",
+    "WithStatement",
+]  # fmt: skip
+
+Specifier: TypeAlias = (
+    WithSpecifier
+    | AtSpecifier
+    | InSpecifier
+    | OnSpecifier
+    | ContainedInSpecifier
+    | OffsetBySpecifier
+    | OffsetAlongSpecifier
+    | BeyondSpecifier
+    | VisibleSpecifier
+    | NotVisibleSpecifier
+    | DirectionSpecifier
+    | FollowingSpecifier
+    | FacingSpecifier
+    | FacingTowardSpecifier
+    | FacingAwayFromSpecifier
+    | ApparentlyFacingSpecifier
+    | UsingSpecifier
+)
+"""What can follow the class of an instance."""
+
+Expression: TypeAlias = (
+    Name
+    | Constant
+    | FormattedString
+    | Tuple
+    | List
+    | Set
+    | Dict
+    | Starred
+    | UnaryOp
+    | BinaryOp
+    | BoolOp
+    | Compare
+    | IfElse
+    | Lambda
+    | Comprehension
+    | DictComprehension
+    | Call
+    | Attribute
+    | Slice
+    | Subscript
+    | Walrus
+    | UnsupportedExpression
+    | New
+    | Deg
+    | Vector
+    | FieldAt
+    | RelativeTo
+    | OffsetBy
+    | OffsetAlong
+    | RelativePosition
+    | RelativeHeading
+    | ApparentHeading
+    | Distance
+    | DistancePast
+    | Angle
+    | Altitude
+    | CanSee
+    | Intersects
+    | Follow
+    | Visible
+    | VisibleFrom
+    | PartOf
+    | Temporal
+    | Until
+    | Implies
+    | InitialScenario
+)
+"""What has a value."""
+
+Statement: TypeAlias = (
+    ExpressionStatement
+    | Assign
+    | AugmentedAssign
+    | AnnotatedAssign
+    | If
+    | For
+    | While
+    | Break
+    | Continue
+    | Pass
+    | FunctionDef
+    | Return
+    | Delete
+    | Assert
+    | Raise
+    | Try
+    | WithStatement
+    | PropertyDefault
+    | ClassDef
+    | Import
+    | ImportFrom
+    | Global
+    | Nonlocal
+    | UnsupportedStatement
+    | Model
+    | Param
+    | Require
+    | RequireMonitor
+    | Mutate
+    | Simulator
+    | DynamicStatement
+    | DynamicDefinition
+)
+"""What stands in a block."""

@@ -1,0 +1,20 @@
+"""What all nodes have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scenicq.errors import Span
+
+__all__ = ["Node"]
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """Base of all nodes.
+
+    Attributes:
+        span: The text of the construct, without surrounding parentheses.
+    """
+
+    span: Span

@@ -1,0 +1,138 @@
+"""Scenic's statements, and the whole program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from scenicq.errors import Source, Span
+from scenicq.syntax.nodes.base import Node
+
+if TYPE_CHECKING:
+    from scenicq.syntax.ast import Expression, Statement
+
+__all__ = [
+    "DynamicDefinition",
+    "DynamicStatement",
+    "Evidence",
+    "Model",
+    "Module",
+    "Mutate",
+    "Param",
+    "ParamItem",
+    "Require",
+    "RequireMonitor",
+    "Simulator",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Model(Node):
+    """`model scenic.domains.driving.model`."""
+
+    name: str
+    name_span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class ParamItem(Node):
+    """`name = value` of a `param` statement; the name may have been quoted."""
+
+    name: str
+    name_span: Span
+    value: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Param(Node):
+    """`param a = 1, b = 2`."""
+
+    items: tuple[ParamItem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Require(Node):
+    """`require condition`, `require[probability] condition`, each with an optional `as name`."""
+
+    condition: Expression
+    probability: Expression | None
+    name: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class RequireMonitor(Node):
+    """`require monitor M()`."""
+
+    monitor: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Mutate(Node):
+    """`mutate a, b by scale`; without objects, all."""
+
+    objects: tuple[Expression, ...]
+    scale: Expression | None
+
+
+@dataclass(frozen=True, slots=True)
+class Simulator(Node):
+    """`simulator S()`."""
+
+    value: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class DynamicStatement(Node):
+    """What happens over time, skipped with its body.
+
+    Kinds: `terminate when`, `terminate after`, `terminate simulation`, `terminate`, `record`, `record initial`,
+    `record final`, `do`, `do choose`, `do shuffle`, `take`, `wait`, `abort`, `invoke`, `override`, `try/interrupt`.
+    """
+
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class DynamicDefinition(Node):
+    """A definition of what happens over time, skipped with its body; unnamed blocks have an empty name.
+
+    Kinds: `behavior`, `monitor`, `scenario`, `setup`, `compose`, `precondition`, `invariant`. The span ends with the
+    header's colon.
+    """
+
+    kind: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """A construct that not every version of Scenic has.
+
+    Attributes:
+        span: The construct.
+        construct: What it is, in words.
+        versions: The versions that have it.
+    """
+
+    span: Span
+    construct: str
+    versions: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    """A whole program.
+
+    Attributes:
+        source: The text.
+        body: The statements.
+        versions: The versions of Scenic that the syntax leaves possible, never empty.
+        version: The one that is left (or that was asked for), or None where several are.
+        evidence: Why, in the order of the text.
+    """
+
+    source: Source
+    body: tuple[Statement, ...]
+    versions: frozenset[int]
+    version: int | None
+    evidence: tuple[Evidence, ...]

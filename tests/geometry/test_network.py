@@ -1,0 +1,222 @@
+"""The network's elements and references, on a small town drawn by hand."""
+
+# pyright: basic
+
+import math
+import pickle
+from typing import Any
+
+import pytest
+from shapely.geometry import LineString, box
+
+from scenicq.geometry.elements import Lane, LaneGroup, MissingElementError, Road
+from scenicq.geometry.features import MapFeature
+from scenicq.geometry.membership import contains
+from scenicq.geometry.network import Network
+
+
+def area(identifier: str, kind: str, bounds: tuple[float, float, float, float], **properties: Any) -> MapFeature:
+    return MapFeature(identifier, kind, box(*bounds), properties)
+
+
+def town(*more: MapFeature) -> Network:
+    """A road along x = 0 with two lanes north (0 to 8) and one south (-4 to 0), an intersection above, a road beyond.
+
+    The inner lane north is cut into two sections.
+    """
+    return Network(
+        "town",
+        [
+            area("road", "road", (-4, 0, 8, 40), forward="north", backward="south"),
+            area("north", "lane_group", (0, 0, 8, 40), road="road", opposite="south"),
+            area("south", "lane_group", (-4, 0, 0, 40), road="road", opposite="north"),
+            area(
+                "inner",
+                "lane",
+                (0, 0, 4, 40),
+                group="north",
+                centerline=[[[2, 0], [2, 40]]],
+                right="outer",
+                left="back",
+            ),
+            area("inner1", "lane_section", (0, 0, 4, 20), lane="inner", right="outer"),
+            area("inner2", "lane_section", (0, 20, 4, 40), lane="inner", right="outer", left="back"),
+            area(
+                "outer",
+                "lane",
+                (4, 0, 8, 40),
+                group="north",
+                left="inner",
+                centerline=[[[6, 0], [6, 40]]],
+                successors=["turn"],
+            ),
+            area("back", "lane", (-4, 0, 0, 40), group="south", road="road", centerline=[[[-2, 40], [-2, 0]]]),
+            area("cross", "intersection", (-4, 40, 8, 50), roads=["road", "far"]),
+            area("inside", "road", (4, 40, 8, 50), intersection="cross", forward=["turns", "more"]),
+            area("turns", "lane_group", (4, 40, 6, 50)),
+            area("more", "lane_group", (6, 40, 8, 50)),
+            area("turn", "lane", (4, 40, 6, 50), group="turns", centerline=[[[5, 40], [5, 50]]], successors=["exit"]),
+            area("exit", "lane", (4, 50, 8, 60), road="far", centerline=[[[6, 50], [6, 60]]]),
+            area("far", "road", (4, 50, 8, 60)),
+            area("zebra", "crossing", (-4, 36, 8, 39)),
+            area("walk", "sidewalk", (8, 0, 10, 40)),
+            area("edge", "shoulder", (-6, 0, -4, 40)),
+            MapFeature("kerb", "curb", LineString([(8, 0), (8, 40)])),
+            area("garage", "parking", (20, 0, 30, 10)),
+            area("plaza", "drivable", (40, 0, 50, 10)),
+            *more,
+        ],
+    )
+
+
+def lane(network: Network, name: str) -> Lane:
+    found = network.elements[name]
+    assert isinstance(found, Lane)
+    return found
+
+
+def test_elements_by_kind() -> None:
+    network = town()
+    assert network.problems == ()
+    assert [e.id for e in network.lanes] == ["inner", "outer", "back", "turn", "exit"]
+    assert [e.id for e in network.roads] == ["road", "far"]
+    assert [e.id for e in network.connectingRoads] == ["inside"]
+    assert {e.id for e in network.laneSections} == {"inner1", "inner2", "outer_sec", "back_sec", "turn_sec", "exit_sec"}
+    assert [e.uid for e in (*network.crossings, *network.sidewalks, *network.shoulders)] == ["zebra", "walk", "edge"]
+    assert [curb.id for curb in network.curbs] == ["kerb"]
+
+
+def test_roads_groups_and_lanes_refer_to_each_other() -> None:
+    network = town()
+    road = network.elements["road"]
+    assert isinstance(road, Road)
+    assert [one.id for one in road.lanes] == ["inner", "outer", "back"]
+    assert [group.id for group in road.laneGroups] == ["north", "south"]
+    assert not road.is1Way
+    north, south = road.forwardLanes, road.backwardLanes
+    assert north is not None
+    assert south is not None
+    assert north.opposite is south
+    assert south.opposite is north
+    assert north.road is road
+    assert lane(network, "inner").road is road
+    assert lane(network, "inner").group is north
+    assert lane(network, "exit").road is network.elements["far"]
+    assert lane(network, "outer").isForward
+    assert not lane(network, "back").isForward
+
+
+def test_several_groups_of_one_direction_become_one() -> None:
+    inside = town().elements["inside"]
+    assert isinstance(inside, Road)
+    assert isinstance(inside.forwardLanes, LaneGroup)
+    assert inside.forwardLanes.polygon.area == pytest.approx(40)
+    assert [one.id for one in inside.lanes] == ["turn"]
+    assert inside.is1Way
+
+
+def test_sections_and_their_neighbours() -> None:
+    network = town()
+    first, second = lane(network, "inner").sections
+    (outer,) = lane(network, "outer").sections
+    (back,) = lane(network, "back").sections
+    assert outer.polygon is lane(network, "outer").polygon
+    assert first.laneToRight is second.laneToRight is outer
+    assert first._laneToLeft is None
+    with pytest.raises(MissingElementError, match="lane to its left"):
+        _ = first.laneToLeft
+    assert second.laneToLeft is back
+    assert second._fasterLane is None, "the lane to the left runs the other way"
+    assert second.slowerLane is outer
+    assert outer.laneToLeft is first
+    assert outer.fasterLane is first
+    assert [one.id for one in lane(network, "inner").adjacentLanes] == ["outer", "back"]
+    assert [section.isForward for section in (first, second, outer, back)] == [True, True, True, False]
+
+
+def test_the_way_through_an_intersection() -> None:
+    network = town()
+    (crossing,) = network.intersections
+    assert [road.id for road in crossing.roads] == ["road", "far", "inside"]
+    assert crossing.is3Way
+    assert not crossing.is4Way
+    outer, turn, onward = (lane(network, name) for name in ("outer", "turn", "exit"))
+    assert crossing.incomingLanes == (outer,)
+    assert crossing.outgoingLanes == (onward,)
+    assert outer.successor is turn
+    assert onward.predecessor is turn
+    (maneuver,) = outer.maneuvers
+    assert (maneuver.startLane, maneuver.connectingLane, maneuver.endLane) == (outer, turn, onward)
+    assert maneuver.intersection is crossing
+    assert crossing.maneuvers == (maneuver,)
+    with pytest.raises(MissingElementError, match="successor"):
+        _ = onward.successor
+
+
+def test_regions() -> None:
+    network = town()
+    assert contains(network.drivableRegion, 45, 5)
+    assert contains(network.drivableRegion, 1, 45)
+    assert not contains(network.drivableRegion, 9, 5)
+    assert contains(network.walkableRegion, 9, 5)
+    assert contains(network.walkableRegion, 0, 37)
+    assert contains(network.curbRegion, 8, 3)
+    parking = network.region("parking")
+    assert parking is not None
+    assert contains(parking, 25, 5)
+    assert network.region("lane") is network.laneRegion
+    assert network.region("curb") is network.curbRegion
+    assert network.region("moat") is None
+    assert Network("bare", []).region("sidewalk") is None
+    assert not Network("bare", []).sidewalkRegion.pieces
+    assert network.laneRegion.orientation is network.roadRegion.orientation is network.roadDirection
+    assert network.sidewalkRegion.orientation is None
+    assert lane(network, "inner").region.orientation is network.roadDirection
+
+
+def test_lookups() -> None:
+    network = town()
+
+    def name(found: Any) -> str | None:
+        return found.id if found else None
+
+    assert name(network.laneAt(1, 5)) == "inner"
+    assert name(network.laneAt(4, 5)) == "inner", "the border lies in both, equally near"
+    assert name(network.laneSectionAt(1, 25)) == "inner2"
+    assert name(network.laneGroupAt(-1, 5)) == "south"
+    assert name(network.laneGroupAt(7, 45)) == "more"
+    assert name(network.roadAt(1, 5)) == "road"
+    assert name(network.roadAt(7, 45)) == "inside"
+    assert name(network.intersectionAt(0, 45)) == "cross"
+    assert name(network.crossingAt(0, 37)) == "zebra"
+    assert name(network.sidewalkAt(9, 5)) == "walk"
+    assert name(network.elementAt(5, 45)) == "cross"
+    assert name(network.elementAt(5, 5)) == "road"
+    assert name(network.elementAt(-5, 5)) == "edge"
+    lookups = (network.laneAt, network.laneSectionAt, network.roadAt, network.intersectionAt, network.elementAt)
+    assert [lookup(99, 99) for lookup in lookups] == [None] * 5
+    assert network.nominalDirectionsAt(-1, 5) == (math.pi,)
+    assert network.roadDirection.values(9, 5) == (0.0,)
+    assert network.roadDirection.values(45, 5) == ()
+
+
+def test_problems_are_listed_and_passed_over() -> None:
+    network = town(
+        area("inner", "lane", (0, 0, 1, 1)),
+        area("lost", "lane", (60, 0, 64, 9), left="nowhere", road="cross", successors=["nirvana"]),
+        area("part", "lane_section", (60, 0, 64, 9), lane="nobody"),
+    )
+    assert len(network.problems) == 5
+    assert network.problems[0] == "lane `inner`: the id is used before"
+    lost = lane(network, "lost")
+    assert lost.road is None
+    assert lost.successors == ()
+    assert lost.sections[0]._laneToLeft is None
+    assert "part" not in network.elements
+
+
+def test_pickling_rebuilds() -> None:
+    network = pickle.loads(pickle.dumps(town()))
+    assert network.name == "town"
+    assert list(network.elements) == list(town().elements)
+    assert contains(network.laneRegion, 1, 5)

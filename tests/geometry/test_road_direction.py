@@ -1,0 +1,143 @@
+"""The direction of traffic against its definition in plain loops, and cells against sampled points."""
+
+# pyright: basic
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import LineString, Point, Polygon, box
+
+from scenicq.geometry.angles import distance
+from scenicq.geometry.fields import ConstantField, FieldCell, VectorField
+from scenicq.geometry.road_direction import DirectedLane, RoadDirection
+
+NORTH, WEST, SOUTH, EAST = 0.0, math.pi / 2, math.pi, -math.pi / 2
+
+
+def lane(area: Polygon, *lines: list[tuple[float, float]]) -> DirectedLane:
+    return DirectedLane(area, tuple(np.array(line, dtype=float) for line in lines))
+
+
+def expected(field: RoadDirection, x: float, y: float) -> list[float]:
+    """The definition, in loops."""
+    here = Point(x, y)
+    directed = []
+    for one in field.lanes:
+        found = []
+        for line in one.centerline:
+            for (x0, y0), (x1, y1) in zip(line[:-1].tolist(), line[1:].tolist(), strict=True):
+                if (x0, y0) != (x1, y1):
+                    found.append((LineString([(x0, y0), (x1, y1)]).distance(here), math.atan2(x0 - x1, y1 - y0)))
+        if found:
+            directed.append((one.area, found))
+    holding = [found for area, found in directed if area.distance(here) <= 1e-9]
+    if holding and not any(area.distance(here) <= 1e-9 for area in field.intersections):
+        holding = [[pair for found in holding for pair in found]]
+    if not holding:
+        nearest = min((area.distance(here) for area, _ in directed), default=math.inf)
+        if nearest <= 20:
+            holding = [found for area, found in directed if area.distance(here) <= nearest + 1e-9]
+    return [heading for found in holding for away, heading in found if away <= min(found)[0] + 1e-9]
+
+
+def same(found: tuple[float, ...], wanted: list[float]) -> bool:
+    def near(a: float, others: list[float] | tuple[float, ...]) -> bool:
+        return any(distance(a, b) < 1e-9 for b in others)
+
+    return all(near(a, wanted) for a in found) and all(near(b, found) for b in wanted)
+
+
+@st.composite
+def fields(draw: st.DrawFn) -> RoadDirection:
+    """A few bent lanes, some of which overlap, and perhaps an intersection."""
+    number = st.integers(-12, 12).map(float)
+    lanes = []
+    for _ in range(draw(st.integers(1, 4))):
+        line = draw(st.lists(st.tuples(number, number), min_size=2, max_size=5))
+        area = LineString(line).buffer(
+            draw(st.sampled_from([1.0, 2.5])), cap_style="flat", join_style="mitre", mitre_limit=2
+        )
+        if area.geom_type == "Polygon" and area.is_valid and area.area > 0.1:
+            lanes.append(lane(area, line))
+    crossing = (box(-4, -4, 4, 4),) if draw(st.booleans()) else ()
+    return RoadDirection(tuple(lanes), crossing)
+
+
+@settings(max_examples=120, deadline=None)
+@given(fields(), st.lists(st.tuples(st.floats(-40, 40), st.floats(-40, 40)), min_size=1, max_size=20))
+def test_values_agree_with_the_definition(field: RoadDirection, places: list[tuple[float, float]]) -> None:
+    for (x, y), found in zip(places, field.values_many(np.array(places)), strict=True):
+        assert same(found, expected(field, x, y)), (x, y)
+        assert found == field.values(x, y)
+        assert all(-math.pi < heading <= math.pi for heading in found)
+
+
+@settings(max_examples=30, deadline=None)
+@given(fields(), st.integers(0, 2**32))
+def test_cells_cover_the_field(field: RoadDirection, seed: int) -> None:
+    cells = field.cells((-16.0, -16.0, 16.0, 16.0))
+    shapes = [Polygon(cell.polygon) for cell in cells]
+    xy = np.random.default_rng(seed).uniform(-16, 16, (150, 2))
+    for point, values in zip(xy, field.values_many(xy), strict=True):
+        here = Point(point)
+        near = [cell for cell, shape in zip(cells, shapes, strict=True) if shape.distance(here) < 1e-6]
+        for value in values:
+            assert any(distance(cell.heading, value) < 1e-9 for cell in near), (point, value)
+        for cell, shape in zip(cells, shapes, strict=True):
+            if cell.exact and shape.contains(here) and shape.exterior.distance(here) > 1e-6:
+                assert any(distance(cell.heading, value) < 1e-9 for value in values), (point, cell)
+
+
+def test_a_bend_ties_on_its_outer_side_only() -> None:
+    bend = lane(box(-5, -5, 15, 15), [(0, -5), (0, 10), (-5, 10)])
+    field = RoadDirection((bend,))
+    assert field.values(-1, 5) == (NORTH,)
+    assert field.values(-4, 9) == (WEST,)
+    assert field.values(2, 12) == (NORTH, WEST), "the corner is the nearest point of both segments"
+    assert field.values(-3, 7) == (NORTH, WEST), "on the bisector"
+
+
+def test_overlapping_lanes_in_and_out_of_an_intersection() -> None:
+    up = lane(box(-2, -10, 2, 10), [(0, -10), (0, 10)])
+    across = lane(box(-10, -2, 10, 2), [(-10, 0), (10, 0)])
+    assert RoadDirection((up, across)).values(0.5, 1) == (NORTH,)
+    assert RoadDirection((up, across), (box(-2, -2, 2, 2),)).values(0.5, 1) == (EAST, NORTH)
+
+
+def test_off_the_lanes_the_nearest_lane_within_reach() -> None:
+    up = lane(box(-2, -10, 2, 10), [(1.9, -10), (1.9, 10)])
+    down = lane(box(10, -10, 14, 10), [(13.9, 10), (13.9, -10)])
+    field = RoadDirection((up, down))
+    # the nearest polygon decides, not the nearest centreline
+    assert field.values(6.5, 0) == (SOUTH,)
+    assert field.values(6, 0) == (NORTH, SOUTH)
+    assert field.values(-21.9, 0) == (NORTH,)
+    assert field.values(-22.1, 0) == ()
+
+
+def test_lanes_without_direction_are_passed_over() -> None:
+    bare = DirectedLane(box(0, 0, 1, 1), ())
+    stuck = lane(box(0, 0, 1, 1), [(0, 0), (0, 0)])
+    assert RoadDirection((bare, stuck)).values(0.5, 0.5) == ()
+    assert RoadDirection(()).cells((0, 0, 10, 10)) == []
+    moving = lane(box(0, 0, 1, 1), [(0, 0), (0, 0), (0, 1)])
+    assert RoadDirection((bare, moving)).values(0.5, 0.5) == (NORTH,)
+
+
+def test_headings_southward_are_pi() -> None:
+    down = lane(box(-2, -10, 2, 10), [(0, 10), (0, -10)])
+    assert RoadDirection((down,)).values(0, 0) == (math.pi,)
+
+
+def test_constant_field() -> None:
+    field = ConstantField(1.5)
+    assert isinstance(field, VectorField)
+    assert field.values(1e9, 0) == (1.5,)
+    (cell,) = field.cells((0, 1, 2, 3))
+    assert isinstance(cell, FieldCell)
+    assert cell.exact
+    assert Polygon(cell.polygon).equals(box(0, 1, 2, 3))
+    assert cell.heading == pytest.approx(1.5)

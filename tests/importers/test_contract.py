@@ -1,0 +1,257 @@
+"""What every importer must do, on its sample and on real data where it is there."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from shapely import box, unary_union
+
+from scenicq.geometry import angles
+from scenicq.importers.base import Importer, Options
+from scenicq.importers.ingest import ingest
+from scenicq.importers.interchange import Interchange
+from scenicq.importers.nuscenes import NuScenes
+from scenicq.importers.registry import importers
+from scenicq.importers.report import Report
+from scenicq.store.classes import ROOT, is_class, is_subclass
+from scenicq.store.dataset import open_dataset
+from scenicq.store.labels import Label, Recording
+
+SAMPLES = Path(__file__).parents[2] / "sample_data"
+REAL = Path(__file__).parents[3] / "shared" / "data"
+BOSTON_MAP = REAL / "boston" / "maps" / "boston-seaport.geojson"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A source with what is known of it.
+
+    `golden` is the id of a frame with rows of it: class, x, y, heading, velocity.
+    """
+
+    importer: Importer
+    path: Path
+    frames: int
+    objects: int
+    tracks: int
+    golden: str
+    rows: Sequence[tuple[str, float, float, float, tuple[float, float] | None]]
+    maps: dict[str, Path] = field(default_factory=dict[str, Path])
+    margin_m: float = 60.0
+
+
+CASES = {
+    "crossroads": Case(
+        Interchange(),
+        SAMPLES / "crossroads",
+        156,
+        676,
+        26,
+        "05-two-lane-traffic/04",
+        [
+            ("Car", 1.75, -82.0, 0.0, (0.0, 8.0)),
+            ("Car", -1.75, 44.0, math.pi, (0.0, -8.0)),
+            ("Car", -1.75, 24.0, math.pi, (0.0, -8.0)),
+            ("Adult", 4.7, 87.2, math.pi, (0.0, -1.4)),
+        ],
+    ),
+    "nuscenes_tiny": Case(
+        NuScenes(),
+        SAMPLES / "nuscenes_tiny",
+        6,
+        12,
+        4,
+        "ae3a09d52cac72d35dbf945b84620f5d",
+        [
+            ("Car", 80.0, 1.75, math.pi / 2, (-8.0, 0.0)),
+            ("Adult", 50.0, -4.0, 0.0, (0.0, 1.0)),
+        ],
+    ),
+    "boston": Case(
+        Interchange(),
+        REAL / "boston",
+        707,
+        725,
+        0,
+        "9ddf9d3f42e848549db68d137bb3a14e",
+        [
+            ("Car", 1742.6141749817075, 918.5494356389863, 1.00562380840094, None),
+            ("Barrier", 1720.972906650457, 881.0964771326235, 0.9214291252970274, None),
+            ("Barrier", 1665.7056711094685, 871.1206674315966, -0.015097098027738953, None),
+        ],
+    ),
+    "nuscenes-mini": Case(
+        NuScenes(),
+        REAL / "nuscenes-mini",
+        404,
+        18538,
+        911,
+        "ca9a282c9e77460f8360f564131a8af5",
+        [("Adult", 373.256, 1130.419, -1.9389037193297651, (0.0, 0.0))],
+        {"boston-seaport": BOSTON_MAP},
+    ),
+}
+
+
+@pytest.fixture(params=CASES.values(), ids=CASES)
+def case(request: pytest.FixtureRequest) -> Case:
+    if not request.param.path.exists():
+        pytest.skip(f"{request.param.path.name} is not on this machine")
+    return request.param
+
+
+def read(case: Case) -> list[Recording]:
+    return list(case.importer.read(case.path, Options(case.maps), Report()).recordings)
+
+
+def read_labels(case: Case) -> list[Label]:
+    return [label for recording in read(case) for label in recording.labels]
+
+
+def test_recognises_its_sample_and_nobody_else_does(case: Case) -> None:
+    assert [name for name, importer in importers().items() if importer.recognises(case.path)] == [case.importer.name]
+
+
+def test_counts(case: Case) -> None:
+    labels = read_labels(case)
+    objects = [member for label in labels for member in label.objects]
+    tracks = {(label.recording, member.track) for label in labels for member in label.objects if member.track}
+    assert (len(labels), len(objects), len(tracks)) == (case.frames, case.objects, case.tracks)
+
+
+def test_identifiers_are_unique_and_recordings_sorted(case: Case) -> None:
+    recordings = read(case)
+    names = [recording.name for recording in recordings]
+    assert names == sorted(set(names))
+    frames = [label.frame for recording in recordings for label in recording.labels]
+    assert len(frames) == len(set(frames))
+    for recording in recordings:
+        for label in recording.labels:
+            ids = ["ego", *(member.id for member in label.objects)]
+            assert len(ids) == len(set(ids))
+            assert (label.recording, label.map, label.ego.id) == (recording.name, recording.map, "ego")
+
+
+def test_time_increases_in_a_recording(case: Case) -> None:
+    for recording in read(case):
+        times = [label.timestamp_us for label in recording.labels]
+        assert times == sorted(set(times))
+
+
+def test_classes_are_known(case: Case) -> None:
+    for label in read_labels(case):
+        assert is_subclass(label.ego.category, "Car")
+        assert all(is_class(member.category) and member.category != ROOT for member in label.objects)
+
+
+def test_values_are_finite_metres_and_radians(case: Case) -> None:
+    for label in read_labels(case):
+        for member in (label.ego, *label.objects):
+            numbers = [member.x, member.y, *(member.velocity or ())]
+            assert all(math.isfinite(number) for number in numbers)
+            assert member.heading is None or -math.pi < member.heading <= math.pi
+            assert all(0 < size < 40 for size in (member.width, member.length, member.height) if size is not None)
+            assert member.velocity is None or math.hypot(*member.velocity) < 60
+
+
+def test_length_is_along_the_heading(case: Case) -> None:
+    vehicles = [
+        member
+        for label in read_labels(case)
+        for member in (label.ego, *label.objects)
+        if is_subclass(member.category, "Vehicle") and member.width and member.length
+    ]
+    if not vehicles:
+        pytest.skip("no vehicle has a size")
+    assert sum(member.length > member.width for member in vehicles) > 0.98 * len(vehicles)
+
+
+def test_moving_vehicles_head_where_they_move(case: Case) -> None:
+    apart = [
+        angles.distance(member.heading, angles.heading_of(*member.velocity))
+        for label in read_labels(case)
+        for member in (label.ego, *label.objects)
+        if is_subclass(member.category, "Vehicle") and member.heading is not None
+        # Slower ones are dominated by noise of the annotation.
+        and member.velocity is not None and math.hypot(*member.velocity) > 2
+    ]  # fmt: skip
+    if not apart:
+        pytest.skip("no velocities")
+    assert sum(angle < math.radians(15) for angle in apart) >= 0.97 * len(apart)
+
+
+def test_egos_lie_on_the_map(case: Case) -> None:
+    source = case.importer.read(case.path, Options(case.maps), Report())
+    area = {
+        name: box(*unary_union([feature.shape for feature in features]).bounds).buffer(case.margin_m)
+        for name, features in source.maps.items()
+    }
+    for recording in source.recordings:
+        for label in recording.labels:
+            if label.map in area:
+                assert area[label.map].contains(box(label.ego.x, label.ego.y, label.ego.x + 0.1, label.ego.y + 0.1))
+
+
+def test_store_round_trip(case: Case, tmp_path: Path) -> None:
+    maps = [f"{name}={file}" for name, file in case.maps.items()]
+    summary = ingest(case.path, tmp_path / "d", maps=maps)
+    assert (summary.frames, summary.objects, summary.tracks) == (case.frames, case.objects, case.tracks)
+    dataset = open_dataset(tmp_path / "d")
+    assert list(dataset.labels()) == read_labels(case)
+    for name, features in case.importer.read(case.path, Options(case.maps), Report()).maps.items():
+        assert dataset.features(name) == features
+
+
+def test_golden_rows(case: Case) -> None:
+    label = next(label for label in read_labels(case) if label.frame == case.golden)
+    for member, (category, x, y, heading, velocity) in zip(label.objects, case.rows, strict=False):
+        assert member.category == category
+        assert (member.x, member.y) == pytest.approx((x, y), abs=1e-9)
+        assert member.heading is not None
+        assert angles.distance(member.heading, heading) < 1e-5
+        assert member.velocity == (None if velocity is None else pytest.approx(velocity, abs=1e-9))
+
+
+@pytest.mark.skipif(not BOSTON_MAP.exists(), reason="the Boston map is not on this machine")
+def test_vehicles_in_one_lane_head_along_it(tmp_path: Path) -> None:
+    ingest(REAL / "nuscenes-mini", tmp_path / "d", maps=[BOSTON_MAP])
+    dataset = open_dataset(tmp_path / "d")
+    vehicles = {
+        (label.frame, member.id): member
+        for label in dataset.labels()
+        if label.map == "boston-seaport"
+        for member in label.objects
+        if is_subclass(member.category, "Vehicle")
+    }
+    lanes: defaultdict[tuple[str, str], int] = defaultdict(int)
+    inside: set[tuple[str, str]] = set()
+    rows = dataset.connect().sql("SELECT frame, object, kind FROM memberships WHERE distance = 0").fetchall()
+    for frame, member, kind in rows:
+        lanes[frame, member] += kind == "lane"
+        if kind == "intersection":
+            inside.add((frame, member))
+    directions = dataset.network("boston-seaport").roadDirection
+    apart = [
+        angles.distance(member.heading or 0.0, directions.values(member.x, member.y)[0])
+        for key, member in vehicles.items()
+        if lanes[key] == 1 and key not in inside
+    ]
+    assert len(apart) > 200
+    assert sum(angle < math.radians(15) for angle in apart) >= 0.95 * len(apart)
+
+
+def test_a_copy_elsewhere_gives_the_same_bytes(case: Case, tmp_path: Path) -> None:
+    shutil.copytree(case.path, tmp_path / "copy" / case.path.name)
+    maps = [f"{name}={file}" for name, file in case.maps.items()]
+    ingest(case.path, tmp_path / "one", maps=maps)
+    ingest(tmp_path / "copy" / case.path.name, tmp_path / "two", maps=maps, jobs=2)
+    one, two = open_dataset(tmp_path / "one").manifest, open_dataset(tmp_path / "two").manifest
+    assert one.tables == two.tables
+    differing = [name for name in one.__slots__ if getattr(one, name) != getattr(two, name)]
+    assert differing in (["provenance"], [])

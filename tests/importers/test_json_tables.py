@@ -1,0 +1,62 @@
+"""Reading a JSON list piece by piece is the same as reading it at once."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from unittest.mock import patch
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from scenicq.errors import DataError
+from scenicq.importers import json_tables
+from scenicq.importers.json_tables import read_list
+
+values = st.recursive(
+    st.none() | st.booleans() | st.integers(-999, 999) | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=5,
+)
+objects = st.lists(st.dictionaries(st.text(), values, max_size=3), max_size=6)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(content=objects, indent=st.none() | st.integers(0, 2), chunk=st.integers(1, 40))
+def test_same_as_reading_at_once(tmp_path: Path, content: list[object], indent: int | None, chunk: int) -> None:
+    file = tmp_path / "list.json"
+    text = json.dumps(content, indent=indent)
+    file.write_text(text, encoding="utf-8")
+    with patch.object(json_tables, "_CHUNK", chunk):
+        found = list(read_list(file))
+    assert [value for value, _ in found] == content
+    if indent is None:
+        assert {line for _, line in found} <= {1}
+
+
+def test_lines(tmp_path: Path) -> None:
+    file = tmp_path / "list.json"
+    file.write_text('\n[\n{"a":\n1},\n\n{"b": 2}\n]')
+    assert list(read_list(file)) == [({"a": 1}, 3), ({"b": 2}, 6)]
+
+
+@pytest.mark.parametrize(
+    ("content", "place"),
+    [(b"", 1), (b"{}", 1), (b'[\n{"a": 1},\n{"b": ', 3), (b"[\n1\n", 3), (b"[1, nope]", 1), (b"[", 1)],
+)
+def test_cut_off_or_not_json(tmp_path: Path, content: bytes, place: int) -> None:
+    file = tmp_path / "list.json"
+    file.write_bytes(content)
+    with pytest.raises(DataError, match=f"list.json:{place} "):
+        list(read_list(file))
+
+
+def test_no_text_and_no_file(tmp_path: Path) -> None:
+    (tmp_path / "list.json").write_bytes(b"[\xff]")
+    with pytest.raises(DataError) as error:
+        list(read_list(tmp_path / "list.json"))
+    assert error.value.diagnostics[0].code == "file-invalid"
+    with pytest.raises(DataError) as error:
+        list(read_list(tmp_path / "nowhere.json"))
+    assert error.value.diagnostics[0].code == "file-missing"

@@ -1,0 +1,60 @@
+"""Importers of other packages stand beside the built-in ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from scenicq.errors import DataError
+from scenicq.importers import registry
+from scenicq.importers.base import Options, Source
+from scenicq.importers.report import Report
+
+
+class Greedy:
+    """Recognises everything."""
+
+    name = "greedy"
+    layout = "anything"
+
+    def recognises(self, path: Path) -> bool:
+        return True
+
+    def read(self, path: Path, options: Options, report: Report) -> Source:
+        raise NotImplementedError
+
+
+@pytest.fixture
+def installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def entry_points(*, group: str) -> list[Any]:
+        assert group == "scenicq.importers"
+        built_in = SimpleNamespace(name="interchange", value="other:Thing", load=lambda: pytest.fail("not needed"))
+        return [SimpleNamespace(name="greedy", value="other:Greedy", load=lambda: Greedy), built_in]
+
+    monkeypatch.setattr(registry, "entry_points", entry_points)
+
+
+def test_built_in_importers_are_always_there() -> None:
+    assert {"interchange", "nuscenes"} <= set(registry.importers())
+
+
+@pytest.mark.usefixtures("installed")
+def test_an_installed_importer_is_found_and_may_be_ambiguous(tmp_path: Path) -> None:
+    assert list(registry.importers()) == ["interchange", "nuscenes", "greedy"]
+    assert registry.choose_importer(tmp_path).name == "greedy"
+    (tmp_path / "dataset.json").write_text('{"interchange": 1}')
+    with pytest.raises(DataError, match="recognised by `interchange` and `greedy`") as error:
+        registry.choose_importer(tmp_path)
+    assert error.value.diagnostics[0].code == "dataset-ambiguous"
+    assert registry.choose_importer(tmp_path, "greedy").name == "greedy"
+
+
+def test_nothing_recognised_says_what_was_looked_for(tmp_path: Path) -> None:
+    with pytest.raises(DataError) as error:
+        registry.choose_importer(tmp_path)
+    assert error.value.diagnostics[0].code == "dataset-unrecognised"
+    assert "labels.jsonl" in str(error.value)
+    assert "scene.json" in str(error.value)

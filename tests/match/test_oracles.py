@@ -1,0 +1,99 @@
+"""Generate and match, perturb, brute force: the matcher against the improviser and against one monolithic formula."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import pytest
+from programs import HEADER, PROGRAMS
+from scenes import compiled, drawn, label_of
+
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.smt.solver import open_solver
+
+SEEDS = range(6)
+
+
+@pytest.fixture(scope="module")
+def solver():
+    with open_solver("portable") as opened:
+        yield opened
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_drawn_scene_matches_among_distractors(name, solver):
+    scenario = compiled(HEADER + PROGRAMS[name])
+    matcher = Matcher(scenario, MatchOptions(), solver)
+    for seed in SEEDS:
+        label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=3)
+        verdict = matcher.match(label)
+        assert isinstance(verdict, Match), (seed, verdict)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_every_method_gives_the_same_verdict(name, solver):
+    scenario = compiled(HEADER + PROGRAMS[name])
+    seen = set()
+    for seed in range(3):
+        rng = random.Random(seed)
+        label = label_of(scenario, drawn(scenario, seed), rng)
+        moved = list(label.objects)
+        if moved:
+            victim = rng.randrange(len(moved))
+            off = rng.choice([0.0, 0.02, 1.0, 8.0])
+            moved[victim] = replace(moved[victim], x=moved[victim].x + off, heading=moved[victim].heading + off / 4)
+        for each in (label, replace(label, objects=tuple(moved))):
+            verdicts = {
+                method: type(Matcher(scenario, MatchOptions(method=method), solver).match(each))
+                for method in ("auto", "smt", "monolithic")
+            }
+            decided = {verdict for verdict in verdicts.values() if verdict is not Unknown}
+            assert len(decided) <= 1, (seed, verdicts)
+            assert verdicts["auto"] is not Unknown, (seed, verdicts)
+            seen |= decided
+    assert Match in seen
+
+
+PERTURBED: dict[str, tuple[str, str, float]] = {
+    # program: object, what is pushed, how far outside of its support
+    "ahead": ("other", "ahead", 12.0),
+    "figure 3": ("other", "ahead", 12.0),
+    "offset": ("other", "right", 10.0),
+    "left of": ("other", "heading", 0.3),
+    "facing field": ("ego", "heading", 0.6),
+    "visible road": ("other", "ahead", -300.0),
+    "apparently": ("other", "heading", 0.5),
+    "toward": ("other", "heading", 0.1),
+    "figure 6": ("side", "right", -9.0),
+    "shared": ("second", "ahead", 3.0),
+    "shared heading": ("second", "heading", 1.5),
+    "hidden requirement": ("other", "ahead", 3.0),
+    "nonlinear": ("other", "heading", 0.9),
+    "discrete": ("third", "right", 3.5),
+    "follow": ("other", "right", 6.0),
+    "requirement": ("other", "ahead", 45.0),
+}
+
+
+@pytest.mark.parametrize("name", PERTURBED)
+def test_a_scene_pushed_out_of_the_support_does_not_match(name, solver):
+    import math
+
+    scenario = compiled(HEADER + PROGRAMS[name])
+    who, what, far = PERTURBED[name]
+    index = next(each.index for each in scenario.objects if each.name == who)
+    for seed in SEEDS:
+        scene = drawn(scenario, seed)
+        values = dict(scene.values)
+        (x, y), heading = values[index, "position"], values[index, "heading"]
+        frame = values[scenario.ego, "heading"]
+        right, ahead = (far, 0.0) if what == "right" else (0.0, far) if what == "ahead" else (0.0, 0.0)
+        c, s = math.cos(frame), math.sin(frame)
+        values[index, "position"] = (x + right * c - ahead * s, y + right * s + ahead * c)
+        values[index, "heading"] = heading + (far if what == "heading" else 0.0)
+        label = label_of(scenario, replace(scene, values=values), random.Random(seed))
+        verdict = Matcher(scenario, MatchOptions(), solver).match(label)
+        assert isinstance(verdict, NoMatch), (seed, verdict)

@@ -1,0 +1,139 @@
+"""Which operator binds tighter: as in the grammar of Scenic 3, checked against its parser when this was written."""
+
+from __future__ import annotations
+
+import pytest
+
+from .shape import error, expression, shape, statement
+
+CASES = {
+    # Python's own
+    "1 + 2 * 3": "(+ 1 (* 2 3))",
+    "a - b - c": "(- (- a b) c)",
+    "-x ** 2": "(- (** x 2))",
+    "2 ** -x": "(** 2 (- x))",
+    "2 ** 3 ** 4": "(** 2 (** 3 4))",
+    "a // b % c": "(% (// a b) c)",
+    "a << 1 + b": "(<< a (+ 1 b))",
+    "a | b ^ c & d": "(| a (^ b (& c d)))",
+    "not a == b": "(not (a == b))",
+    "not a and b or c": "(or (and (not a) b) c)",
+    "a < b <= c is not d not in e": "(a < b <= c is not d not in e)",
+    "a if b else c if d else e": "IfElse(b, a, IfElse(d, c, e))",
+    "lambda x, *y, z=1, **k: x + y": "Lambda([Parameter(x, positional), Parameter(y, *), "
+    "Parameter(z, keyword-only, 1), Parameter(k, **)], (+ x y))",
+    "- + ~ x": "(- (+ (~ x)))",
+    # degrees and vectors bind like products
+    "-5 deg": "Deg((- 5))",
+    "2 * x deg": "Deg((* 2 x))",
+    "x deg + y": "(+ Deg(x) y)",
+    "a + 1 @ 2": "(+ a Vector(1, 2))",
+    "1 @ -2": "Vector(1, (- 2))",
+    "2 * a @ b": "Vector((* 2 a), b)",
+    "Range(-15, 15) deg relative to roadDirection": "RelativeTo(Deg(Range((- 15), 15)), roadDirection)",
+    "Uniform(1, -1) * Range(90, 180) deg relative to roadDirection": (
+        "RelativeTo(Deg((* Uniform(1, (- 1)) Range(90, 180))), roadDirection)"
+    ),
+    "-1 * Range(50, 135) deg relative to ego.heading": "RelativeTo(Deg((* (- 1) Range(50, 135))), ego.heading)",
+    # fields, offsets, relations
+    "roadDirection at 1 @ 2": "FieldAt(roadDirection, Vector(1, 2))",
+    "f at x + y": "FieldAt(f, (+ x y))",
+    "f at x relative to g at y": "RelativeTo(FieldAt(f, x), FieldAt(g, y))",
+    "a relative to b relative to c": "RelativeTo(RelativeTo(a, b), c)",
+    "a offset by b relative to c": "RelativeTo(OffsetBy(a, b), c)",
+    "a offset along b by c offset by d": "OffsetAlong(a, b, OffsetBy(c, d))",
+    "a offset along b relative to c by d": "OffsetAlong(a, RelativeTo(b, c), d)",
+    "a relative to b visible from c": "VisibleFrom(RelativeTo(a, b), c, False)",
+    "a not visible from b": "VisibleFrom(a, b, True)",
+    "a can see b < c": "(CanSee(a, b) < c)",
+    "a can see b and c": "(and CanSee(a, b) c)",
+    "a intersects b": "Intersects(a, b)",
+    "x is in r": "(x in r)",
+    "x in r and y": "(and (x in r) y)",
+    # operators that start with words take a sum
+    "distance from ego to intersection < 10": "(Distance(intersection, ego) < 10)",
+    "distance to a + 1 < 3": "(Distance((+ a 1)) < 3)",
+    "distance to a from b": "Distance(a, b)",
+    "distance to a and b from c": "Distance((and a b), c)",
+    "distance to a < 3 and r visible from b": "(and (Distance(a) < 3) VisibleFrom(r, b, False))",
+    "distance from a": "Distance(a)",
+    "distance from a relative to b to c": "Distance(c, RelativeTo(a, b))",
+    "distance from a relative to b": "RelativeTo(Distance(a), b)",
+    "distance past a of b": "DistancePast(a, b)",
+    "distance past a": "DistancePast(a)",
+    "abs((angle to goal) - (angle to bottleneck)) <= 10 deg": ("(abs((- Angle(goal) Angle(bottleneck))) <= Deg(10))"),
+    "angle from a to b": "Angle(b, a)",
+    "angle from a": "Angle(ego, a)",
+    "azimuth to b": "Angle(b)",
+    "altitude from a to b": "Altitude(b, a)",
+    "relative heading of a > 70 deg": "(RelativeHeading(a) > Deg(70))",
+    "relative heading of a from b > 1": "(RelativeHeading(a, b) > 1)",
+    "relative heading of a relative to b from c": "RelativeHeading(RelativeTo(a, b), c)",
+    "relative heading of a relative to b": "RelativeTo(RelativeHeading(a), b)",
+    "relative position of a from b": "RelativePosition(a, b)",
+    "apparent heading of a from b": "ApparentHeading(a, b)",
+    "visible road visible from x": "VisibleFrom(Visible(road, False), x, False)",
+    "not visible road": "Visible(road, True)",
+    "not visible": "(not visible)",
+    "visible not visible road": "Visible(Visible(road, True), False)",
+    "front of car offset by x": "OffsetBy(PartOf(front, car), x)",
+    "back left of visible x": "PartOf(back left, Visible(x, False))",
+    "follow f from front of car for 3 < x": "(Follow(f, PartOf(front, car), 3) < x)",
+    "follow f for x": "Follow(f, x)",
+    "follow (a).f from b for 1": "Follow(a.f, b, 1)",
+    "initial scenario": "InitialScenario()",
+    # an instance reaches as far as an expression does
+    "new Car at a if b else c": "New(Car, [At(IfElse(b, a, c))], True)",
+    "-new Car": "(- New(Car, True))",
+    "[new Car, visible road]": "List([New(Car, True), Visible(road, False)])",
+    "(new Car at x, facing y).z": "New(Car, [At(x), Facing(y)], True).z",
+}
+
+
+@pytest.mark.parametrize("text", CASES)
+def test_precedence(text: str) -> None:
+    assert shape(expression(text)) == CASES[text]
+
+
+PARTS = [
+    *("front", "back", "left", "right", "top", "bottom", "front left", "front right", "back left", "back right"),
+    *(f"{a} {b} {c}" for a in ("top", "bottom") for b in ("front", "back") for c in ("left", "right")),
+]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_parts_of_a_box(part: str) -> None:
+    assert shape(expression(f"{part} of x")) == f"PartOf({part}, x)"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    {
+        "always x": "Temporal(always, x)",
+        "always x and y": "Temporal(always, (and x y))",
+        "eventually (x and always y)": "Temporal(eventually, (and x Temporal(always, y)))",
+        "(always x) implies y": "Implies(Temporal(always, x), y)",
+        "next (x)": "Temporal(next, x)",
+        "x until y": "Until(x, y)",
+        "not always x or y": "(not Temporal(always, (or x y)))",
+        "f(next(x)) > 1": "(f(next(x)) > 1)",
+    }.items(),
+)
+def test_temporal_operators_in_requirements(text: str, expected: str) -> None:
+    assert shape(statement(f"require {text}")) == f"Require({expected})"
+
+
+def test_temporal_words_are_functions_elsewhere() -> None:
+    assert shape(expression("next(x) + always(y)")) == "(+ next(x) always(y))"
+
+
+@pytest.mark.parametrize("text", ["1 + distance to x", "-angle to x", "2 * front of x", "x ** visible y"])
+def test_word_operators_inside_tighter_ones_need_parentheses(text: str) -> None:
+    assert "needs parentheses here" in error(f"_ = {text}")
+
+
+def test_parentheses_are_not_nodes_but_part_of_what_is_around() -> None:
+    node = expression("(a) + (b)")
+    assert node.span.text == "(a) + (b)"
+    assert shape(expression("((a))")) == "a"
+    assert expression("((a))").span.text == "a"

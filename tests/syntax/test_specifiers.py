@@ -1,0 +1,171 @@
+"""Instances and every specifier, in the spellings of the versions."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenicq.syntax import ast
+
+from .shape import error, expression, module, shape, spans, statement
+
+SPECIFIERS = {
+    "with width 3": "With(width, 3)",
+    "with behavior Follow(speed=3)": "With(behavior, Follow(speed=3))",
+    "with at 3": "With(at, 3)",
+    "at (1, 2)": "At(Tuple([1, 2]))",
+    "at (front of c) offset by (x @ y)": "At(OffsetBy(PartOf(front, c), Vector(x, y)))",
+    "in road": "In(road)",
+    "on visible curb": "On(Visible(curb, False))",
+    "contained in road": "ContainedIn(road)",
+    "offset by -1 @ 2": "OffsetBy(Vector((- 1), 2))",
+    "offset along 30 deg by (1, 2)": "OffsetAlong(Deg(30), Tuple([1, 2]))",
+    "beyond c by 1 @ 2": "Beyond(c, Vector(1, 2))",
+    "beyond c by 3 from ego": "Beyond(c, 3, ego)",
+    "visible": "Visible()",
+    "visible from x": "Visible(x)",
+    "not visible": "NotVisible()",
+    "not visible from x": "NotVisible(x)",
+    "left of spot": "Direction(left, spot)",
+    "left of spot by 0.5": "Direction(left, spot, 0.5)",
+    "right of spot by x": "Direction(right, spot, x)",
+    "ahead of ego by (1, 2)": "Direction(ahead, ego, Tuple([1, 2]))",
+    "behind ego": "Direction(behind, ego)",
+    "above ego by 2": "Direction(above, ego, 2)",
+    "below ego": "Direction(below, ego)",
+    "following f for 3": "Following(f, 3)",
+    "following f from x for 3": "Following(f, x, 3)",
+    "facing 30 deg relative to roadDirection": "Facing(RelativeTo(Deg(30), roadDirection))",
+    "facing (1, 2, 3)": "Facing(Tuple([1, 2, 3]))",
+    "facing toward ego": "FacingToward(ego, False)",
+    "facing directly toward ego": "FacingToward(ego, True)",
+    "facing away from ego": "FacingAwayFrom(ego, False)",
+    "facing directly away from ego": "FacingAwayFrom(ego, True)",
+    "facing toward": "Facing(toward)",
+    "apparently facing 3 deg": "ApparentlyFacing(Deg(3))",
+    "apparently facing 3 from x": "ApparentlyFacing(3, x)",
+    "using f(1, x=2)": "Using(f(1, x=2))",
+}
+
+
+@pytest.mark.parametrize("text", SPECIFIERS)
+def test_specifier(text: str) -> None:
+    node = expression(f"new Car {text}")
+    assert isinstance(node, ast.New)
+    (specifier,) = node.specifiers
+    assert shape(specifier) == SPECIFIERS[text]
+    assert specifier.span.text == text
+    assert node.span.text == f"new Car {text}"
+
+
+SCENIC_3_ONLY = ("contained in", "above", "below", "facing directly")
+
+
+@pytest.mark.parametrize("text", [text for text in SPECIFIERS if not text.startswith(SCENIC_3_ONLY)])
+def test_specifier_without_new(text: str) -> None:
+    node = expression(f"Car {text}")
+    assert isinstance(node, ast.New)
+    assert not node.keyword
+    assert shape(node.specifiers[0]) == SPECIFIERS[text]
+    assert node.span.text == f"Car {text}"
+
+
+@pytest.mark.parametrize("text", ["with a 1", "facing 3", "left of x", "on road", "visible", "beyond x by 2"])
+def test_lower_case_class_before_a_specifier_that_continues_no_expression(text: str) -> None:
+    assert isinstance(expression(f"rover {text}"), ast.New)
+
+
+def test_words_that_are_operators_after_values_and_specifiers_after_classes() -> None:
+    assert shape(expression("roadDirection at x")) == "FieldAt(roadDirection, x)"
+    assert shape(expression("spot offset by x")) == "OffsetBy(spot, x)"
+    assert shape(expression("road visible from x")) == "VisibleFrom(road, x, False)"
+    assert shape(expression("x in road")) == "(x in road)"
+    assert shape(expression("Car at x")) == "New(Car, [At(x)], False)"
+    assert shape(expression("lib.Car offset by x")) == "New(lib.Car, [OffsetBy(x)], False)"
+    assert shape(expression("ORIGIN offset by x")) == "OffsetBy(ORIGIN, x)"
+
+
+def test_names_that_the_program_assigns_are_values_and_those_it_defines_are_classes() -> None:
+    body = module("Field = f()\nx = Field at y\nclass thing: pass\nz = thing at y\n").body
+    assert shape(body[1]) == "Assign([x], FieldAt(Field, y))"
+    assert shape(body[3]) == "Assign([z], New(thing, [At(y)], False))"
+
+
+def test_a_name_before_in_is_a_value_where_new_is_used() -> None:
+    assert shape(expression("[new Car, Car in classes]")) == "List([New(Car, True), (Car in classes)])"
+
+
+def test_several_specifiers_on_one_line() -> None:
+    node = expression("Car left of spot by 0.5, facing badAngle relative to roadDirection, with model BUS")
+    assert shape(node) == (
+        "New(Car, [Direction(left, spot, 0.5), Facing(RelativeTo(badAngle, roadDirection)), With(model, BUS)], False)"
+    )
+
+
+LINES = [
+    "ego = new Car at x,\n    facing 3 deg,\n    with a 1\nnext_one = 2\n",
+    "ego = new Car at x,\n    facing 3 deg,\n    with a 1,\nnext_one = 2\n",
+    "ego = new Car at x, \\\n  facing 3 deg, \\\n  with a 1\nnext_one = 2\n",
+    "ego = new Car at x,  # first\n\n      # alone\n    facing 3 deg,\n  with a 1\nnext_one = 2",
+    "ego = (new Car at x,\nfacing 3 deg,\nwith a 1)\nnext_one = 2",
+    "ego = new Car at x,\r\n    facing 3 deg,\r\n    with a 1\r\nnext_one = 2\r\n",
+]
+
+
+@pytest.mark.parametrize("text", LINES)
+def test_specifiers_on_several_lines(text: str) -> None:
+    first, second = module(text).body
+    assert shape(first) == "Assign([ego], New(Car, [At(x), Facing(Deg(3)), With(a, 1)], True))"
+    assert shape(second) == "Assign([next_one], 2)"
+
+
+def test_specifiers_on_several_lines_inside_a_block() -> None:
+    node = statement("for i in a:\n    new Car at x,\n        facing y\n    b\n")
+    assert shape(node) == "For(i, a, [New(Car, [At(x), Facing(y)], True), b])"
+
+
+def test_the_span_of_an_instance_ends_before_a_trailing_comma() -> None:
+    assert spans("new Car at x,\n  facing y,\n", ast.New) == ["new Car at x,\n  facing y"]
+
+
+def test_an_instance_in_a_tuple_or_an_argument_leaves_the_comma() -> None:
+    assert shape(expression("Car at 1 @ 2, Car at 3 @ 4")).startswith("Tuple([New(Car, [At(Vector(1, 2))], False), New")
+    assert shape(expression("f(new Car at x, y)")) == "f(New(Car, [At(x)], True), y)"
+    assert shape(expression("f(new Car at x, behind=3)")) == "f(New(Car, [At(x)], True), behind=3)"
+
+
+def test_a_class_without_specifiers() -> None:
+    assert shape(expression("Car")) == "Car"
+    assert shape(expression("new Car")) == "New(Car, True)"
+    assert shape(expression("new lib.Car")) == "New(lib.Car, True)"
+
+
+def test_misspelt_specifiers() -> None:
+    assert error("x = new Car facng 3 deg") == (
+        "error[unknown-specifier]: no specifier starts with `facng`\n"
+        " --> test.scenic:1:13\n"
+        "  |\n"
+        "1 | x = new Car facng 3 deg\n"
+        "  |             ^^^^^ \n".replace(" \n", "\n")
+        + "  = hint: `facing` is spelled similarly"
+    )
+    assert "error[unknown-specifier]: no specifier starts with `fcing`" in error("Car at x, fcing 3")
+    assert "error[unknown-specifier]: no specifier starts with `wit`" in error("Car at x, wit width 3")
+    assert "hint: `beyond` is spelled similarly" in error("Car beyon x by 3")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    {
+        "Car beyond x": "`by` is missing after the position to be beyond",
+        "Car following f": "`for` is missing after the field to follow",
+        "Car offset along x": "`by` is missing after the direction",
+        "Car with": "the name of the property is missing",
+        "Car with 3": "the name of the property is missing",
+        "Car with width": "an expression is missing",
+        "Car at": "an expression is missing",
+        "Car left x": "`left` alone starts no specifier",
+        "Car apparently x": "hint: write `apparently facing`",
+    }.items(),
+)
+def test_incomplete_specifiers(text: str, message: str) -> None:
+    assert message in error(text)

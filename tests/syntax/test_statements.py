@@ -1,0 +1,101 @@
+"""Scenic's own statements."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenicq.syntax import ast
+
+from .shape import error, module, shape, statement
+
+STATEMENTS = {
+    "model scenic.domains.driving.model": "Model(scenic.domains.driving.model)",
+    "param time = 12*60": "Param([ParamItem(time, (* 12 60))])",
+    "param a = 1, 'b c' = 2": "Param([ParamItem(a, 1), ParamItem(b c, 2)])",
+    "param a = 1,\n    b = 2": "Param([ParamItem(a, 1), ParamItem(b, 2)])",
+    "require x": "Require(x)",
+    "require (x) > 3": "Require((x > 3))",
+    "require abs(relative heading of pedestrian) > 70 deg": "Require((abs(RelativeHeading(pedestrian)) > Deg(70)))",
+    "require[0.5] car2 can see ego": "Require(CanSee(car2, ego), 0.5)",
+    "require x as name": "Require(x, name)",
+    "require x as 'a name'": "Require(x, a name)",
+    "require monitor M(3)": "RequireMonitor(M(3))",
+    "require monitor > 3": "Require((monitor > 3))",
+    "require not x": "Require((not x))",
+    "mutate": "Mutate()",
+    "mutate by 2": "Mutate(2)",
+    "mutate taxi": "Mutate([taxi])",
+    "mutate ego, taxi by 2": "Mutate([ego, taxi], 2)",
+    "simulator S(x=1)": "Simulator(S(x=1))",
+    "terminate": "DynamicStatement(terminate)",
+    "terminate when x > 3": "DynamicStatement(terminate when)",
+    "terminate after 3 seconds": "DynamicStatement(terminate after)",
+    "terminate simulation": "DynamicStatement(terminate simulation)",
+    "terminate simulation when x": "DynamicStatement(terminate simulation)",
+    "record x as y": "DynamicStatement(record)",
+    "record initial x": "DynamicStatement(record initial)",
+    "record final (x)": "DynamicStatement(record final)",
+    "do F() until x": "DynamicStatement(do)",
+    "do choose {A(): 1, B(): 2}": "DynamicStatement(do choose)",
+    "do shuffle A(), B()": "DynamicStatement(do shuffle)",
+    "take A(), B()": "DynamicStatement(take)",
+    "wait": "DynamicStatement(wait)",
+    "abort": "DynamicStatement(abort)",
+    "invoke A()": "DynamicStatement(invoke)",
+    "override ego with behavior B(),\n  with x 1": "DynamicStatement(override)",
+    "try:\n  do A()\ninterrupt when x:\n  do B()\nexcept E:\n  abort": "DynamicStatement(try/interrupt)",
+}
+
+
+@pytest.mark.parametrize("text", STATEMENTS)
+def test_statement(text: str) -> None:
+    first, second = module(f"{text}\nafter = 1\n").body
+    assert shape(first) == STATEMENTS[text]
+    assert first.span.text == text
+    assert shape(second) == "Assign([after], 1)"
+
+
+DEFINITIONS = {
+    "behavior B(a, b=2):": ("behavior", "B", "    while True:\n        take A()\n\n    # end\n"),
+    "monitor M:": ("monitor", "M", "    wait\n"),
+    "monitor M():": ("monitor", "M", "    if x:\n      abort\n"),
+    "scenario S(a):": ("scenario", "S", "  precondition: x\n  setup:\n    ego = Car\n  compose:\n    do T()\n"),
+    "scenario S:": ("scenario", "S", "  ego = Car\n"),
+    "setup:": ("setup", "", "  ego = Car\n"),
+    "compose:": ("compose", "", "  do A()\n"),
+}
+
+
+@pytest.mark.parametrize("header", DEFINITIONS)
+def test_definition_of_what_happens_over_time(header: str) -> None:
+    kind, name, body = DEFINITIONS[header]
+    first, second = module(f"{header}\n{body}after = 1\n").body
+    assert isinstance(first, ast.DynamicDefinition)
+    assert (first.kind, first.name) == (kind, name)
+    assert first.span.text == header
+    assert shape(second) == "Assign([after], 1)"
+
+
+def test_names_of_params_have_places() -> None:
+    node = statement("param 'a b' = 1")
+    assert isinstance(node, ast.Param)
+    assert node.items[0].name_span.text == "'a b'"
+    model = statement("model a.b")
+    assert isinstance(model, ast.Model)
+    assert model.name_span.text == "a.b"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    {
+        "param x": "`=` is missing after the name of the parameter",
+        "param x = ": "an expression is missing",
+        "require x as": "the name of the requirement is missing",
+        "require[] x": "an index is missing between the brackets",
+        "require x y": "`y` does not continue the statement",
+        "mutate by": "an expression is missing",
+        "behavior B()": "`:` is missing after the header of the behavior",
+    }.items(),
+)
+def test_incomplete_statement(text: str, message: str) -> None:
+    assert message in error(text)
