@@ -33,6 +33,8 @@ TIE = 1e-9
 DIRECTION_REACH = 20.0
 CAR_LENGTH = 4.5
 COARSE_CLASSES = {"vehicle": "Car", "human": "Pedestrian"}
+SCENIC_VEHICLES = "Car Van Truck Bus Motorcycle Bicycle Trailer ConstructionVehicle".split()
+SCENIC_PEOPLE = "Pedestrian Adult Child ConstructionWorker PoliceOfficer".split()
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,8 +332,12 @@ SCENARIOS: Mapping[int, Callable[[Scene], Iterator[Correspondence]]] = {
 
 
 def _kind(name: str, coarse: bool) -> str | None:
-    """`Car`, `Pedestrian` or neither, for a class name of nuScenes."""
+    """`Car`, `Pedestrian` or neither, for a class name of nuScenes or of Scenic's libraries."""
     family = name.split(".")[0]
+    if name in SCENIC_PEOPLE:
+        return "Pedestrian"
+    if name in SCENIC_VEHICLES:
+        return "Car" if coarse or name == "Car" else None
     if coarse or family == "human":
         return COARSE_CLASSES.get(family)
     return "Car" if name == "vehicle.car" else None
@@ -377,12 +383,12 @@ def frames(
         empty where the label does not match.
 
     Raises:
-        ValueError: If the folder's classes are not those of nuScenes.
+        ValueError: If the folder's classes are neither those of nuScenes nor Scenic's.
     """
     folder = Path(dataset_folder)
     dataset = json.loads((folder / "dataset.json").read_text())
-    if dataset.get("classes") != "nuscenes":
-        raise ValueError(f"classes {dataset.get('classes')!r} are not nuscenes")
+    if dataset.get("classes") not in ("nuscenes", "scenic"):
+        raise ValueError(f"classes {dataset.get('classes')!r} are neither nuscenes nor scenic")
     angle: str = dataset["angle"]
     tolerances = Tolerances(tolerance_x, tolerance_y, heading_tolerance, slack)
     maps: dict[str, RoadMap] = {}

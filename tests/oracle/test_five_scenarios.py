@@ -118,8 +118,8 @@ class TestPedestrian:
         assert run(tmp_path, 1, ego, pedestrian, angle="yaw")
 
     def test_other_class_lists_are_refused(self, tmp_path: Path) -> None:
-        with pytest.raises(ValueError, match="not nuscenes"):
-            run(tmp_path, 1, body("e", 2, 0), classes="scenic")
+        with pytest.raises(ValueError, match="neither nuscenes"):
+            run(tmp_path, 1, body("e", 2, 0), classes="other.json")
 
 
 class TestCrossing:
