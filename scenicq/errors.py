@@ -194,10 +194,7 @@ class SolverError(ScenicqError):
 
 def _columns(text: str) -> int:
     """Width of a text on a terminal: wide characters take two columns, combining ones none."""
-    return sum(
-        0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1
-        for c in text
-    )
+    return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
 def _excerpt(span: Span, label: str, mark: str, margin: int) -> list[str]:

@@ -1,0 +1,1 @@
+"""The expression forest: what a scenario means, and the passes over it. Start with `nodes`."""

@@ -136,7 +136,7 @@ def _of_leaf(node: Node, args: list[_Bounds], leaves: Mapping[Identity, _Bounds]
             given = leaves.get(node.identity)
             if given is None:
                 return own
-            pairs = zip(cast(Box, own), cast(Box, given), strict=True)
+            pairs = zip(own, cast(Box, given), strict=True)
             return cast(Box, tuple((max(a[0], b[0]), min(a[1], b[1])) for a, b in pairs))
         case _:
             own = EVERYTHING
@@ -163,7 +163,7 @@ def _bounds(root: Node, leaves: Mapping[Identity, _Bounds]) -> dict[int, _Bounds
             case Feature():
                 value = _PLANE if node.kind == "vector" else EVERYTHING
             case Arithmetic():
-                value = _arithmetic(node.op, [arg if arg is not None else (0.0, 1.0) for arg in given])
+                value = _arithmetic(node.op, [(0.0, 1.0) if arg is None else cast(Interval, arg) for arg in args])
             case Coordinate():
                 value = cast(Box, args[0])[node.axis]
             case Norm():

@@ -8,6 +8,7 @@ raises `CannotEvaluate`, which the matcher reports as unknown, never as no.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from typing import cast
 
@@ -68,57 +69,75 @@ from scenicq.geometry.regions import (
 __all__ = ["CannotEvaluate", "compute", "directions", "fold"]
 
 
-class CannotEvaluate(Exception):
+class CannotEvaluate(Exception):  # noqa: N818  (an answer that is missing, not an error)
     """A question that plain evaluation cannot answer; the message says which."""
 
 
-def _divide(a: float, b: float) -> float:
-    return a / b
+_Numbers = tuple[float, ...]
 
 
-_SCALAR: dict[ArithmeticOp, Callable[..., float]] = {
-    ArithmeticOp.ADD: lambda *args: math.fsum(args) if len(args) > 2 else args[0] + args[1],
-    ArithmeticOp.SUB: lambda a, b: a - b,
-    ArithmeticOp.MUL: lambda a, b: a * b,
-    ArithmeticOp.DIV: _divide,
-    ArithmeticOp.FLOORDIV: lambda a, b: a // b,
-    ArithmeticOp.MOD: lambda a, b: a % b,
-    ArithmeticOp.POW: lambda a, b: a**b,
-    ArithmeticOp.NEG: lambda a: -a,
-    ArithmeticOp.ABS: abs,
+def _floor(args: _Numbers) -> float:
+    return float(math.floor(args[0]))
+
+
+def _ceil(args: _Numbers) -> float:
+    return float(math.ceil(args[0]))
+
+
+def _power(args: _Numbers) -> float:
+    """A power, where it is real (`math.pow` refuses what is not)."""
+    return math.pow(args[0], args[1])
+
+
+def _unary(function: Callable[[float], float]) -> Callable[[_Numbers], float]:
+    return lambda args: function(args[0])
+
+
+def _binary(function: Callable[[float, float], float]) -> Callable[[_Numbers], float]:
+    return lambda args: function(args[0], args[1])
+
+
+_SCALAR: dict[ArithmeticOp, Callable[[_Numbers], float]] = {
+    ArithmeticOp.ADD: sum,
+    ArithmeticOp.SUB: _binary(operator.sub),
+    ArithmeticOp.MUL: _binary(operator.mul),
+    ArithmeticOp.DIV: lambda args: args[0] / args[1],
+    ArithmeticOp.FLOORDIV: lambda args: args[0] // args[1],
+    ArithmeticOp.MOD: _binary(operator.mod),
+    ArithmeticOp.POW: _power,
+    ArithmeticOp.NEG: _unary(operator.neg),
+    ArithmeticOp.ABS: _unary(abs),
     ArithmeticOp.MIN: min,
     ArithmeticOp.MAX: max,
-    ArithmeticOp.SQRT: math.sqrt,
-    ArithmeticOp.SIN: math.sin,
-    ArithmeticOp.COS: math.cos,
-    ArithmeticOp.TAN: math.tan,
-    ArithmeticOp.ASIN: math.asin,
-    ArithmeticOp.ACOS: math.acos,
-    ArithmeticOp.ATAN: math.atan,
-    ArithmeticOp.ATAN2: math.atan2,
-    ArithmeticOp.EXP: math.exp,
-    ArithmeticOp.LOG: math.log,
-    ArithmeticOp.FLOOR: lambda a: float(math.floor(a)),
-    ArithmeticOp.CEIL: lambda a: float(math.ceil(a)),
-    ArithmeticOp.WRAP: normalize,
+    ArithmeticOp.SQRT: _unary(math.sqrt),
+    ArithmeticOp.SIN: _unary(math.sin),
+    ArithmeticOp.COS: _unary(math.cos),
+    ArithmeticOp.TAN: _unary(math.tan),
+    ArithmeticOp.ASIN: _unary(math.asin),
+    ArithmeticOp.ACOS: _unary(math.acos),
+    ArithmeticOp.ATAN: _unary(math.atan),
+    ArithmeticOp.ATAN2: _binary(math.atan2),
+    ArithmeticOp.EXP: _unary(math.exp),
+    ArithmeticOp.LOG: _unary(math.log),
+    ArithmeticOp.FLOOR: _floor,
+    ArithmeticOp.CEIL: _ceil,
+    ArithmeticOp.WRAP: _unary(normalize),
 }
 
 _ORDER: dict[CompareOp, Callable[[float, float], bool]] = {
-    CompareOp.LT: lambda a, b: a < b,
-    CompareOp.LE: lambda a, b: a <= b,
-    CompareOp.GT: lambda a, b: a > b,
-    CompareOp.GE: lambda a, b: a >= b,
+    CompareOp.LT: operator.lt,
+    CompareOp.LE: operator.le,
+    CompareOp.GT: operator.gt,
+    CompareOp.GE: operator.ge,
 }
 
 
 def _arithmetic(op: ArithmeticOp, args: tuple[Value, ...]) -> Value:
     try:
-        result = _SCALAR[op](*args)
+        result = _SCALAR[op](cast(_Numbers, args))
     except (ZeroDivisionError, ValueError, OverflowError):
-        return Undefined(f"`{op.value}` has no value at {', '.join(f'{arg:.6g}' for arg in cast('tuple[float]', args))}")
-    if isinstance(result, complex) or not math.isfinite(result):
-        return Undefined(f"`{op.value}` has no finite value here")
-    return result
+        return Undefined(f"`{op.value}` has no value at {', '.join(f'{arg:.6g}' for arg in cast(_Numbers, args))}")
+    return float(result) if math.isfinite(result) else Undefined(f"`{op.value}` has no finite value here")
 
 
 def _logic(op: LogicOp, args: tuple[Value, ...]) -> Value:
@@ -213,7 +232,7 @@ def compute(node: Node, args: tuple[Value, ...]) -> Value:
     return _compute(node, args)
 
 
-def _compute(node: Node, args: tuple[Value, ...]) -> Value:  # noqa: PLR0911, PLR0912
+def _compute(node: Node, args: tuple[Value, ...]) -> Value:
     given = cast("tuple[object, ...]", args)
     match node, given:
         case Arithmetic(), _:
@@ -241,14 +260,15 @@ def _compute(node: Node, args: tuple[Value, ...]) -> Value:  # noqa: PLR0911, PL
 
 
 def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
+    numbers = cast(_Numbers, args[1:])
     given = cast("tuple[object, ...]", args)
     match node, given:
-        case DiscAt(), ((float(), float()) as center, float() as radius):
-            return Disc(center, radius)
-        case SectorAt(), ((float(), float()) as center, float() as radius, float() as heading, float() as angle):
-            return Sector(center, radius, heading, angle)
-        case RectangleAt(), ((float(), float()) as center, float() as heading, float() as width, float() as length):
-            return Rectangle(center, heading, width, length)
+        case DiscAt(), _:
+            return Disc(cast(Vector, args[0]), *numbers)
+        case SectorAt(), _:
+            return Sector(cast(Vector, args[0]), *numbers)
+        case RectangleAt(), _:
+            return Rectangle(cast(Vector, args[0]), *numbers)
         case RegionUnion(), _:
             return union(*cast("tuple[Region, ...]", args))
         case RegionIntersection(), _:
@@ -276,4 +296,3 @@ def fold(node: Node) -> Node:
     if is_leaf(node) or isinstance(node, DirectionAt):
         return node
     return Constant(compute(node, tuple(child.value for child in from_constants)), span=node.span)
-

@@ -91,7 +91,8 @@ def _direction(
         x, y = cast(Vector, args[1])
         name = getattr(args[0], "name", "the field")
         return Undefined(f"`{name}` is undefined at ({x:.2f}, {y:.2f})")
-    return choose(node, allowed) if choose and len(allowed) > 1 else allowed[0]
+    first, *others = allowed
+    return choose(node, allowed) if choose and others else first
 
 
 def evaluate(
@@ -117,8 +118,8 @@ def admits(leaf: Leaf, args: tuple[Value, ...], value: Value, slack: float) -> b
         return False
     match leaf:
         case Range():
-            low, high = sorted(cast("tuple[float, float]", args))
-            return low - slack <= cast(float, value) <= high + slack
+            ends = cast("tuple[float, float]", args)
+            return min(ends) - slack <= cast(float, value) <= max(ends) + slack
         case TruncatedNormal():
             _, _, low, high = cast("tuple[float, float, float, float]", args)
             return low - slack <= cast(float, value) <= high + slack

@@ -77,7 +77,7 @@ class Undefined:
     reason: str
 
 
-Value: TypeAlias = float | bool | str | None | Vector | Region | VectorField | Undefined
+Value: TypeAlias = float | bool | str | Vector | Region | VectorField | Undefined | None
 
 
 class ArithmeticOp(StrEnum):

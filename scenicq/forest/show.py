@@ -6,6 +6,7 @@ Random variables are numbered in order of first use, so that two expressions of 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import cast
 
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -17,6 +18,7 @@ from scenicq.forest.nodes import (
     Feature,
     Identity,
     Index,
+    Leaf,
     Logic,
     Node,
     Select,
@@ -41,13 +43,13 @@ def show_constant(value: Value) -> str:
     if isinstance(value, Undefined):
         return f"undefined ({value.reason})"
     name = getattr(value, "name", None)
-    parts = [f"{key}={getattr(value, key)!r}" for key in getattr(value, "__slots__", ()) if key not in ("name", "parts")]
+    parts = [
+        f"{key}={getattr(value, key)!r}" for key in getattr(value, "__slots__", ()) if key not in ("name", "parts")
+    ]
     return f"<{name or type(value).__name__}{' ' + ' '.join(parts) if parts and not name else ''}>"
 
 
-def show(
-    root: Node, objects: Mapping[int, int | str] | None = None, numbers: dict[Identity, int] | None = None
-) -> str:
+def show(root: Node, objects: Mapping[int, int | str] | None = None, numbers: dict[Identity, int] | None = None) -> str:
     """An expression as one line of text.
 
     Args:
@@ -87,7 +89,7 @@ def _show(
         case Bearing() | DirectionAt():
             return f"{type(node).__name__}({', '.join(args)})"
         case _ if is_leaf(node):
-            identity: Identity = node.identity  # type: ignore[union-attr]
+            identity = cast(Leaf, node).identity
             number = numbers.setdefault(identity, len(numbers) + 1)
             if identity in seen:
                 return f"#{number}"

@@ -1,0 +1,1 @@
+"""From a scenario and a dataset to results: necessary conditions as SQL, then the matcher. Start with `run`."""

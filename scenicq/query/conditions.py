@@ -31,6 +31,7 @@ from scenicq.forest.scenario import Scenario, ScenarioObject
 from scenicq.forest.walk import features
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import IntersectionOf, PolygonSet, Region, UnionOf
+from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
 from scenicq.query.expression import SLACK, Columns, angle_between, number, requirement_sql
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
@@ -211,8 +212,9 @@ def _heading_condition(
     own, directions = ("ego_heading", "ego_road_directions") if thing.index == ego else ("heading", "road_directions")
     if thing.index != ego and _is_feature(term, ego, "heading"):
         return Condition(what, angle_between("relative_heading", low, high), span)
-    at_own = isinstance(term, DirectionAt) and _is_feature(term.point, thing.index, "position")
-    if not at_own or getattr(getattr(term.field, "value", None), "name", "") != "roadDirection":
+    if not (isinstance(term, DirectionAt) and _is_feature(term.point, thing.index, "position")):
+        return None
+    if not (isinstance(term.field, Constant) and isinstance(term.field.value, RoadDirection)):
         return None
     test = angle_between(f"({own} - d)", low, high)
     return Condition(what, f"({own} IS NULL OR len(list_filter({directions}, lambda d: {test})) > 0)", span)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from scenicq.errors import Span
 from scenicq.forest.scenario import Scenario
@@ -18,7 +18,7 @@ from scenicq.query.conditions import Condition, object_conditions
 from scenicq.query.expression import SLACK, number
 from scenicq.store.classes import ROOT, class_matches, subclasses
 
-__all__ = ["Excluded", "Plan", "Step", "make_plan"]
+__all__ = ["Excluded", "Plan", "Step", "frames_sql", "make_plan"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +71,10 @@ class Plan:
         """
         reader = connection.sql(self.sql).to_arrow_reader(batch)
         for table in reader:
-            columns = [table.column(name).to_pylist() for name in ("frame", "recording", "timestamp_us", "missed")]
-            for frame, recording, timestamp, missed in zip(*columns, strict=True):
-                yield Excluded(frame, recording, timestamp, None if missed is None else self.steps[missed])
+            for row in cast("list[dict[str, Any]]", table.to_pylist()):
+                missed = cast("int | None", row["missed"])
+                step = None if missed is None else self.steps[missed]
+                yield Excluded(row["frame"], row["recording"], row["timestamp_us"], step)
 
 
 def _text(value: str) -> str:
@@ -93,10 +94,18 @@ def _filled(condition: Condition, near: dict[str, str]) -> str:
     return f"coalesce({name}, false)"
 
 
-def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Plan:
+def make_plan(
+    scenario: Scenario, network: Network, options: MatchOptions, recordings: tuple[str, str] | None = None
+) -> Plan:
     """The prefilter of a scenario, compiled against the map, under the options.
 
     Every step is necessary: a frame that matches misses none of them.
+
+    Args:
+        scenario: The scenario.
+        network: The map it was compiled against.
+        options: Tolerances, classes, radius.
+        recordings: The first and the last recording to look at, in order of their names; None for all.
     """
     roles = [thing for thing in scenario.objects if thing.index != scenario.ego]
     ego = scenario.objects[scenario.ego]
@@ -105,8 +114,8 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Pl
     steps: list[Step] = []
     counts: dict[str, str] = {}
     if own_ego:
-        for condition in object_conditions(scenario, ego, network, options):
-            steps.append(Step(condition.what, "", _filled(condition, near), condition.span))
+        found = object_conditions(scenario, ego, network, options)
+        steps += [Step(each.what, "", _filled(each, near), each.span) for each in found]
         ego_near = dict(near)
     else:
         ego_near = {}
@@ -127,10 +136,10 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Pl
             so_far = f"{so_far} AND {_filled(condition, near)}"
             count = counts.setdefault(so_far, f"n{len(counts)}")
             steps.append(Step(condition.what, "", f"{count} >= 1", condition.span))
-    return Plan(network.name, tuple(steps), _query(network.name, steps, counts, near, ego_near))
+    return Plan(network.name, tuple(steps), _query(network.name, steps, counts, (near, ego_near), recordings))
 
 
-def _flags(name: str, near: dict[str, str], map_name: str, *, ego: bool) -> str:
+def _flags(name: str, near: dict[str, str], *, ego: bool) -> str:
     """The memberships of every object (or of the egos) as one row of flags."""
     picked = ", ".join(f"bool_or({sql}) AS {flag}" for sql, flag in near.items())
     wanted = " OR ".join(near)
@@ -141,27 +150,36 @@ def _flags(name: str, near: dict[str, str], map_name: str, *, ego: bool) -> str:
     )
 
 
+def frames_sql(map_name: str, recordings: tuple[str, str] | None) -> str:
+    """The frames of a map, possibly between two recordings."""
+    between = "" if recordings is None else f" AND recording BETWEEN {_text(recordings[0])} AND {_text(recordings[1])}"
+    return f"SELECT * FROM labels WHERE map = {_text(map_name)}{between}"
+
+
 def _query(
-    map_name: str, steps: list[Step], counts: dict[str, str], near: dict[str, str], ego_near: dict[str, str]
+    map_name: str,
+    steps: list[Step],
+    counts: dict[str, str],
+    flags: tuple[dict[str, str], dict[str, str]],
+    recordings: tuple[str, str] | None,
 ) -> str:
-    parts = [f"frames AS (SELECT * FROM labels WHERE map = {_text(map_name)})"]
+    near, ego_near = flags
+    parts = [f"frames AS ({frames_sql(map_name, recordings)})"]
     source, ego_source = "objects JOIN frames USING (frame)", "frames"
     columns = "objects.* EXCLUDE (recording, timestamp_us), frames.* EXCLUDE (frame)"
     if near:
-        parts.append(_flags("object_flags", near, map_name, ego=False))
+        parts.append(_flags("object_flags", near, ego=False))
         source = f"{source} LEFT JOIN object_flags ON object_flags.frame = objects.frame AND object_flags.object = objects.id"
         columns = f"{columns}, {', '.join(f'object_flags.{flag}' for flag in near.values())}"
     if ego_near:
-        parts.append(_flags("ego_flags", ego_near, map_name, ego=True))
+        parts.append(_flags("ego_flags", ego_near, ego=True))
         ego_source = "frames LEFT JOIN ego_flags USING (frame)"
     if counts:
         tallied = ", ".join(f"count(*) FILTER (WHERE {sql}) AS {name}" for sql, name in counts.items())
         parts.append(f"candidates AS (SELECT {columns} FROM {source})")
         parts.append(f"counts AS (SELECT frame, {tallied} FROM candidates GROUP BY frame)")
         ego_source = f"{ego_source} LEFT JOIN counts USING (frame)"
-    missed = " ".join(
-        f"WHEN NOT ({_zeroed(step.sql, counts)}) THEN {number_}" for number_, step in enumerate(steps)
-    )
+    missed = " ".join(f"WHEN NOT ({_zeroed(step.sql, counts)}) THEN {number_}" for number_, step in enumerate(steps))
     blamed = f"CASE {missed} END" if steps else "NULL::INTEGER"
     return (
         f"WITH {', '.join(parts)} SELECT frame, recording, timestamp_us, {blamed} AS missed "
@@ -172,4 +190,4 @@ def _query(
 def _zeroed(sql: str, counts: dict[str, str]) -> str:
     """Counts of frames without any object are 0, not null."""
     name = sql.split(" ", 1)[0]
-    return f"coalesce({name}, 0){sql[len(name):]}" if name in counts.values() else sql
+    return f"coalesce({name}, 0){sql[len(name) :]}" if name in counts.values() else sql

@@ -21,7 +21,7 @@ from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
-from scenicq.query.plan import Excluded, Plan, make_plan
+from scenicq.query.plan import Excluded, Plan, frames_sql, make_plan
 from scenicq.query.results import Funnel, Result
 from scenicq.query.solving import LazySolver
 from scenicq.store.dataset import Dataset, open_dataset
@@ -93,12 +93,14 @@ class Query:
         dataset: The dataset.
         source: The program.
         options: The options.
+        recordings: The first and the last recording to look at, in order of their names; None for all.
         funnel: Filled while results are taken.
     """
 
     dataset: Dataset
     source: Source
     options: QueryOptions = QueryOptions()
+    recordings: tuple[str, str] | None = None
     funnel: Funnel = field(default_factory=Funnel)
 
     def compile(self, map_name: str) -> tuple[Scenario, Network]:
@@ -141,7 +143,7 @@ class Query:
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
-        return [make_plan(scenario, network, self.options.match) for _, scenario, network in self._worlds()]
+        return [make_plan(s, network, self.options.match, self.recordings) for _, s, network in self._worlds()]
 
     def results(self, progress: Callable[[int], None] | None = None) -> Iterator[Result]:
         """Results in the order of recording, time and frame, map by map.
@@ -152,7 +154,6 @@ class Query:
         Raises:
             ScenarioError: The program is wrong or not supported.
         """
-        tell = progress or (lambda _: None)
         worlds = self._worlds()
         left = self.options.limit
         with ExitStack() as stack:
@@ -161,7 +162,8 @@ class Query:
             for name, scenario, network in worlds:
                 matcher = Matcher(scenario, self.options.match, solver)
                 for result, decided in self._on_map(name, matcher, network, pool):
-                    tell(decided)
+                    if progress is not None:
+                        progress(decided)
                     if result is None:
                         continue
                     yield result
@@ -176,9 +178,10 @@ class Query:
         connection = self.dataset.connect()
         try:
             if self.options.prefilter:
-                rows = make_plan(matcher.scenario, network, self.options.match).run(connection)
+                plan = make_plan(matcher.scenario, network, self.options.match, self.recordings)
+                rows = plan.run(connection)
             else:
-                rows = _all_frames(connection, name)
+                rows = _all_frames(connection, name, self.recordings)
             batches = _batches(rows)
             decided = pool.run(name, batches) if pool else ((b, _decide(self.dataset, matcher, b)) for b in batches)
             for batch, found in decided:
@@ -202,11 +205,12 @@ class Query:
                 yield excluded, 1
 
 
-def _all_frames(connection: object, name: str) -> Iterator[Excluded]:
-    everything = Plan(name, (), "SELECT frame, recording, timestamp_us, NULL::INTEGER AS missed FROM labels "
-                                f"WHERE map = '{name.replace(chr(39), chr(39) * 2)}' "
-                                "ORDER BY recording, timestamp_us, frame")  # fmt: skip
-    return everything.run(connection)
+def _all_frames(connection: object, name: str, recordings: tuple[str, str] | None) -> Iterator[Excluded]:
+    sql = (
+        f"SELECT frame, recording, timestamp_us, NULL::INTEGER AS missed FROM ({frames_sql(name, recordings)}) "
+        "ORDER BY recording, timestamp_us, frame"
+    )
+    return Plan(name, (), sql).run(connection)
 
 
 def _batches(rows: Iterator[Excluded]) -> Iterator[list[Excluded]]:
@@ -259,18 +263,25 @@ class _Pool:
             yield first, future.result()
 
 
-_worker: dict[str, object] = {}
+@dataclass(slots=True)
+class _Worker:
+    """What a worker process keeps between batches."""
+
+    query: Query
+    solver: LazySolver
+    matchers: dict[str, Matcher] = field(default_factory=dict[str, Matcher])
+
+
+_worker: list[_Worker] = []
 
 
 def _start_worker(path: Path, source: Source, options: QueryOptions) -> None:
-    _worker["query"] = Query(open_dataset(path), source, options)
-    _worker["solver"] = LazySolver(options.solver)
-    _worker["matchers"] = {}
+    _worker[:] = [_Worker(Query(open_dataset(path), source, options), LazySolver(options.solver))]
 
 
 def _work(name: str, frames: Sequence[Excluded]) -> dict[str, Result]:
-    query, solver, matchers = _worker["query"], _worker["solver"], _worker["matchers"]
-    assert isinstance(query, Query) and isinstance(solver, LazySolver) and isinstance(matchers, dict)
-    if name not in matchers:
-        matchers[name] = Matcher(query.compile(name)[0], query.options.match, solver)
-    return _decide(query.dataset, matchers[name], frames)
+    (worker,) = _worker
+    query = worker.query
+    if name not in worker.matchers:
+        worker.matchers[name] = Matcher(query.compile(name)[0], query.options.match, worker.solver)
+    return _decide(query.dataset, worker.matchers[name], frames)

@@ -44,7 +44,13 @@ def expected(data) -> dict[int, dict[str, list[dict[str, str]]]]:
     found = {}
     for number in range(1, 6):
         frames = five_scenarios.frames(
-            source, number, tolerance_x=0.25, tolerance_y=0.25, heading_tolerance=math.radians(5), coarse=True, radius=50
+            source,
+            number,
+            tolerance_x=0.25,
+            tolerance_y=0.25,
+            heading_tolerance=math.radians(5),
+            coarse=True,
+            radius=50,
         )
         found[number] = {frame: ways for frame, ways in frames.items() if ways}
     return found

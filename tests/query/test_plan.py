@@ -71,7 +71,9 @@ def dataset(tmp_path_factory) -> Dataset:
                     )
                 )
     target = tmp_path_factory.mktemp("plan") / "dataset"
-    write_dataset(target, iter([Recording("recording", "street", tuple(labels))]), {"street": STREET.features}, name="t")
+    write_dataset(
+        target, iter([Recording("recording", "street", tuple(labels))]), {"street": STREET.features}, name="t"
+    )
     return open_dataset(target)
 
 

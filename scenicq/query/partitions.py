@@ -1,0 +1,198 @@
+"""Running a query piece by piece: partitions, their files, and putting them together.
+
+A partition is a run of recordings, so the pieces of a dataset are the same for everybody who asks for the same number.
+Each finished piece is one file, written under a temporary name and renamed; whoever runs again does what is missing.
+Any launcher will do: a loop, xargs, an array of cluster jobs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, cast
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.query.results import Funnel
+from scenicq.query.run import QueryOptions
+from scenicq.store.dataset import Dataset
+from scenicq.store.manifest import Counts
+
+__all__ = ["Gathered", "Partition", "fingerprint", "gather", "is_done", "partitions", "write_partition"]
+
+
+@dataclass(frozen=True, slots=True)
+class Partition:
+    """One piece of a dataset.
+
+    Attributes:
+        number: From 0.
+        count: How many pieces there are.
+        first, last: Its first and last recording, in order of their names; the same name for one recording.
+        frames: How many frames it holds.
+    """
+
+    number: int
+    count: int
+    first: str
+    last: str
+    frames: int
+
+    @property
+    def recordings(self) -> tuple[str, str]:
+        """First and last recording."""
+        return (self.first, self.last)
+
+
+def partitions(dataset: Dataset, count: int) -> tuple[Partition, ...]:
+    """At most `count` pieces of about the same number of frames; fewer where the dataset has fewer recordings."""
+    by_recording: Mapping[str, Counts] = dataset.manifest.by_recording
+    names = sorted(by_recording)
+    total = sum(by_recording[name].frames for name in names)
+    cuts = [0]
+    seen = 0
+    for number, name in enumerate(names, 1):
+        seen += by_recording[name].frames
+        if seen * count >= total * len(cuts) or number == len(names):
+            cuts.append(number)
+    pieces = [names[low:high] for low, high in pairwise(cuts) if high > low]
+    return tuple(
+        Partition(i, len(pieces), piece[0], piece[-1], sum(by_recording[name].frames for name in piece))
+        for i, piece in enumerate(pieces)
+    )
+
+
+def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
+    """A name for the question: pieces of another program, dataset or other options never mix."""
+    tables = {name: [part.sha256 for part in parts] for name, parts in dataset.manifest.tables.items()}
+    asked = asdict(options)
+    asked["match"]["enforce"] = sorted(asked["match"]["enforce"])
+    asked["match"]["ignore_params"] = sorted(asked["match"]["ignore_params"])
+    for name in ("jobs", "prefilter"):
+        asked.pop(name)
+    text = json.dumps([tables, program, asked], sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _file(folder: Path, question: str, number: int, count: int) -> Path:
+    return folder / f"{question}-{number:05}-of-{count:05}.jsonl"
+
+
+def is_done(folder: Path, question: str, number: int, count: int) -> bool:
+    """Whether a piece is finished."""
+    return _file(folder, question, number, count).exists()
+
+
+def write_partition(
+    folder: Path, question: str, piece: Partition, records: Iterable[Mapping[str, Any]], funnel: Funnel
+) -> Path:
+    """Write a finished piece: one line a record, the funnel last.
+
+    Args:
+        folder: Where the pieces are; made if need be.
+        question: Its `fingerprint`.
+        piece: Which piece.
+        records: Its results as plain values, in order.
+        funnel: Its counts, complete once the records are taken.
+
+    Raises:
+        DataError: target-unwritable.
+    """
+    target = _file(folder, question, piece.number, piece.count)
+    partial = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with partial.open("w", encoding="utf-8") as file:
+            for each in records:
+                file.write(json.dumps(each, ensure_ascii=False) + "\n")
+            counts = {
+                name: dict(value) if isinstance(value, Counter) else value
+                for name, value in ((name, getattr(funnel, name)) for name in _COUNTS)
+            }
+            file.write(json.dumps({"funnel": counts}) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(target)
+    except OSError as error:
+        raise DataError(Diagnostic("target-unwritable", f"{target} cannot be written: {error.strerror}")) from None
+    finally:
+        partial.unlink(missing_ok=True)
+    return target
+
+
+_COUNTS = ("frames", "candidates", "cast", "matches", "unknowns", "excluded", "reasons")
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """The pieces of one question, put together.
+
+    Attributes:
+        files: Their files, in order.
+        funnel: Their counts, added up.
+    """
+
+    files: tuple[Path, ...]
+    funnel: Funnel
+
+    def records(self) -> Iterator[dict[str, Any]]:
+        """The results in the order of the dataset, one piece in memory at a time."""
+        for path in self.files:
+            yield from _lines(path)[:-1]
+
+
+def _lines(path: Path) -> list[dict[str, Any]]:
+    try:
+        lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    except (OSError, ValueError):
+        lines = []
+    if not lines or "funnel" not in lines[-1]:
+        raise DataError(Diagnostic("store-damaged", f"{path} is not a complete piece of a result",
+                                   hints=("delete it and run its shard again",)))  # fmt: skip
+    return cast("list[dict[str, Any]]", lines)
+
+
+def gather(folder: Path, question: str | None = None) -> Gathered:
+    """Put the pieces in a folder together.
+
+    Args:
+        folder: Where the pieces are.
+        question: Which question's; there must be only one if not given.
+
+    Raises:
+        DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions.
+    """
+    found = sorted(folder.glob("*-of-*.jsonl")) if folder.is_dir() else []
+    questions = sorted({path.name.rsplit("-", 3)[0] for path in found})
+    if question is None and len(questions) > 1:
+        raise DataError(Diagnostic("file-invalid", f"{folder} holds pieces of {len(questions)} different questions",
+                                   hints=("gather each from a folder of its own",)))  # fmt: skip
+    chosen = question or next(iter(questions), "")
+    found = [path for path in found if path.name.startswith(f"{chosen}-")]
+    if not found:
+        raise DataError(Diagnostic("file-missing", f"{folder} holds no piece of a result",
+                                   hints=("run `scenicq match ... --shard i/n -o` with this folder first",)))  # fmt: skip
+    counts = {int(path.stem.rsplit("-", 1)[1]) for path in found}
+    count = max(counts)
+    missing = [str(n + 1) for n in range(count) if not is_done(folder, chosen, n, count)]
+    if missing or len(counts) > 1:
+        shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
+        raise DataError(Diagnostic("file-missing", f"{len(missing)} of {count} pieces are missing: {shown}",
+                                   hints=("run their shards again",)))  # fmt: skip
+    total = Funnel()
+    for path in found:
+        _add(total, _lines(path)[-1]["funnel"])
+    return Gathered(tuple(found), total)
+
+
+def _add(total: Funnel, counts: Mapping[str, Any]) -> None:
+    for name in _COUNTS:
+        if isinstance(counts[name], dict):
+            getattr(total, name).update(counts[name])
+        else:
+            setattr(total, name, getattr(total, name) + counts[name])

@@ -1,0 +1,1 @@
+"""Formulas over real variables and the solvers that decide them. Start at `formula`, then `solver`."""

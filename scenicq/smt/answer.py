@@ -1,0 +1,102 @@
+"""What a solver is and what it answers. Outcomes are values: a timeout is an answer, not an exception."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Protocol, Self
+
+from scenicq.smt.formula import Problem
+
+__all__ = ["Answer", "Sat", "Solver", "SolverSession", "SolverStatus", "Unknown", "Unsat"]
+
+
+@dataclass(frozen=True, slots=True)
+class Sat:
+    """The problem has a solution.
+
+    Attributes:
+        witness: A value for each variable; the constraint holds there in plain floating point evaluation with a slack
+            of at most the precision that was asked for.
+    """
+
+    witness: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Unsat:
+    """The problem is proven to have no solution."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """The solver did not decide.
+
+    Attributes:
+        reason: "timeout", "crash", "budget", "memory", "garbage", "precision" (a witness that does not replay) or
+            "unsupported: ..." with what the solver cannot express.
+    """
+
+    reason: str
+
+
+Answer = Sat | Unsat | Unknown
+
+
+@dataclass(frozen=True, slots=True)
+class SolverStatus:
+    """Whether a solver can be used here.
+
+    Attributes:
+        name: As `open_solver` takes it.
+        ok: Whether it loads and answers.
+        detail: Its version, or exactly what is missing.
+        hint: A command or statement that helps; empty where `ok`.
+    """
+
+    name: str
+    ok: bool
+    detail: str
+    hint: str = ""
+
+
+class Solver(Protocol):
+    """Decides problems. Implementations keep one contract, tested for all of them alike."""
+
+    @property
+    def name(self) -> str:
+        """What the solver is called in messages."""
+        ...
+
+    def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
+        """Decide one problem.
+
+        Args:
+            problem: What to decide.
+            precision: The slack that a witness may need (δ), in the unit of each atom.
+            timeout_s: Wall-clock seconds after which the answer is `Unknown("timeout")`.
+        """
+        ...
+
+
+class SolverSession(Solver, Protocol):
+    """A solver with resources, to be used in a `with` statement; threads may share it."""
+
+    def check_many(self, problems: Sequence[Problem], *, precision: float, timeout_s: float) -> list[Answer]:
+        """Decide problems side by side; the answers come in the order of the problems, each with its own timeout."""
+        ...
+
+    def close(self) -> None:
+        """Give all resources back; the solver cannot be used afterwards."""
+        ...
+
+    def __enter__(self) -> Self:
+        """Return the solver itself."""
+        ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Close the solver."""
+        ...

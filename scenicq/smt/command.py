@@ -1,0 +1,132 @@
+"""Any solver that reads SMT-LIB 2 from its standard input, as a command line such as `z3 -in` or `dreal --in`.
+
+Every problem gets a process of its own, in a process group of its own, which is killed with the timeout.
+"""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from types import TracebackType
+from typing import IO, Self
+
+from scenicq.errors import Diagnostic, SolverError
+from scenicq.smt.answer import Answer, Sat, Unknown
+from scenicq.smt.evaluation import holds
+from scenicq.smt.formula import Problem
+from scenicq.smt.pool import end_group
+from scenicq.smt.smtlib import read_reply, to_smtlib
+
+__all__ = ["SmtlibSolver"]
+
+REPLY_BYTES = 4 * 2**20
+"""Length of a reply at most."""
+
+
+class SmtlibSolver:
+    """A solver behind a command line; threads may share it."""
+
+    def __init__(self, command: str, *, jobs: int = 1) -> None:
+        """Take a command line, in the quoting of a POSIX shell, that runs without a shell.
+
+        Raises:
+            SolverError: The command is not there or cannot be started.
+        """
+        self._command = command
+        self._jobs = max(1, jobs)
+        try:
+            self._words = shlex.split(command)
+        except ValueError as error:
+            raise SolverError(
+                Diagnostic("option-invalid", f"solver command `{command}` cannot be read: {error}")
+            ) from None
+        with self._spawn() as process:
+            end_group(process)
+
+    @property
+    def name(self) -> str:
+        """The command line."""
+        return self._command
+
+    def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
+        """Decide a problem in a new process; see `Solver.check`."""
+        with self._spawn() as process:
+            text, expired = _converse(process, to_smtlib(problem, precision).encode(), timeout_s)
+        if len(text) > REPLY_BYTES:
+            return Unknown("garbage")
+        answer = read_reply(text.decode(errors="replace"), problem)
+        if expired and answer == Unknown("garbage"):
+            return Unknown("timeout")
+        if answer == Unknown("garbage") and process.returncode:
+            return Unknown("crash")
+        if isinstance(answer, Sat) and not holds(problem, answer.witness, precision):
+            return Unknown("precision")
+        return answer
+
+    def check_many(self, problems: Sequence[Problem], *, precision: float, timeout_s: float) -> list[Answer]:
+        """Decide problems side by side; the answers come in the problems' order."""
+        with ThreadPoolExecutor(self._jobs) as threads:
+            asked = [
+                threads.submit(self.check, problem, precision=precision, timeout_s=timeout_s) for problem in problems
+            ]
+            return [future.result() for future in asked]
+
+    def close(self) -> None:
+        """Do nothing: no process outlives its problem."""
+
+    def __enter__(self) -> Self:
+        """Return the solver itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Do nothing."""
+
+    def _spawn(self) -> subprocess.Popen[bytes]:
+        try:
+            return subprocess.Popen(  # noqa: S603 - the user chooses the command
+                self._words,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+        except (OSError, IndexError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is empty or holds a null character"
+            hint = "known names are auto, dreal and portable; anything else is a command that reads SMT-LIB 2"
+            diagnostic = Diagnostic(
+                "solver-missing", f"solver command `{self._command}` cannot be started: {reason}", hints=(hint,)
+            )
+            raise SolverError(diagnostic) from None
+
+
+def _converse(process: subprocess.Popen[bytes], script: bytes, timeout_s: float) -> tuple[bytes, bool]:
+    """Write a script and read the reply; whether time ran out. The process has ended afterwards."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    expired = threading.Event()
+    timer = threading.Timer(timeout_s, lambda: (expired.set(), end_group(process)))
+    timer.daemon = True
+    timer.start()
+    writer = threading.Thread(target=_write, args=(process.stdin, script), daemon=True)
+    writer.start()
+    text = process.stdout.read(REPLY_BYTES + 1)
+    if len(text) > REPLY_BYTES:
+        end_group(process)
+    process.wait()
+    timer.cancel()
+    writer.join()
+    return text, expired.is_set()
+
+
+def _write(stream: IO[bytes], script: bytes) -> None:
+    try:
+        stream.write(script)
+        stream.close()
+    except OSError:
+        # the solver has ended before it read everything
+        pass

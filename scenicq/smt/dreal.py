@@ -1,0 +1,212 @@
+"""The adapter to dReal's Python package, for worker processes only: a call cannot be interrupted."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib
+import itertools
+import math
+import operator
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.evaluation import holds
+from scenicq.smt.formula import (
+    And,
+    Atom,
+    Formula,
+    Node,
+    Num,
+    Op,
+    Operator,
+    Or,
+    Problem,
+    Relation,
+    Var,
+    compare,
+    conjunction,
+    postorder,
+)
+from scenicq.smt.relational import without_inverses
+
+__all__ = ["VERSION", "check"]
+
+LIBRARIES = (
+    "libibex.so",
+    "libClpSolver.so.1",
+    "libClp.so.1",
+    "libCoinUtils.so.3",
+    "liblapack.so.3",
+    "libblas.so.3",
+    "libnlopt.so.0",
+)
+"""What dReal's wheel needs of the system."""
+IBEX_FOLDER = Path("/opt/libibex/2.7.4/lib")
+"""Where the wheel looks for libibex besides the loader's own path."""
+
+
+def _missing() -> list[str]:
+    """The libraries that the loader does not find."""
+    missing: list[str] = []
+    for library in LIBRARIES:
+        folder = str(IBEX_FOLDER / library)
+        try:
+            ctypes.CDLL(folder if Path(folder).exists() else library)
+        except OSError:
+            missing.append(library)
+    return missing
+
+
+try:
+    # by name: the module has no types that a checker could read
+    dreal: Any = importlib.import_module("dreal")
+except ImportError as error:
+    absent = _missing() if error.name != "dreal" else []
+    raise ImportError(f"missing libraries: {', '.join(absent)}" if absent else str(error)) from error
+
+VERSION = str(dreal.__version__)
+
+Symbolic = Any
+"""An expression or a formula of dReal, which ships no types."""
+
+
+NEAR = 1000.0
+"""Distance at which unbounded ranges are cut off in the search for a witness that holds."""
+CASES = 1000
+"""Conjunctions that a problem is split into at most."""
+
+
+def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
+    """Decide a problem; see `Solver.check`.
+
+    dReal takes a conjunction in less than a millisecond, but can take seconds for a disjunction of twenty together with
+    equalities: hence the disjunctions are split here, as long as that makes few cases.
+    """
+    deadline = time.monotonic() + timeout_s
+    related = without_inverses(problem)
+    variables = {variable.name: dreal.Variable(variable.name) for variable in related.variables}
+    fixed, choices = _cases(related.constraint)
+    try:
+        common = _all([_formula(part, variables, precision) for part in fixed])
+        options = [[_formula(part, variables, precision) for part in choice] for choice in choices]
+        near, given = (_formula(_bounds(related, reach), variables, precision) for reach in (NEAR, math.inf))
+    except (ValueError, RuntimeError) as error:
+        # constants outside of a function's domain
+        return Unknown(f"unsupported: {error}")
+    doubtful: Sat | None = None
+    for case in itertools.product(*options):
+        # the box of an answer can be so wide that its middle is no solution: then finer, and close to the origin
+        for bounds, delta in ((given, precision), (near, precision), (near, precision / 100)):
+            if time.monotonic() > deadline:
+                return Unknown("timeout")
+            box = dreal.CheckSatisfiability(_all([bounds, common, *case]), delta)
+            if box is None:
+                break
+            witness = {variable.name: _value(box, variables[variable.name]) for variable in problem.variables}
+            if holds(problem, witness, precision):
+                return Sat(witness)
+            doubtful = Sat(witness)
+    return doubtful or Unsat()
+
+
+def _cases(constraint: Formula) -> tuple[list[Formula], list[tuple[Formula, ...]]]:
+    """The parts of a conjunction that stay, and the alternatives that are tried one by one."""
+    parts = constraint.args if isinstance(constraint, And) else (constraint,)
+    fixed: list[Formula] = [part for part in parts if not isinstance(part, Or)]
+    choices: list[tuple[Formula, ...]] = []
+    count = 1
+    for part in sorted((part for part in parts if isinstance(part, Or)), key=lambda part: len(part.args)):
+        count *= max(1, len(part.args))
+        if count <= CASES:
+            choices.append(part.args)
+        else:
+            fixed.append(part)
+    return fixed, choices
+
+
+def _bounds(problem: Problem, reach: float) -> Formula:
+    """The ranges of the variables, those without an end cut off at a distance."""
+    atoms: list[Formula] = []
+    for variable in problem.variables:
+        low = variable.low if math.isfinite(variable.low) else min(-reach, variable.high - reach)
+        high = variable.high if math.isfinite(variable.high) else max(reach, variable.low + reach)
+        if math.isfinite(low):
+            atoms.append(compare("<=", low, Var(variable.name)))
+        if math.isfinite(high):
+            atoms.append(compare("<=", Var(variable.name), high))
+    return conjunction(atoms)
+
+
+def _all(formulas: list[Symbolic]) -> Symbolic:
+    return dreal.logical_and(dreal.Formula.TRUE(), *formulas)
+
+
+def _value(box: Symbolic, variable: Symbolic) -> float:
+    """The middle of a variable's range, 0 where it does not matter."""
+    return float(box[variable].mid()) if box.has_key(variable) else 0.0
+
+
+def _formula(root: Node, variables: dict[str, Symbolic], precision: float) -> Symbolic:
+    made: dict[int, Symbolic] = {}
+    for node in postorder(root):
+        match node:
+            case Var(name):
+                made[id(node)] = dreal.Expression(variables[name])
+            case Num(value):
+                made[id(node)] = dreal.Expression(float(value))
+            case Op(function, args):
+                made[id(node)] = _operation(function, [made[id(arg)] for arg in args])
+            case Atom(_, Num(left), Num(right)):
+                # only atoms that rounding decides are ground
+                close = abs(left - right) <= precision
+                made[id(node)] = dreal.Formula.TRUE() if close else dreal.Formula.FALSE()
+            case Atom(relation, left, right):
+                made[id(node)] = _RELATIONS[relation](made[id(left)], made[id(right)])
+            case Or(args):
+                made[id(node)] = dreal.logical_or(dreal.Formula.FALSE(), *(made[id(arg)] for arg in args))
+            case _:
+                made[id(node)] = _all([made[id(arg)] for arg in node.args])
+    return made[id(root)]
+
+
+def _operation(function: Operator, args: list[Symbolic]) -> Symbolic:
+    if function in _FOLDS:
+        return functools.reduce(_FOLDS[function], args)
+    return _FUNCTIONS[function](*args)
+
+
+def _quotient(a: Symbolic, b: Symbolic) -> Symbolic:
+    return a / b
+
+
+_RELATIONS: dict[Relation, Callable[[Symbolic, Symbolic], Symbolic]] = {
+    Relation.LE: operator.le,
+    Relation.LT: operator.lt,
+    Relation.EQ: operator.eq,
+}
+
+_FOLDS: dict[Operator, Callable[[Symbolic, Symbolic], Symbolic]] = {
+    Operator.ADD: operator.add,
+    Operator.MUL: operator.mul,
+    Operator.MIN: dreal.Min,
+    Operator.MAX: dreal.Max,
+}
+
+_FUNCTIONS: dict[Operator, Callable[..., Symbolic]] = {
+    Operator.SUB: operator.sub,
+    Operator.DIV: _quotient,
+    Operator.NEG: operator.neg,
+    Operator.ABS: abs,
+    Operator.SQRT: dreal.sqrt,
+    Operator.SIN: dreal.sin,
+    Operator.COS: dreal.cos,
+    Operator.TAN: dreal.tan,
+    Operator.ATAN: dreal.atan,
+    Operator.POW: dreal.pow,
+    Operator.EXP: dreal.exp,
+    Operator.LOG: dreal.log,
+}

@@ -1,0 +1,233 @@
+"""Worker processes that run a solver: what they do to themselves harms one problem, never the caller.
+
+A worker that crashes, hangs, is killed or talks nonsense is replaced, and its problem's answer is `Unknown`. Workers
+start when they are first needed and import the solver themselves, because a library can change the rounding mode of the
+process, print, or fail to load.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+from scenicq.errors import Diagnostic, SolverError
+from scenicq.smt.answer import Answer, Sat, Unknown
+from scenicq.smt.evaluation import holds
+from scenicq.smt.formula import Problem
+from scenicq.smt.worker import Request, Setup, read_answer
+
+__all__ = ["DREAL", "PORTABLE", "WorkerSolver", "end_group"]
+
+PORTABLE = "scenicq.smt.portable:check"
+DREAL = "scenicq.smt.dreal:check"
+
+GRACE_S = 0.5
+"""Seconds that a worker has to answer after its timeout before it is killed."""
+START_S = 60.0
+"""Seconds that a worker has to start."""
+ANSWER_BYTES = 16 * 2**20
+"""Length of an answer at most."""
+
+_BOOTSTRAP = (
+    "import pickle, sys\n"
+    "sys.path[:] = pickle.load(sys.stdin.buffer)\n"
+    "from scenicq.smt.worker import serve\n"
+    "serve(pickle.load(sys.stdin.buffer), sys.stdin.buffer)\n"
+)
+
+
+class WorkerSolver:
+    """A solver that runs in worker processes; threads may share it."""
+
+    def __init__(self, kind: str = PORTABLE, *, name: str = "", jobs: int = 1, memory_mb: int | None = None) -> None:
+        """Prepare workers; none starts yet.
+
+        Args:
+            kind: `module:function` of the check that the workers run; the function takes what `Solver.check` takes.
+            name: What the solver is called; by default the last part of the module.
+            jobs: Worker processes at most.
+            memory_mb: Address space of each worker (Linux); an interpreter takes about 50 by itself.
+        """
+        self._name = name or kind.partition(":")[0].rpartition(".")[2]
+        self._workers = [_Worker(Setup(kind, memory_mb), self._name) for _ in range(max(1, jobs))]
+        self._idle: queue.LifoQueue[_Worker] = queue.LifoQueue()
+        for worker in self._workers:
+            self._idle.put(worker)
+
+    @property
+    def name(self) -> str:
+        """What the solver is called in messages."""
+        return self._name
+
+    def start(self) -> str:
+        """Start one worker now.
+
+        Returns:
+            The version that the solver's module gives as `VERSION`, or nothing.
+
+        Raises:
+            SolverError: The solver cannot be loaded.
+        """
+        worker = self._idle.get()
+        try:
+            return worker.start()
+        finally:
+            self._idle.put(worker)
+
+    def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
+        """Decide a problem in an idle worker; see `Solver.check`.
+
+        Raises:
+            SolverError: The solver cannot be loaded.
+        """
+        worker = self._idle.get()
+        try:
+            answer = worker.ask(problem, precision, timeout_s)
+        finally:
+            self._idle.put(worker)
+        if isinstance(answer, Sat) and not _replays(problem, answer, precision):
+            return Unknown("precision")
+        return answer
+
+    def check_many(self, problems: Sequence[Problem], *, precision: float, timeout_s: float) -> list[Answer]:
+        """Decide problems, as many at once as there are workers; the answers come in the problems' order."""
+        if not problems:
+            return []
+        with ThreadPoolExecutor(min(len(self._workers), len(problems))) as threads:
+            asked = [
+                threads.submit(self.check, problem, precision=precision, timeout_s=timeout_s) for problem in problems
+            ]
+            return [future.result() for future in asked]
+
+    def close(self) -> None:
+        """End all workers."""
+        for worker in self._workers:
+            worker.stop()
+
+    def __enter__(self) -> Self:
+        """Return the solver itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """End all workers."""
+        self.close()
+
+
+def _replays(problem: Problem, answer: Sat, precision: float) -> bool:
+    named = all(variable.name in answer.witness for variable in problem.variables)
+    return named and holds(problem, answer.witness, precision)
+
+
+class _Worker:
+    """One process and its pipes."""
+
+    def __init__(self, setup: Setup, name: str) -> None:
+        self._setup = setup
+        self._name = name
+        self._process: subprocess.Popen[bytes] | None = None
+        self._version = ""
+
+    def start(self) -> str:
+        """Start the process unless it runs; the version of what it loaded."""
+        if self._process is not None:
+            if self._process.poll() is None:
+                return self._version
+            self.stop()
+        package = str(Path(__file__).parents[2])
+        path = [package, *(entry or str(Path.cwd()) for entry in sys.path)]
+        self._process = subprocess.Popen(  # noqa: S603
+            # -S and -I: the search path comes by message, which halves the time of the start
+            [sys.executable, "-I", "-S", "-c", _BOOTSTRAP],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        line, _ = self._exchange(pickle.dumps(path) + pickle.dumps(self._setup), START_S)
+        try:
+            greeting = json.loads(line)
+        except ValueError:
+            greeting = {"failed": "the process ended while it loaded the solver"}
+        if "ready" not in greeting:
+            self.stop()
+            raise SolverError(
+                Diagnostic("solver-missing", f"solver `{self._name}` does not load", label=greeting["failed"])
+            )
+        self._version = greeting["ready"]
+        return self._version
+
+    def ask(self, problem: Problem, precision: float, timeout_s: float) -> Answer:
+        """Have a problem decided."""
+        self.start()
+        request = Request(problem, precision, timeout_s, timeout_s + 2 * GRACE_S)
+        line, expired = self._exchange(pickle.dumps(request), timeout_s + GRACE_S)
+        if not line.endswith(b"\n"):
+            self.stop()
+            return Unknown("timeout" if expired else "garbage" if len(line) > ANSWER_BYTES else "crash")
+        answer = read_answer(line)
+        if isinstance(answer, Unknown) and answer.reason in ("garbage", "memory"):
+            self.stop()
+        return answer
+
+    def _exchange(self, message: bytes, timeout_s: float) -> tuple[bytes, bool]:
+        """Send a message and read one line; the process is killed if that takes too long."""
+        process = self._process
+        assert process is not None
+        requests, answers = _pipes(process)
+        expired = threading.Event()
+        timer = threading.Timer(timeout_s, lambda: (expired.set(), end_group(process)))
+        timer.daemon = True
+        timer.start()
+        line = b""
+        try:
+            requests.write(message)
+            requests.flush()
+            line = answers.readline(ANSWER_BYTES + 1)
+        except OSError:
+            # the process has ended
+            pass
+        finally:
+            timer.cancel()
+        return line, expired.is_set()
+
+    def stop(self) -> None:
+        """Kill the process, if any, and close its pipes."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        end_group(process)
+        process.wait()
+        for pipe in _pipes(process):
+            with contextlib.suppress(OSError):
+                pipe.close()
+
+
+def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
+    assert process.stdin is not None
+    assert process.stdout is not None
+    return process.stdin, process.stdout
+
+
+def end_group(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process that leads a process group, with the group."""
+    if process.poll() is not None:
+        return
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()

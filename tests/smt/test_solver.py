@@ -1,0 +1,84 @@
+"""Choosing a solver by name, and what is said where it cannot be used."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from scenicq.errors import SolverError
+from scenicq.smt import solver as module
+from scenicq.smt.answer import Sat, SolverStatus
+from scenicq.smt.formula import Problem, Variable, compare
+from scenicq.smt.formula import Var as V
+from scenicq.smt.solver import available, open_solver
+
+PROBLEM = Problem((Variable("x", 0.0, 4.0),), compare(">=", V("x"), 3.0))
+
+
+@pytest.fixture
+def without_dreal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "DREAL", "no_such_package:check")
+
+
+@pytest.mark.parametrize("name", ["auto", "portable"])
+def test_names(name: str) -> None:
+    with open_solver(name) as opened:
+        assert opened.name in ("dreal", "portable")
+        assert isinstance(opened.check(PROBLEM, precision=1e-3, timeout_s=20.0), Sat)
+
+
+@pytest.mark.usefixtures("without_dreal")
+def test_auto_falls_back() -> None:
+    with open_solver("auto") as opened:
+        assert opened.name == "portable"
+        assert isinstance(opened.check(PROBLEM, precision=1e-3, timeout_s=20.0), Sat)
+
+
+@pytest.mark.usefixtures("without_dreal")
+def test_a_missing_solver_is_named_with_what_helps() -> None:
+    with pytest.raises(SolverError) as caught:
+        open_solver("dreal")
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.code == "solver-missing"
+    assert "no_such_package" in diagnostic.message
+    assert any("portable" in hint for hint in diagnostic.hints)
+
+
+def test_unknown_names_are_commands_that_do_not_exist() -> None:
+    with pytest.raises(SolverError) as caught:
+        open_solver("dreaal")
+    assert "dreaal" in caught.value.diagnostics[0].message
+    assert "auto, dreal and portable" in caught.value.diagnostics[0].hints[0]
+
+
+@pytest.mark.usefixtures("without_dreal")
+def test_available() -> None:
+    statuses = available()
+    assert [status.name for status in statuses] == ["dreal", "portable"]
+    assert not statuses[0].ok
+    assert statuses[0].hint
+    assert statuses[1] == SolverStatus("portable", ok=True, detail="built in")
+
+
+@pytest.mark.parametrize(
+    ("reason", "words"),
+    [
+        ("ImportError: missing libraries: libibex.so", ("/opt/libibex/2.7.4/lib",)),
+        ("ImportError: missing libraries: libClp.so.1, libnlopt.so.0", ("apt-get install libnlopt0",)),
+        ("the process ended while it loaded the solver", ("--solver portable",)),
+    ],
+)
+def test_hints_fit_the_reason(reason: str, words: tuple[str, ...]) -> None:
+    hints = " ".join(module._dreal_hints(reason))
+    assert all(word in hints for word in words)
+
+
+def test_opening_imports_no_solver() -> None:
+    """dReal and numpy stay out of the caller's process, and the start is quick."""
+    script = "import sys; import scenicq.smt.solver; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.split())
+    assert "scenicq.smt.pool" in loaded
+    assert not loaded & {"dreal", "codac", "numpy", "scenicq.smt.dreal", "scenicq.smt.portable"}
