@@ -32,7 +32,6 @@ CODES: dict[str, str] = {
     "unknown-name": "a name is used that nothing defines",
     "unknown-attribute": "a value has no attribute of that name",
     "unknown-specifier": "no specifier is spelled like this",
-    "unknown-property": "an object has no property of that name",
     "unknown-model": "a world model or module that is not known here",
     "specifier-conflict": "two specifiers give the same property",
     "specifier-cycle": "specifiers depend on each other in a circle",
@@ -44,6 +43,7 @@ CODES: dict[str, str] = {
     "no-ego": "the program needs an ego object and defines none",
     "unsupported-construct": "Scenic, but not part of what can be matched",
     "unsupported-region": "a region of a kind that cannot be used here",
+    "soft-requirement": "a requirement that need not hold, so that it excludes nothing",
     "impossible-requirement": "a requirement that no scene satisfies",
     "budget-exceeded": "the program takes too many steps or too much memory",
     "runtime-error": "evaluating the program failed",
@@ -67,6 +67,8 @@ CODES: dict[str, str] = {
     # the solvers
     "solver-missing": "the solver cannot be loaded",
     "solver-failed": "the solver cannot be started",
+    # the answers
+    "frame-excluded": "what a frame shows is not what the program allows",
 }
 """Every diagnostic code with its meaning."""
 

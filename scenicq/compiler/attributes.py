@@ -1,5 +1,9 @@
 """Attribute access: what a program may read of each kind of value. Everything not listed does not exist."""
 
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -7,34 +11,30 @@ from difflib import get_close_matches
 from typing import Any, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.builtins import LARGEST
+from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_random
+from scenicq.compiler.choices import make_choice
 from scenicq.compiler.coerce import property_node, to_heading, to_scalar, to_vector
+from scenicq.compiler.elements import MISSING, names_of, of_element, of_network
+from scenicq.compiler.environment import Runner
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
-from scenicq.errors import Span
+from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Constant, Node
-from scenicq.geometry.elements import Maneuver, MissingElementError, NetworkElement
-from scenicq.geometry.fields import VectorField
+from scenicq.forest.nodes import Constant, Node, PointIn
+from scenicq.geometry.angles import heading_of
+from scenicq.geometry.elements import Maneuver, NetworkElement
 from scenicq.geometry.network import Network
-from scenicq.geometry.regions import Region
+from scenicq.geometry.regions import PolylineSet, Region, orientation_of
 
-__all__ = ["attribute", "part_of"]
+__all__ = ["attribute", "corner", "part_of"]
 
 _PLAIN: dict[type, frozenset[str]] = {
-    str: frozenset("lower upper strip lstrip rstrip split startswith endswith replace title capitalize isdigit".split()),
+    str: frozenset("lower upper strip lstrip rstrip split startswith endswith replace title isdigit".split()),
     list: frozenset("append extend insert pop remove index count reverse copy clear".split()),
     dict: frozenset("get keys values items update pop setdefault copy".split()),
     set: frozenset("add discard remove union intersection difference update copy".split()),
     tuple: frozenset("index count".split()),
 }
-_ELEMENT_HIDDEN = frozenset({"polygon", "properties"})
-_NETWORK = frozenset(
-    "lanes laneSections laneGroups roads connectingRoads allRoads intersections crossings sidewalks shoulders "
-    "laneRegion roadRegion intersectionRegion crossingRegion sidewalkRegion shoulderRegion drivableRegion "
-    "walkableRegion curbRegion roadDirection".split()
-)
-_LOOKUPS = frozenset("laneAt laneSectionAt laneGroupAt roadAt intersectionAt crossingAt sidewalkAt elementAt".split())
 _PARTS: dict[str, tuple[float, float]] = {
     "front": (0.0, 0.5),
     "back": (0.0, -0.5),
@@ -56,14 +56,15 @@ def part_of(part: str, target: ModelValue, span: Span) -> Instance:
         raise fail("unsupported-construct", f"`{part} of` is not supported: labels are matched in 2D", span)
     right, ahead = _PARTS[part]
     size = [to_scalar(property_node(target, name, span), span) for name in ("width", "length")]
-    offset = build.vector(
-        cast(Node, operators.binary("*", size[0], right, span)), cast(Node, operators.binary("*", size[1], ahead, span)), span
+    x, y = (
+        cast(Node, operators.binary("*", side, part, span)) for side, part in zip(size, (right, ahead), strict=True)
     )
+    offset = build.vector(x, y, span)
     heading = to_heading(target, span)
     return operators.oriented(build.offset_local(to_vector(target, span), heading, offset, span), heading)
 
 
-def attribute(value: ModelValue, name: str, span: Span) -> ModelValue:
+def attribute(run: Runner, value: ModelValue, name: str, span: Span) -> ModelValue:
     """`value.name`.
 
     Raises:
@@ -72,16 +73,48 @@ def attribute(value: ModelValue, name: str, span: Span) -> ModelValue:
     if name.startswith("__"):
         raise fail("unsupported-construct", f"`{name}` is not available to scenarios", span, "Python's own attribute",
                    ("scenarios are data: they never reach the Python interpreter",))  # fmt: skip
+    if isinstance(value, Choice):
+        return _of_choice(run, value, name, span)
     found = _lookup(value, name, span)
-    if found is _MISSING:
-        close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
-        hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
-        shown = f"a {kind_of(value)}" if is_node(value) else describe(value)
-        raise fail("unknown-attribute", f"{shown} has no attribute `{name}`", span, "not found", hints)
+    if found is MISSING:
+        raise _unknown(value, name, span)
     return found
 
 
-_MISSING = object()
+_ROAD_PLACES = frozenset(
+    "lane laneSection laneGroup oppositeLaneGroup road intersection crossing element".split()
+)  # fmt: skip
+
+
+def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
+    if isinstance(value, Instance) and name.lstrip("_") in _ROAD_PLACES:
+        return fail("unsupported-construct", f"`{name}` of an object is not supported", span,
+                    "depends on where the object is",
+                    ("choose the element first, as in `lane = Uniform(*network.lanes)`, and place the object on it",
+                     "to relate an object to an element, use `in`, as in `require car in lane`"))  # fmt: skip
+    close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
+    hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
+    shown = f"a {kind_of(cast(Node, value))}" if is_node(value) else describe(value)
+    return fail("unknown-attribute", f"{shown} has no attribute `{name}`", span, "not found", hints)
+
+
+def _of_choice(run: Runner, value: Choice, name: str, span: Span) -> ModelValue:
+    """The attribute of each option; where the map has none, that option has no scene, as in Scenic."""
+    found: dict[int, ModelValue] = {}
+    missing: ScenarioError | None = None
+    for number, option in enumerate(value.options):
+        try:
+            found[number] = attribute(run, option, name, span)
+        except ScenarioError as error:
+            if error.diagnostics[0].code != "map-lacks":
+                raise
+            missing = error
+    if not found:
+        assert missing is not None
+        raise missing
+    run.exclude(value.index, [number for number in range(len(value.options)) if number not in found], span)
+    spare = next(iter(found.values()))
+    return make_choice(value.index, [found.get(number, spare) for number in range(len(value.options))], span)
 
 
 def _names(value: ModelValue) -> set[str]:
@@ -90,52 +123,69 @@ def _names(value: ModelValue) -> set[str]:
             return set(value.properties) | set(_PART_NAMES)
         case Module():
             return set(value.names)
-        case Network():
-            return set(_NETWORK | _LOOKUPS)
-        case NetworkElement() | Maneuver():
-            return {name for name in dir(value) if not name.startswith("__")} - _ELEMENT_HIDDEN
+        case Network() | NetworkElement() | Maneuver():
+            return names_of(value)
         case _:
             return set(_PLAIN.get(type(value), ()))
 
 
-def _lookup(value: ModelValue, name: str, span: Span) -> ModelValue:  # noqa: PLR0911
+def _lookup(value: ModelValue, name: str, span: Span) -> ModelValue:
     match value:
         case Instance():
             return _of_instance(value, name, span)
         case Module():
-            return value.names.get(name, _MISSING)
+            return None if value.dynamic else value.names.get(name, MISSING)
         case ScenicClass():
-            return next((cls.attributes[name] for cls in value.ancestry() if name in cls.attributes), _MISSING)
+            return next((cls.attributes[name] for cls in value.ancestry() if name in cls.attributes), MISSING)
         case Network():
-            return _of_network(value, name)
+            return of_network(value, name, span)
         case NetworkElement():
-            region = _of_region(build.constant(value.region, span), name)
-            return _of_element(value, name, span) if region is _MISSING else region
+            region = _of_region(build.constant(value.region, span), name, span)
+            return of_element(value, name, span) if region is MISSING else region
         case Maneuver():
-            return _of_element(value, name, span)
-        case Choice():
-            return operators.make_choice(value.index, [attribute(option, name, span) for option in value.options], span)
+            return of_element(value, name, span)
         case _ if is_node(value):
             return _of_node(value, name, span)
         case _ if name in _PLAIN.get(type(value), ()):
-            return Builtin(name, _guarded(getattr(value, name)), lifted=False)
+            return Builtin(name, _guarded(name, value), lifted=False, owner=value)
         case _:
-            return _MISSING
+            return MISSING
 
 
-def _guarded(method: Callable[..., Any]) -> Callable[..., ModelValue]:
+_SEARCHES = frozenset({"index", "count", "remove"})
+_KEYED = frozenset({"get", "pop", "setdefault", "add", "discard"})
+
+
+def _guarded(name: str, owner: ModelValue) -> Callable[..., ModelValue]:
+    """A method of a string, list, dictionary or set, within bounds."""
+    method: Callable[..., Any] = getattr(owner, name)
+
     def call(span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
+        if name in _SEARCHES and not isinstance(owner, str):
+            if any(map(is_random, [*args, *cast("list[ModelValue]", owner)])):
+                raise fail("random-branch", f"`{name}` cannot look for a random value", span, "random here")
+            check_weight(span, owner, *args, compared=True)
+        if isinstance(owner, dict | set) and name in _KEYED:
+            args = (hashed(args[0], span), *args[1:]) if args else args
+        if isinstance(owner, str) and name == "replace" and all(isinstance(arg, str) for arg in args[:2]):
+            old, new = (*args, "", "")[:2]
+            grown = owner.count(old) * max(len(new) - len(old), 0)
+            _check_length(len(owner) + grown, span)
         try:
             result = method(*args, **named)
-        except (ValueError, TypeError, IndexError, KeyError) as error:
-            raise fail("runtime-error", f"`{method.__name__}` failed: {error}", span) from None
-        owner = getattr(method, "__self__", None)
-        size = max(len(part) for part in (owner, result, "") if isinstance(part, str | list | dict | set | tuple))
-        if size > LARGEST:
-            raise fail("budget-exceeded", f"a value grows beyond {LARGEST:,} items", span)
+        except (ValueError, IndexError, KeyError):
+            raise fail("runtime-error", f"`{name}` finds no such item", span, "failed here") from None
+        for part in (owner, result):
+            if isinstance(part, str | list | dict | set | tuple):
+                _check_length(len(cast("list[ModelValue]", part)), span)
         return list(result) if type(result).__name__ in ("dict_keys", "dict_values", "dict_items") else result
 
     return call
+
+
+def _check_length(length: int, span: Span) -> None:
+    if length > LARGEST:
+        raise fail("budget-exceeded", f"a value grows beyond {LARGEST:,} items", span, "grows here")
 
 
 def _of_instance(value: Instance, name: str, span: Span) -> ModelValue:
@@ -145,37 +195,11 @@ def _of_instance(value: Instance, name: str, span: Span) -> ModelValue:
         return part_of(_PART_NAMES[name], value, span)
     if name == "visibleRegion":
         return operators.visible_region(value, span)
-    return next((cls.attributes[name] for cls in value.cls.ancestry() if name in cls.attributes), _MISSING)
-
-
-def _of_network(network: Network, name: str) -> ModelValue:
-    if name in _LOOKUPS:
-
-        def look_up(span: Span, point: ModelValue, **_: ModelValue) -> ModelValue:
-            where = to_vector(point, span)
-            if not isinstance(where, Constant):
-                raise fail("unsupported-construct", f"`network.{name}` of a random point is not supported", span,
-                           "a random point", ("state the relation with `in` and a region",))  # fmt: skip
-            return getattr(network, name)(*cast("tuple[float, float]", where.value))
-
-        return Builtin(name, look_up)
-    if name not in _NETWORK:
-        return _MISSING
-    found = getattr(network, name)
-    return build.constant(found) if name.endswith("Region") or name == "roadDirection" else found
-
-
-def _of_element(value: NetworkElement | Maneuver, name: str, span: Span) -> ModelValue:
-    if name in _ELEMENT_HIDDEN or not hasattr(type(value), name) and name not in value.__dict__:
-        return _MISSING
-    try:
-        found = getattr(value, name)
-    except MissingElementError as error:
-        raise fail("map-lacks", str(error), span, "not in this map",
-                   (f"test `_{name}` against None first",)) from None  # fmt: skip
-    if callable(found):
-        return _MISSING
-    return build.constant(found, span) if isinstance(found, Region | VectorField) else found
+    if name == "distanceTo":
+        return Builtin(name, lambda span, other: operators.distance_to(other, value, span))
+    if name == "angleTo":
+        return Builtin(name, lambda span, other: operators.angle_to(other, value, span))
+    return next((cls.attributes[name] for cls in value.cls.ancestry() if name in cls.attributes), MISSING)
 
 
 def _of_node(value: Node, name: str, span: Span) -> ModelValue:
@@ -188,25 +212,69 @@ def _of_node(value: Node, name: str, span: Span) -> ModelValue:
             return Builtin(name, lambda span: build.norm(value, span))
         case "vector", "distanceTo":
             return Builtin(name, lambda span, other: operators.distance_to(other, value, span))
-        case "vector", "angleTo":
+        case "vector", "angleTo" | "azimuthTo":
             return Builtin(name, lambda span, other: operators.angle_to(other, value, span))
         case "vector", "rotatedBy":
             return Builtin(name, lambda span, angle: build.rotate(value, to_heading(angle, span), span))
+        case "vector", "offsetRotated" | "offsetLocally":
+            return Builtin(name, lambda span, turn, by: operators.along(value, to_heading(turn, span), by, span))
+        case "vector", "offsetRadially":
+            return Builtin(name, lambda span, by, turn: operators.along(value, to_heading(turn, span), (0, by), span))
         case "region", _:
-            return _of_region(value, name)
+            return _of_region(value, name, span)
         case _:
-            return _MISSING
+            return MISSING
 
 
-def _of_region(value: Node, name: str) -> ModelValue:
+def _of_region(value: Node, name: str, span: Span) -> ModelValue:
     match name:
         case "union":
-            return Builtin(name, lambda span, other: operators.region_union(value, other, span))
+            return Builtin(name, lambda span, other: operators.region_union(value, other, span), cost=800)
         case "intersect":
-            return Builtin(name, lambda span, other: operators.region_intersection(value, other, span))
+            return Builtin(name, lambda span, other: operators.region_intersection(value, other, span), cost=800)
         case "difference":
-            return Builtin(name, lambda span, other: operators.region_difference(value, other, span))
+            return Builtin(name, lambda span, other: operators.region_difference(value, other, span), cost=800)
+        case "intersects":
+            return Builtin(name, lambda span, other: operators.intersects(value, other, span))
+        case "orientation" if isinstance(value, Constant):
+            field = orientation_of(cast(Region, value.value))
+            return None if field is None else build.constant(field, span)
         case "containsPoint":
             return Builtin(name, lambda span, point: operators.within(to_vector(point, span), value, span))
+        case "containsObject":
+            return Builtin(name, lambda span, thing: operators.within(thing, value, span))
+        case "distanceTo":
+            return Builtin(name, lambda span, point: operators.distance_to(value, point, span))
+        case "uniformPointInner" | "uniformPoint":
+            return Builtin(name, lambda span: PointIn(operators.existing(value, span), span=span))
+        case "start" | "end" if (points := _line(value)) is not None:
+            (x, y), (u, v) = points[:2] if name == "start" else points[-2:]
+            place = points[0] if name == "start" else points[-1]
+            return operators.oriented(build.constant(place, span), build.constant(heading_of(u - x, v - y), span))
+        case "points" if (points := _line(value)) is not None:
+            return tuple(build.constant(point, span) for point in points)
+        case "length" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
+            return float(sum(line.length for line in value.value.lines))
         case _:
-            return _MISSING
+            return MISSING
+
+
+def _line(value: ModelValue) -> list[tuple[float, float]] | None:
+    """The corners of a polyline, pieces one after the other; None for other regions."""
+    if not (isinstance(value, Constant) and isinstance(value.value, PolylineSet)):
+        return None
+    return [(float(x), float(y)) for line in value.value.pieces for x, y in line.coords]
+
+
+def corner(value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
+    """`polyline[n]`.
+
+    Raises:
+        ScenarioError: wrong-type for other regions, runtime-error where there is no such corner.
+    """
+    points = _line(value)
+    if points is None:
+        raise fail("wrong-type", "a region has no items", span, "indexed here", ("only polylines have corners",))
+    if not isinstance(index, int) or not -len(points) <= index < len(points):
+        raise fail("runtime-error", "there is no item with this index", span, "not found")
+    return build.constant(points[index], span)

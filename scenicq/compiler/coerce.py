@@ -1,5 +1,9 @@
 """Reading a value as what an operator needs: a scalar, a heading, a vector, a region (language paper, table 1)."""
 
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import math
@@ -15,6 +19,7 @@ from scenicq.geometry.regions import Everywhere, Region
 
 __all__ = [
     "OBSERVABLE",
+    "PARTIAL",
     "kind_of_model",
     "property_node",
     "to_boolean",
@@ -38,10 +43,14 @@ OBSERVABLE: dict[str, Kind] = {
 """Properties that a label can observe, by kind: references to them are conditioned on the label."""
 
 
+PARTIAL = frozenset({"parentOrientation", "yaw"})
+"""Properties that only make up the heading: not features of their own."""
+
+
 def property_node(instance: Instance, name: str, span: Span | None) -> ModelValue:
     """The value of a property of an instance, by reference where a label may observe it."""
     value = instance.properties[name]
-    if instance.index is None:
+    if instance.index is None or name in PARTIAL:
         return value
     if name in OBSERVABLE:
         return Feature(instance.index, name, OBSERVABLE[name], span=span)
@@ -104,7 +113,7 @@ def to_scalar(value: ModelValue, span: Span | None) -> Node:
         if not math.isfinite(value):
             raise fail("wrong-value", "this number is not finite", span)
         return constant(value, span)
-    if is_node(value) and kind_of(value) in ("scalar", "boolean"):
+    if is_node(value) and kind_of(cast(Node, value)) in ("scalar", "boolean"):
         return cast(Node, value)
     if isinstance(value, Choice):
         return Select(value.index, tuple(to_scalar(option, span) for option in value.options), span=span)
@@ -113,11 +122,13 @@ def to_scalar(value: ModelValue, span: Span | None) -> Node:
 
 def to_heading(value: ModelValue, span: Span | None) -> Node:
     """A heading in radians: a number, or the heading of an oriented point or object."""
+    if isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 3 and value[1:] == (0, 0):
+        return to_scalar(value[0], span)
     if isinstance(value, Instance) and value.oriented:
         return to_scalar(property_node(value, "heading", span), span)
     if isinstance(value, Choice):
         return Select(value.index, tuple(to_heading(option, span) for option in value.options), span=span)
-    if isinstance(value, Instance) or (is_node(value) and kind_of(value) not in ("scalar", "boolean")):
+    if isinstance(value, Instance) or (is_node(value) and kind_of(cast(Node, value)) not in ("scalar", "boolean")):
         raise _need(value, "a heading", span)
     return to_scalar(value, span)
 
@@ -134,7 +145,7 @@ def to_vector(value: ModelValue, span: Span | None) -> Node:
                        span, "three coordinates", ("write two coordinates, or make the third 0",))  # fmt: skip
         if len(parts) == 2 or flat:
             return vector(to_scalar(parts[0], span), to_scalar(parts[1], span), span)
-    if is_node(value) and kind_of(value) == "vector":
+    if is_node(value) and kind_of(cast(Node, value)) == "vector":
         return cast(Node, value)
     if isinstance(value, Choice):
         return Select(value.index, tuple(to_vector(option, span) for option in value.options), span=span)

@@ -8,30 +8,42 @@ from typing import Protocol
 
 from scenicq.compiler.values import Function, Instance, ModelValue, fail
 from scenicq.errors import Span
+from scenicq.forest.nodes import Index
 from scenicq.syntax import ast
 
-__all__ = ["Budget", "Environment", "Runner"]
+__all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Environment", "Runner"]
+
+FIRST_LIBRARIES = frozenset({"gtaLib", "mars"})
+"""The 2019 paper's libraries."""
+
+FIRST_NAMES = {"height": "length", "viewDistance": "visibleDistance"}
+"""Properties that the 2019 paper calls by other names than later versions do (table 2)."""
 
 
 class Budget:
-    """What a program may use: steps of evaluation and depth of calls.
+    """What a program may use: steps of evaluation (time and memory alike) and depth of calls.
 
     Attributes:
         steps: Steps left.
         depth: Calls in progress.
     """
 
-    MOST_STEPS = 1_000_000
+    MOST_STEPS = 400_000
     MOST_CALLS = 40
+    ITEMS_PER_STEP = 8
 
     def __init__(self) -> None:
         """Start with everything left."""
         self.steps = self.MOST_STEPS
         self.depth = 0
 
-    def step(self, span: Span) -> None:
-        """Use up one step."""
-        self.steps -= 1
+    def pay(self, items: int, span: Span) -> None:
+        """Use up the steps of making or going through a value of so many items."""
+        self.step(span, items // self.ITEMS_PER_STEP)
+
+    def step(self, span: Span, count: int = 1) -> None:
+        """Use up steps."""
+        self.steps -= count
         if self.steps < 0:
             raise fail("budget-exceeded", f"the program takes more than {self.MOST_STEPS:,} steps", span,
                        "the budget ends here", ("make loops shorter",))  # fmt: skip
@@ -61,13 +73,18 @@ class Environment:
     __slots__ = ("library", "names", "parent", "shared")
 
     def __init__(
-        self, names: dict[str, ModelValue], parent: Environment | None = None, *, library: bool = False
+        self,
+        names: dict[str, ModelValue],
+        parent: Environment | None = None,
+        *,
+        library: bool = False,
+        user: bool = False,
     ) -> None:
-        """Take the names and the enclosing environment."""
+        """Take the names and the enclosing environment; one inside a library's is a library's unless it is the user's."""
         self.names = names
         self.parent = parent
         self.shared: dict[str, Environment] = {}
-        self.library = library or (parent is not None and parent.library)
+        self.library = not user and (library or (parent is not None and parent.library))
 
     def find(self, name: str) -> Environment | None:
         """The innermost environment that has a name."""
@@ -92,8 +109,8 @@ class Environment:
             current = current.parent
         close = get_close_matches(name, sorted(known), 1, 0.75)
         hints = (f"`{close[0]}` has a similar name",) if close else ()
-        if not close and "network" not in known:
-            hints = ("names such as `road` come with `model scenic.domains.driving.model`",)
+        if not close and "roadDirection" not in known:
+            hints = ("names such as `road` and `Car` come with `model scenic.domains.driving.model`",)
         raise fail("unknown-name", f"`{name}` is not defined", span, "not found", hints)
 
     def set(self, name: str, value: ModelValue) -> None:
@@ -107,10 +124,12 @@ class Runner(Protocol):
     Attributes:
         version: The version of Scenic that the program is read as.
         budget: What the program may still use.
+        params: Global parameters: value, place, whether a library sets it.
     """
 
     version: int
     budget: Budget
+    params: dict[str, tuple[ModelValue, Span, bool]]
 
     def ego(self, span: Span) -> Instance:
         """The ego.
@@ -143,4 +162,8 @@ class Runner(Protocol):
 
     def make_instance(self, node: ast.New, scope: Environment) -> Instance:
         """Make a point, oriented point or object."""
+        ...
+
+    def exclude(self, index: Index, options: list[int], span: Span) -> None:
+        """Require that a random choice does not come out as one of some options, because they have no value."""
         ...

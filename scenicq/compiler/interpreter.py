@@ -3,17 +3,25 @@
 The interpreter collects objects, requirements and parameters; `program` turns them into a scenario.
 """
 
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, assert_never, cast
 
 from scenicq.compiler import operators
+from scenicq.compiler.arithmetic import plain_binary
 from scenicq.compiler.builtins import truth
+from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_boolean, to_region, to_scalar
+from scenicq.compiler.comparisons import iterate
 from scenicq.compiler.environment import Budget, Environment
-from scenicq.compiler.expressions import assign, evaluate, iterate, plain_binary
+from scenicq.compiler.expressions import assign, evaluate
+from scenicq.compiler.imports import import_into
 from scenicq.compiler.placing import Surroundings, bind
 from scenicq.compiler.specifiers import construct
 from scenicq.compiler.values import (
@@ -32,11 +40,15 @@ from scenicq.compiler.values import (
 )
 from scenicq.errors import Diagnostic, ScenarioError, Span
 from scenicq.forest import build
-from scenicq.forest.nodes import Constant, Node
+from scenicq.forest.nodes import Identity, Index, Node, Select
 from scenicq.geometry.regions import Everywhere
 from scenicq.syntax import ast
 
 __all__ = ["Interpreter", "Requirement"]
+
+
+_OBJECT_STEPS = 300
+"""Steps that an object takes: its properties and requirements are work later on, too."""
 
 
 class _Break(Exception):
@@ -80,6 +92,7 @@ class Interpreter:
     requirements: list[Requirement] = field(default_factory=list[Requirement])
     soft: list[Span] = field(default_factory=list[Span])
     params: dict[str, tuple[ModelValue, Span, bool]] = field(default_factory=dict[str, Any])
+    excluded: dict[Identity, tuple[Index, set[int], Span]] = field(default_factory=dict[Identity, Any])
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
     workspace: Node = field(default_factory=lambda: build.constant(Everywhere()))
@@ -89,8 +102,9 @@ class Interpreter:
     def ego(self, span: Span) -> Instance:
         """The ego; see `Runner`."""
         if self.current_ego is None:
+            example = "ego = new Car" if self.version == 3 else "ego = Car"
             raise fail("no-ego", "the ego is used before it is defined", span, "refers to the ego",
-                       ("define it first, as in `ego = new Car`",))  # fmt: skip
+                       (f"define it first, as in `{example}`",))  # fmt: skip
         return self.current_ego
 
     def name_value(self, name: str, value: ModelValue, scope: Environment, span: Span) -> None:
@@ -98,28 +112,43 @@ class Interpreter:
         if isinstance(value, Delayed):
             raise fail("wrong-type", "this needs the position of an object", span, "no object here",
                        ("use it in a specifier, or write `F at V`",))  # fmt: skip
+        if name == "ego":
+            self._set_ego(value, span)
+            return
         if isinstance(value, Instance) and value.index is not None and not value.label and not scope.library:
             value.label = name
-        if name == "ego":
-            self._set_ego(value, scope, span)
-            return
         if name == "workspace":
             self.workspace = to_region(value, span)
         scope.set(name, value)
 
-    def _set_ego(self, value: ModelValue, scope: Environment, span: Span) -> None:
-        if isinstance(value, ScenicClass):
-            value = self._make(value, (), scope, span)
-            value.label = "ego"
+    def _set_ego(self, value: ModelValue, span: Span) -> None:
         if not (isinstance(value, Instance) and value.index is not None):
-            raise fail("wrong-type", "the ego must be an object", span, f"this is {describe(value)}")
+            bare = isinstance(value, ScenicClass)
+            raise fail("wrong-type", "the ego must be an object", span, f"this is {describe(value)}",
+                       (f"write `ego = new {value.name}`",) if bare else ())  # fmt: skip
         self.current_ego = value
+
+    def exclude(self, index: Index, options: list[int], span: Span) -> None:
+        """Require that a random choice does not come out as one of some options; see `Runner`."""
+        if options:
+            self.excluded.setdefault(index.identity, (index, set(), span))[1].update(options)
+
+    def exclusions(self) -> list[tuple[Node, Span]]:
+        """The conditions that `exclude` asks for."""
+        return [
+            (Select(index, tuple(build.constant(n not in options) for n in range(len(index.weights))), span=span), span)
+            for index, options, span in self.excluded.values()
+        ]
+
+    def demand(self, condition: Callable[[], Node], span: Span) -> None:
+        """Require a condition; see `specifiers.Evaluator`."""
+        self.requirements.append(Requirement(condition, span))
 
     def call_function(
         self, function: Function, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span
     ) -> ModelValue:
         """Call a function; see `Runner`."""
-        scope = Environment(_bind(function, args, named, span), cast(Environment, function.environment))
+        scope = Environment(bind_arguments(function, args, named, span), cast(Environment, function.environment))
         self.budget.enter(span)
         try:
             if not isinstance(function.body, tuple):
@@ -156,10 +185,14 @@ class Interpreter:
     def _make(
         self, cls: ScenicClass, specifiers: tuple[ast.Specifier, ...], scope: Environment, span: Span
     ) -> Instance:
-        around = Surroundings(self.version, self.ego, lambda: self.workspace)
+        is_object = cls.derives_from("Object")
+        around = Surroundings(self.version, self.ego, lambda: self.workspace, is_object=is_object)
         kept = [node for node in specifiers if not self._is_dynamic(node)]
         bound = tuple(bind(node, lambda part: evaluate(self, part, scope), around) for node in kept)
-        is_object = cls.derives_from("Object")
+        if scope.library:
+            bound = tuple(replace(specifier, explicit=False) for specifier in bound)
+        if is_object:
+            self.budget.step(span, _OBJECT_STEPS)
         instance = Instance(cls, len(self.objects) if is_object else None, span)
         if is_object:
             self.objects.append(instance)
@@ -169,7 +202,7 @@ class Interpreter:
     def _is_dynamic(self, node: ast.Specifier) -> bool:
         if not (isinstance(node, ast.WithSpecifier) and node.property == "behavior"):
             return False
-        self._dynamic("with behavior", node.span)
+        self.dynamic("with behavior", node.span)
         return True
 
     def default(self, definition: PropertyDefinition, instance: Instance) -> ModelValue:
@@ -189,13 +222,13 @@ class Interpreter:
         for statement in body:
             self._execute(statement, scope)
 
-    def _execute(self, node: ast.Statement, scope: Environment) -> None:  # noqa: PLR0912
+    def _execute(self, node: ast.Statement, scope: Environment) -> None:
         self.budget.step(node.span)
         match node:
             case ast.ExpressionStatement():
-                evaluate(self, node.value, scope)
+                self._value(node.value, scope)
             case ast.Assign():
-                value = evaluate(self, node.value, scope)
+                value = self._value(node.value, scope)
                 for target in node.targets:
                     assign(self, target, value, scope)
             case ast.AugmentedAssign():
@@ -217,14 +250,14 @@ class Interpreter:
             case ast.Pass():
                 pass
             case ast.FunctionDef():
-                self._refuse_decorators(node.decorators)
+                refuse_decorators(node.decorators)
                 scope.set(node.name, self.make_function(node.name, node.parameters, node.body, scope, node.span))
             case ast.Return():
-                raise _Return(None if node.value is None else evaluate(self, node.value, scope))
+                raise _Return(None if node.value is None else self._value(node.value, scope))
             case ast.ClassDef():
-                scope.set(node.name, self._class(node, scope))
+                scope.set(node.name, define_class(self, node, scope))
             case ast.Import() | ast.ImportFrom() | ast.Model():
-                self._import(node, scope)
+                import_into(node, scope, self.load, self.version)
             case ast.Param():
                 for item in node.items:
                     self.params[item.name] = (evaluate(self, item.value, scope), item.span, scope.library)
@@ -238,22 +271,36 @@ class Interpreter:
             case ast.Global() | ast.Nonlocal():
                 self._share(node, scope)
             case ast.Simulator():
-                self._dynamic("simulator", node.span)
+                self.dynamic("simulator", node.span)
             case ast.DynamicStatement() | ast.DynamicDefinition():
-                self._dynamic(node.kind, node.span)
+                self.dynamic(node.kind, node.span)
                 if isinstance(node, ast.DynamicDefinition) and node.name:
                     scope.set(node.name, None)
             case ast.RequireMonitor():
-                self._dynamic("require monitor", node.span)
+                self.dynamic("require monitor", node.span)
             case ast.Delete() | ast.Raise() | ast.Try() | ast.WithStatement() | ast.UnsupportedStatement():
                 word = node.span.text.split()[0].rstrip(":")
-                raise fail("unsupported-construct", f"`{word}` is not supported", node.span, "not needed for a scene")
+                raise fail("unsupported-construct", f"`{word}` is not supported", node.span, "not needed for a scene",
+                           ("write what the scene needs with assignments, `if`, `for` and functions",))  # fmt: skip
             case ast.PropertyDefault():
                 raise fail("parse-error", "a property line belongs in a class", node.span)
             case _:
                 assert_never(node)
 
-    def _dynamic(self, kind: str, span: Span) -> None:
+    def _value(self, node: ast.Expression, scope: Environment) -> ModelValue:
+        """An expression's value; up to Scenic 2 the bare name of a class is an instance of it."""
+        value = evaluate(self, node, scope)
+        bare = isinstance(value, ScenicClass) and isinstance(node, ast.Name | ast.Attribute)
+        if bare and self.version < 3 and not scope.library:
+            return self._make(cast(ScenicClass, value), (), scope, node.span)
+        return value
+
+    def dynamic(self, kind: str, span: Span) -> None:
+        """Refuse what does not describe one instant, or note that it is ignored.
+
+        Raises:
+            ScenarioError: unsupported-construct, unless dynamic parts are to be ignored.
+        """
         found = Diagnostic(
             "unsupported-construct",
             f"`{kind}` is not supported",
@@ -297,77 +344,17 @@ class Interpreter:
                 return
         self.run(node.orelse, scope)
 
-    def _refuse_decorators(self, decorators: tuple[ast.Expression, ...]) -> None:
-        if decorators:
-            raise fail("unsupported-construct", "decorators are not supported", decorators[0].span, "a decorator")
-
     def _share(self, node: ast.Global | ast.Nonlocal, scope: Environment) -> None:
         for name in node.names:
             outer = scope.parent
-            while isinstance(node, ast.Global) and outer is not None and outer.parent is not None and outer.parent.parent:
+            while (
+                isinstance(node, ast.Global) and outer is not None and outer.parent is not None and outer.parent.parent
+            ):
                 outer = outer.parent
             found = outer.find(name.id) if outer is not None else None
             if found is None:
                 raise fail("unknown-name", f"`{name.id}` is not defined outside", name.span)
             scope.shared[name.id] = found
-
-    def _class(self, node: ast.ClassDef, scope: Environment) -> ScenicClass:
-        self._refuse_decorators(node.decorators)
-        if len(node.bases) > 1:
-            raise fail("unsupported-construct", "a class with several bases is not supported", node.bases[1].span)
-        base = evaluate(self, node.bases[0].value, scope) if node.bases else scope.get("Object", node.name_span)
-        if not isinstance(base, ScenicClass):
-            raise fail("wrong-type", "a class must derive from a class of objects", node.bases[0].span,
-                       f"this is {describe(base)}")  # fmt: skip
-        definitions: dict[str, PropertyDefinition] = {}
-        inner = Environment({}, scope)
-        for line in node.body:
-            if isinstance(line, ast.PropertyDefault):
-                definitions[line.name] = PropertyDefinition(
-                    line.name, line.value, lambda _: None, self._needs(line.value), line.modifiers, scope,
-                    scope.library, line.span,
-                )  # fmt: skip
-            elif isinstance(line, ast.ExpressionStatement) and isinstance(line.value, ast.Constant):
-                continue
-            else:
-                self._execute(line, inner)
-        category = base.category if not scope.library or node.name.startswith("_") else node.name
-        return ScenicClass(node.name, base, definitions, inner.names, category, node.span)
-
-    @staticmethod
-    def _needs(value: ast.Expression) -> frozenset[str]:
-        """The properties of `self` that a default uses, and `position` where a field is taken at the object."""
-        found: set[str] = set()
-        stack: list[Any] = [value]
-        while stack:
-            node = stack.pop()
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "self":
-                found.add(node.name)
-            if isinstance(node, ast.RelativeTo):
-                found.add("position")
-            if isinstance(node, tuple):
-                stack.extend(cast("tuple[Any, ...]", node))
-            elif isinstance(node, ast.Node):
-                stack.extend(getattr(node, name) for name in node.__dataclass_fields__ if name != "span")
-        return frozenset(found)
-
-    def _import(self, node: ast.Import | ast.ImportFrom | ast.Model, scope: Environment) -> None:
-        match node:
-            case ast.Model():
-                scope.names.update(self.load(node.name, 0, node.name_span).names)
-            case ast.Import():
-                for alias in node.aliases:
-                    module = self.load(alias.path, 0, alias.span)
-                    scope.set(alias.name or alias.path.split(".")[-1], module)
-            case ast.ImportFrom():
-                module = self.load(node.module, node.level, node.span)
-                for alias in node.aliases:
-                    if alias.path == "*":
-                        scope.names.update(module.names)
-                    elif alias.path in module.names:
-                        scope.set(alias.name or alias.path, module.names[alias.path])
-                    else:
-                        raise fail("unknown-name", f"`{node.module}` has no `{alias.path}`", alias.span, "not found")
 
     def _require(self, node: ast.Require, scope: Environment) -> None:
         if node.probability is not None:
@@ -377,19 +364,29 @@ class Interpreter:
             if probability < 1:
                 self.soft.append(node.span)
                 return
+        wanted = node.condition
+        if isinstance(wanted, ast.Temporal | ast.Until):
+            self.dynamic(f"require {wanted.span.text.split()[0]}", wanted.span)
+            if not (isinstance(wanted, ast.Temporal) and wanted.operator == "always"):
+                return
+            wanted = wanted.operand
         names: dict[str, ModelValue] = {}
-        current: Environment | None = scope
-        while current is not None and current.parent is not None:
+        current = scope
+        while current.parent is not None:
             names = current.names | names
             current = current.parent
-        frozen = Environment(names, current)
+        self.budget.step(node.span, 20 + len(names))
+        frozen, ego = Environment(names, current), self.current_ego
 
         def condition() -> Node:
-            value = evaluate(self, node.condition, frozen)
+            # names and the ego are those of the moment of the statement
+            before, self.current_ego = self.current_ego, ego
+            value = evaluate(self, wanted, frozen)
+            self.current_ego = before
             if isinstance(value, Delayed):
-                raise fail("wrong-type", "this needs the position of an object", node.condition.span,
+                raise fail("wrong-type", "this needs the position of an object", wanted.span,
                            "no object here", ("write `F at V`",))  # fmt: skip
-            return to_boolean(value, node.condition.span)
+            return to_boolean(value, wanted.span)
 
         self.requirements.append(Requirement(condition, node.span))
 
@@ -399,29 +396,6 @@ class Interpreter:
         targets = [evaluate(self, part, scope) for part in node.objects] or list(self.objects)
         for target in targets:
             if not isinstance(target, Instance):
-                raise fail("wrong-type", "only objects can be mutated", node.span, f"this is {describe(target)}")
-            target.mutation = None if isinstance(amount, Constant) and amount.value == 0 else amount
-
-
-def _bind(function: Function, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span) -> dict[str, ModelValue]:
-    """The names that a call gives to a function's parameters."""
-    names: dict[str, ModelValue] = {}
-    rest = list(args)
-    given = dict(named)
-    for parameter in function.parameters:
-        if parameter.kind == "*":
-            names[parameter.name], rest = tuple(rest), []
-        elif parameter.kind == "**":
-            names[parameter.name], given = given, {}
-        elif parameter.kind != "keyword-only" and rest:
-            names[parameter.name] = rest.pop(0)
-        elif parameter.kind != "positional-only" and parameter.name in given:
-            names[parameter.name] = given.pop(parameter.name)
-        elif parameter.name in function.defaults:
-            names[parameter.name] = function.defaults[parameter.name]
-        else:
-            raise fail("wrong-arity", f"`{function.name}` needs a value for `{parameter.name}`", span, "called here")
-    if rest or given:
-        extra = f"`{next(iter(given))}`" if given else f"{len(rest)} more value{'s' * (len(rest) > 1)}"
-        raise fail("wrong-arity", f"`{function.name}` cannot take {extra}", span, "called here")
-    return names
+                raise fail("wrong-type", "only objects can be mutated", node.span, f"this is {describe(target)}",
+                           ("name the objects, or write `mutate` for all",))  # fmt: skip
+            target.mutation = amount

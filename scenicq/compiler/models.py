@@ -1,8 +1,8 @@
 """World models: what `model scenic.domains.driving.model` and its like bring in, over one map.
 
 The classes are written in Scenic (`library/*.scenic`) and read by the same front end as users' programs; the road
-network comes from the dataset. Simulators' models resolve to the same classes: what a simulator adds over time has no
-meaning at one instant.
+network comes from the dataset. A simulator's model has the classes and sizes that Scenic's has; what a simulator adds
+over time has no meaning at one instant. The driving domain itself has CARLA's classes too: datasets label them.
 """
 
 from __future__ import annotations
@@ -11,61 +11,106 @@ from functools import cache
 from importlib import resources
 
 from scenicq.compiler.builtins import mathematics
-from scenicq.compiler.values import ModelValue, Module, fail
+from scenicq.compiler.elements import MANEUVER_TYPES
+from scenicq.compiler.values import Builtin, ModelValue, Module, fail
 from scenicq.errors import Source, Span
 from scenicq.forest import build
-from scenicq.geometry.elements import Intersection, Lane, LaneGroup, LaneSection, NetworkElement, Road
+from scenicq.geometry.elements import (
+    Intersection,
+    Lane,
+    LaneGroup,
+    LaneSection,
+    Maneuver,
+    NetworkElement,
+    PedestrianCrossing,
+    Road,
+    Shoulder,
+    Sidewalk,
+)
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import union
 from scenicq.syntax import ast
 from scenicq.syntax.parser import parse
 
-__all__ = ["library_text", "known_modules", "network_names", "plain_module"]
+__all__ = ["default_library", "is_dynamic", "libraries_of", "library_text", "network_names", "plain_module"]
 
-_DRIVING = (
-    "scenic.domains.driving.model",
-    "scenic.simulators.carla.model",
-    "scenic.simulators.lgsvl.model",
-    "scenic.simulators.gta.model",
-    "scenic.simulators.metadrive.model",
-    "scenic.simulators.newtonian.driving_model",
-    "scenic.simulators.webots.road.model",
-)
-_LIBRARIES = ("driving.scenic", "carla.scenic")
+_LIBRARIES: dict[str, tuple[str, ...]] = {
+    "scenic.domains.driving.model": ("driving", "traffic"),
+    "scenic.simulators.carla.model": ("driving", "traffic", "carla"),
+    "scenic.simulators.lgsvl.model": ("driving", "traffic", "lgsvl"),
+    "scenic.simulators.metadrive.model": ("driving", "traffic"),
+    "scenic.simulators.newtonian.model": ("driving", "traffic", "newtonian"),
+    "scenic.simulators.newtonian.driving_model": ("driving", "traffic", "newtonian"),
+    "scenic.simulators.gta.model": ("gta",),
+    "scenic.simulators.webots.road.model": ("webots_road",),
+    "scenic.simulators.webots.mars.model": ("mars",),
+    "carla": ("driving", "traffic", "carla"),
+    "gta": ("gta",),
+    "gtaLib": ("gta",),
+    "mars": ("mars",),
+}
+_NO_MAP = frozenset({"mars"})
+_DYNAMIC = frozenset({"actions", "behaviors", "monitors", "simulator", "simulators", "controllers", "sensors"})
+_MAP_FILES = {"setLocalMap", "setMapPath", "mapPath", "setLocalWorld", "worldPath"}
+_ELEMENTS = (
+    Intersection, Lane, LaneGroup, LaneSection, Maneuver, Network, NetworkElement, PedestrianCrossing, Road, Shoulder,
+    Sidewalk,
+)  # fmt: skip
 
 
 @cache
 def library_text(name: str) -> ast.Module:
     """The syntax of one of the library's files."""
-    text = resources.files(__package__).joinpath("library", name).read_text(encoding="utf-8")
-    return parse(Source(f"<{name}>", text), 3)
-
-
-def known_modules() -> tuple[str, ...]:
-    """The models and modules that resolve."""
-    return (*_DRIVING, "scenic.domains.driving.roads", "math")
+    text = resources.files("scenicq.compiler").joinpath("library", f"{name}.scenic").read_text(encoding="utf-8")
+    return parse(Source(f"<{name}.scenic>", text), 3)
 
 
 def libraries_of(name: str) -> tuple[str, ...]:
     """The library files that a model stands for; empty for what is not a model."""
-    return _LIBRARIES if name in _DRIVING else ()
+    return _LIBRARIES.get(name, ())
 
 
-def network_names(network: Network) -> dict[str, ModelValue]:
-    """The names that a driving model gives to the parts of the map."""
+_GTA_ONLY = frozenset({"EgoCar", "CarModel", "CarColor", "createPlatoonAt", "carAheadOfCar", "BUS", "Compact"})
+
+
+def default_library(version: int, used: frozenset[str]) -> str:
+    """The model of a program that names none, as the papers print theirs: the line that imports it is left out.
+
+    Args:
+        version: The version of Scenic, 1 or 2.
+        used: The names that the program uses.
+    """
+    return "gtaLib" if version == 1 or used & _GTA_ONLY else "scenic.domains.driving.model"
+
+
+def is_dynamic(name: str) -> bool:
+    """Whether a module of Scenic's holds only what happens over time."""
+    return name.startswith("scenic.") and name.rsplit(".", 1)[-1] in _DYNAMIC
+
+
+def network_names(network: Network, library: str) -> dict[str, ModelValue]:
+    """The names that a model gives to the parts of the map."""
+    if library in _NO_MAP:
+        return {}
+    drivable, walkable = network.drivableRegion, network.walkableRegion
     regions = {
-        "road": network.drivableRegion,
+        "road": drivable,
         "curb": network.curbRegion,
         "sidewalk": network.sidewalkRegion,
         "shoulder": network.shoulderRegion,
         "crossing": network.crossingRegion,
-        "roadOrShoulder": union(network.drivableRegion, network.shoulderRegion),
+        "roadOrShoulder": union(drivable, network.shoulderRegion) if network.shoulders else drivable,
         "intersection": network.intersectionRegion,
         "roadDirection": network.roadDirection,
-        "roadOrientation": network.roadDirection,
     }
+    if library == "webots_road":
+        regions |= {"nonIntersection": network.roadRegion, "walkway": walkable}
     names: dict[str, ModelValue] = {name: build.constant(value) for name, value in regions.items()}
     return names | {"network": network}
+
+
+def _ignored(span: Span, *_: ModelValue, **__: ModelValue) -> ModelValue:
+    return None
 
 
 def plain_module(name: str, span: Span) -> Module:
@@ -74,11 +119,17 @@ def plain_module(name: str, span: Span) -> Module:
     Raises:
         ScenarioError: unknown-model.
     """
-    if name == "math":
-        return Module("math", mathematics())
-    if name == "scenic.domains.driving.roads":
-        classes = {cls.__name__: cls for cls in (Intersection, Lane, LaneGroup, LaneSection, NetworkElement, Road)}
-        return Module(name, dict[str, ModelValue](classes))
-    raise fail("unknown-model", f"`{name}` is not a model or module known here", span, "not found",
-               ("known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, and `math`",
-                "a scenario never imports Python code: write what it needs in Scenic"))  # fmt: skip
+    match name:
+        case "math":
+            return Module("math", mathematics())
+        case "scenic.domains.driving.roads":
+            return Module(name, {"ManeuverType": MANEUVER_TYPES, **{cls.__name__: cls for cls in _ELEMENTS}})
+        case "scenic.simulators.gta.map" | "scenic.simulators.carla.map" | "scenic.simulators.webots.road.world":
+            # the map comes from the dataset
+            return Module(name, {each: Builtin(each, _ignored) for each in _MAP_FILES})
+        case "scenic":
+            return Module(name, {})
+        case _:
+            raise fail("unknown-model", f"`{name}` is not a model or module known here", span, "not found",
+                       ("known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, and `math`",
+                        "a scenario never imports Python code: write what it needs in Scenic"))  # fmt: skip

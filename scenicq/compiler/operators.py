@@ -6,8 +6,7 @@ Every function takes evaluated values and the span of the construct; the ego is 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, cast
+from typing import cast
 
 from scenicq.compiler.coerce import (
     kind_of_model,
@@ -21,9 +20,10 @@ from scenicq.compiler.coerce import (
     to_vector,
 )
 from scenicq.compiler.roots import oriented_point
-from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, describe, fail, is_node
+from scenicq.compiler.values import Delayed, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
+from scenicq.forest.compute import fold
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     ArithmeticOp,
@@ -36,13 +36,21 @@ from scenicq.forest.nodes import (
     Intersects,
     LogicOp,
     Node,
+    Range,
     RegionDifference,
     RegionIntersection,
     RegionUnion,
     Select,
 )
-from scenicq.forest.compute import fold
-from scenicq.geometry.regions import Region, orientation_of
+from scenicq.geometry.regions import (
+    DifferenceOf,
+    IntersectionOf,
+    PolygonSet,
+    PolylineSet,
+    Region,
+    UnionOf,
+    orientation_of,
+)
 
 __all__ = [
     "along",
@@ -52,15 +60,22 @@ __all__ = [
     "can_see",
     "combine",
     "compare",
+    "degrees",
     "direction_at",
+    "distance_past",
     "distance_to",
+    "existing",
     "follow",
+    "intersects",
     "is_field",
     "negate",
     "object_box",
     "offset",
-    "oriented",
     "orientation",
+    "oriented",
+    "region_difference",
+    "region_intersection",
+    "region_union",
     "relative_heading",
     "relative_to",
     "visible_region",
@@ -68,7 +83,11 @@ __all__ = [
 ]
 
 FOLLOW_STEPS = 4
-"""Steps of forward Euler along a field (language paper, appendix B)."""
+"""Steps of forward Euler along a field (language paper, appendix B), the least number in later versions."""
+_FOLLOW_STEP = 5.0
+"""Metres of the longest step in later versions."""
+_LARGEST_REGION = 5_000
+"""Parts of a region that is combined from others."""
 
 _BINARY: dict[str, ArithmeticOp] = {op.value: op for op in ArithmeticOp if not op.value[0].isalpha()}
 _COMPARE: dict[str, CompareOp] = {op.value: op for op in CompareOp}
@@ -128,6 +147,9 @@ def direction_at(field: ModelValue, point: ModelValue, span: Span | None) -> Nod
 def relative_to(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
     """`X relative to Y`: headings and fields add up, a vector is offset from an oriented point or another vector."""
     if is_field(left) or is_field(right):
+        for value in (left, right):
+            if not is_field(value):
+                to_heading(value, span)
 
         def at_object(value: ModelValue, instance: Instance) -> Node:
             position = property_node(instance, "position", span)
@@ -137,13 +159,21 @@ def relative_to(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
             frozenset({"position"}),
             lambda instance: build.add(at_object(left, instance), at_object(right, instance), span),
         )
-    vector_like = kind_of_model(left) == "vector" or isinstance(left, tuple | list)
-    if vector_like or (isinstance(left, Instance) and not left.oriented):
+    if _is_offset(left):
         return offset(right, left, span)
+    if _is_offset(right):
+        return offset(left, right, span)
     if isinstance(left, Instance) and isinstance(right, Instance):
         raise fail("wrong-type", "`relative to` of two oriented points is ambiguous", span, "a heading or a position?",
                    ("write `A.heading relative to B.heading` or `A.position relative to B`",))  # fmt: skip
     return build.add(to_heading(left, span), to_heading(right, span), span)
+
+
+def _is_offset(value: ModelValue) -> bool:
+    """Whether a value has a position but no heading."""
+    if isinstance(value, Instance):
+        return not value.oriented
+    return kind_of_model(value) == "vector" or isinstance(value, tuple | list)
 
 
 def offset(origin: ModelValue, by: ModelValue, span: Span) -> ModelValue:
@@ -188,12 +218,21 @@ def angle_to(target: ModelValue, origin: ModelValue, span: Span) -> Node:
 
 def distance_to(target: ModelValue, origin: ModelValue, span: Span) -> Node:
     """`distance from X to Y`: between positions, or to a region (0 inside)."""
-    start = to_vector(origin, span)
-    if kind_of_model(target) == "region":
-        return fold(Distance(to_region(target, span), start, span=span))
-    if kind_of_model(origin) == "region":
-        return fold(Distance(to_region(origin, span), to_vector(target, span), span=span))
-    return build.norm(build.vector_difference(to_vector(target, span), start, span), span)
+    for region, point in ((target, origin), (origin, target)):
+        if kind_of_model(region) == "region":
+            return fold(Distance(existing(region, span), to_vector(point, span), span=span))
+    return build.norm(build.vector_difference(to_vector(target, span), to_vector(origin, span), span), span)
+
+
+def distance_past(point: ModelValue, origin: ModelValue, span: Span) -> Node:
+    """`distance past V of OP`: how far OP is ahead of V along OP's own heading."""
+    if not (isinstance(origin, Instance) and origin.oriented):
+        raise fail(
+            "wrong-type", "`distance past` needs an oriented point or object", span, f"this is {describe(origin)}"
+        )
+    line = build.vector_difference(to_vector(origin, span), to_vector(point, span), span)
+    back = build.arithmetic(ArithmeticOp.NEG, to_heading(origin, span), span=span)
+    return build.coordinate(build.rotate(line, back, span), 1, span)
 
 
 def visible_region(viewer: ModelValue, span: Span | None) -> Node:
@@ -231,9 +270,22 @@ def can_see(viewer: ModelValue, target: ModelValue, span: Span) -> Node:
     return fold(Contains(seen, to_vector(target, span), span=span))
 
 
+def existing(value: ModelValue, span: Span | None) -> Node:
+    """A region that something is placed in or tested against.
+
+    Raises:
+        ScenarioError: map-lacks, where the map has nothing of the kind; wrong-type.
+    """
+    area = to_region(value, span)
+    if isinstance(area, Constant) and isinstance(area.value, PolygonSet | PolylineSet) and not area.value.pieces:
+        raise fail("map-lacks", f"the map has no {area.value.name}", span, "there is none",
+                   ("the map of another dataset may have it", "leave out what the program asks of it"))  # fmt: skip
+    return area
+
+
 def within(item: ModelValue, region: ModelValue, span: Span) -> Node:
     """`X in R`: a point in a region; an object with all of its box."""
-    area = to_region(region, span)
+    area = existing(region, span)
     if _is_object(item):
         return fold(Encloses(area, object_box(item, span), span=span))
     return fold(Contains(area, to_vector(item, span), span=span))
@@ -241,23 +293,52 @@ def within(item: ModelValue, region: ModelValue, span: Span) -> Node:
 
 def intersects(left: ModelValue, right: ModelValue, span: Span) -> Node:
     """`X intersects Y` of objects and regions."""
-    shapes = [object_box(value, span) if _is_object(value) else to_region(value, span) for value in (left, right)]
+    shapes = [object_box(value, span) if _is_object(value) else existing(value, span) for value in (left, right)]
     return fold(Intersects(shapes[0], shapes[1], span=span))
+
+
+def _combined(parts: tuple[Node, ...], made: Node, span: Span) -> Node:
+    """A region made from others, unless it grows beyond all bounds (shared parts count as often as they are used)."""
+    size, stack = 0, [*parts]
+    while stack and size <= _LARGEST_REGION:
+        part = stack.pop()
+        size += 1
+        match part:
+            case RegionUnion() | RegionIntersection():
+                stack += part.parts
+            case RegionDifference():
+                stack += [part.base, part.removed]
+            case Select():
+                stack += part.options
+            case Constant(value=UnionOf() | IntersectionOf() as region):
+                stack += [Constant(inner) for inner in region.parts]
+            case Constant(value=DifferenceOf() as region):
+                stack += [Constant(region.base), Constant(region.removed)]
+            case _:
+                pass
+    if size > _LARGEST_REGION:
+        raise fail(
+            "budget-exceeded", f"a region is combined from more than {_LARGEST_REGION:,} parts", span, "grows here"
+        )
+    return fold(made)
 
 
 def region_union(left: ModelValue, right: ModelValue, span: Span) -> Node:
     """What lies in either region."""
-    return fold(RegionUnion((to_region(left, span), to_region(right, span)), span=span))
+    parts = to_region(left, span), to_region(right, span)
+    return parts[0] if parts[0] is parts[1] else _combined(parts, RegionUnion(parts, span=span), span)
 
 
 def region_intersection(left: ModelValue, right: ModelValue, span: Span) -> Node:
     """What lies in both regions."""
-    return fold(RegionIntersection((to_region(left, span), to_region(right, span)), span=span))
+    parts = to_region(left, span), to_region(right, span)
+    return parts[0] if parts[0] is parts[1] else _combined(parts, RegionIntersection(parts, span=span), span)
 
 
 def region_difference(left: ModelValue, right: ModelValue, span: Span) -> Node:
     """What lies in the left region only."""
-    return fold(RegionDifference(to_region(left, span), to_region(right, span), span=span))
+    parts = to_region(left, span), to_region(right, span)
+    return _combined(parts, RegionDifference(*parts, span=span), span)
 
 
 def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
@@ -283,13 +364,21 @@ def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
             return None
 
 
-def follow(field: ModelValue, start: ModelValue, distance: ModelValue, span: Span) -> Instance:
-    """`follow F from V for S`: forward Euler in four steps, and the field's heading at the end (appendix B)."""
-    point = to_vector(start, span)
-    step = build.arithmetic(
-        ArithmeticOp.DIV, to_scalar(distance, span), build.constant(float(FOLLOW_STEPS)), span=span
-    )
-    for _ in range(FOLLOW_STEPS):
+def _follow_steps(distance: Node, version: int) -> int:
+    """How many steps: later versions take steps of at most 5 m where the distance, or the most it can be, is known."""
+    if version == 1:
+        return FOLLOW_STEPS
+    ends = (distance.low, distance.high) if isinstance(distance, Range) else (distance,)
+    known = [end.value for end in ends if isinstance(end, Constant) and isinstance(end.value, float)]
+    return max([FOLLOW_STEPS, *(min(math.ceil(value / _FOLLOW_STEP), 100) for value in known)])
+
+
+def follow(field: ModelValue, start: ModelValue, distance: ModelValue, version: int, span: Span) -> Instance:
+    """`follow F from V for S`: forward Euler, and the field's heading at the end (appendix B)."""
+    point, length = to_vector(start, span), to_scalar(distance, span)
+    count = _follow_steps(length, version)
+    step = build.arithmetic(ArithmeticOp.DIV, length, build.constant(float(count)), span=span)
+    for _ in range(count):
         ahead = build.vector(build.constant(0.0), step, span)
         point = build.vector_sum(point, build.rotate(ahead, direction_at(field, point, span), span), span)
     return oriented(point, direction_at(field, point, span))
@@ -300,20 +389,3 @@ def degrees(value: ModelValue, span: Span) -> ModelValue:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return math.radians(value)
     return build.arithmetic(ArithmeticOp.MUL, to_scalar(value, span), build.constant(math.pi / 180), span=span)
-
-
-def map_choice(value: ModelValue, function: Callable[[Any], ModelValue], span: Span | None) -> ModelValue:
-    """Apply a function to each option of a random choice; an expression if all results can be one."""
-    if not isinstance(value, Choice):
-        return function(value)
-    return make_choice(value.index, [function(option) for option in value.options], span)
-
-
-def make_choice(index: Any, options: list[ModelValue], span: Span | None) -> ModelValue:
-    """A random choice as an expression where all options are numbers, vectors or regions of one kind."""
-    kinds = {kind_of_model(option) for option in options}
-    plain = all(not isinstance(option, Instance) and kind_of_model(option) is not None for option in options)
-    elements = any(kind_of_model(option) == "region" and not is_node(option) for option in options)
-    if plain and len(kinds) == 1 and not elements:
-        return Select(index, tuple(to_node(option, span) for option in options), span=span)
-    return Choice(index, tuple(options))

@@ -1,18 +1,25 @@
 """What each specifier of the language means (language paper, appendix B.3; Scenic 3's changes in its 2D mode)."""
 
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import assert_never, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to_region, to_scalar, to_vector
+from scenicq.compiler.choices import holds_instances, make_choice
+from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to_scalar, to_vector
+from scenicq.compiler.environment import FIRST_NAMES
 from scenicq.compiler.specifiers import BoundSpecifier
-from scenicq.compiler.values import Delayed, Instance, ModelValue, fail, lift
+from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, lift
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import Feature, Node, PointIn, RegionDifference
 from scenicq.forest.compute import fold
+from scenicq.forest.nodes import Feature, Index, Node, PointIn, RegionDifference, Select
 from scenicq.syntax import ast
 
 __all__ = ["Surroundings", "bind"]
@@ -27,18 +34,17 @@ class Surroundings:
         version: The version of Scenic.
         ego: Gives the ego, or fails where there is none yet.
         workspace: The workspace's region.
+        is_object: Whether an object, rather than a point, is being placed.
     """
 
     def __init__(
-        self,
-        version: int,
-        ego: Callable[[Span], Instance],
-        workspace: Callable[[], Node],
+        self, version: int, ego: Callable[[Span], Instance], workspace: Callable[[], Node], *, is_object: bool
     ) -> None:
         """Take what the interpreter knows."""
         self.version = version
         self.ego = ego
         self.workspace = workspace
+        self.is_object = is_object
 
 
 def _specifier(
@@ -48,11 +54,15 @@ def _specifier(
     *arguments: ModelValue,
     optionally: str = "",
     needs: str = "",
+    rank: int = 3,
+    modifies: str = "",
+    condition: Callable[[Instance], Node] | None = None,
 ) -> BoundSpecifier:
     delayed = frozenset[str]().union(*(argument.needs for argument in arguments if isinstance(argument, Delayed)))
     return BoundSpecifier(
-        frozenset(gives.split()), frozenset(optionally.split()), frozenset(needs.split()) | delayed, evaluate, span
-    )
+        frozenset(gives.split()), frozenset(optionally.split()), frozenset(needs.split()) | delayed, evaluate, span,
+        rank=rank, modifies=modifies, condition=condition,
+    )  # fmt: skip
 
 
 def _known(value: ModelValue, instance: Instance) -> ModelValue:
@@ -85,8 +95,8 @@ def _own_position(instance: Instance, position: Node, span: Span) -> Node:
     return position if instance.index is None else Feature(instance.index, "position", "vector", span=span)
 
 
-def _in_region(span: Span, region: ModelValue, *, contained: bool = False) -> BoundSpecifier:
-    area = to_region(region, span)
+def _in_region(span: Span, region: ModelValue, *, contained: bool = False, modifies: bool = False) -> BoundSpecifier:
+    area = operators.existing(region, span)
     point = PointIn(area, span=span)
     has_heading = operators.orientation(area, point, span) is not None
 
@@ -96,8 +106,15 @@ def _in_region(span: Span, region: ModelValue, *, contained: bool = False) -> Bo
             given["heading"] = operators.orientation(area, _own_position(instance, point, span), span)
         return given
 
+    def inside(instance: Instance) -> Node:
+        return operators.within(property_node(instance, "position", span), area, span)
+
     gives = "position regionContainedIn" if contained else "position"
-    return _specifier(span, gives, evaluate, optionally="heading" if has_heading else "")
+    optional = "heading" if has_heading else ""
+    if not modifies:
+        return _specifier(span, gives, evaluate, optionally=optional)
+    # in the plane, projecting a position that is given otherwise onto a region is to demand that it lies there
+    return _specifier(span, gives, evaluate, optionally=optional, rank=2, modifies="position", condition=inside)
 
 
 _SIDES: dict[str, tuple[int, int]] = {"left": (-1, 0), "right": (1, 0), "ahead": (0, 1), "behind": (0, -1)}
@@ -112,14 +129,19 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
     right, ahead = _SIDES[node.direction]
     size = "width" if right else "length"
 
-    def gap() -> tuple[Node, Node]:
-        if kind_of_model(by) == "vector" or isinstance(by, tuple | list):
-            pair = to_vector(by, span)
-            return build.coordinate(pair, 0, span), build.coordinate(pair, 1, span)
-        distance = to_scalar(0.0 if by is None else by, span)
-        signed = distance if right + ahead > 0 else cast(Node, operators.negate(distance, span))
+    def gap(away: ModelValue) -> tuple[Node, Node]:
         zero = build.constant(0.0)
-        return (signed, zero) if right else (zero, signed)
+        if kind_of_model(away) == "vector" or isinstance(away, tuple | list):
+            pair = to_vector(away, span)
+            x, y = build.coordinate(pair, 0, span), build.coordinate(pair, 1, span)
+        else:
+            distance = to_scalar(0.0 if away is None else away, span)
+            x, y = (distance, zero) if right else (zero, distance)
+        if right + ahead > 0:
+            return x, y
+        # the part of the offset that points away from the edge counts outwards
+        inward = cast(Node, operators.negate(x if right else y, span))
+        return (inward, y) if right else (x, inward)
 
     def half(instance: Instance) -> Node:
         factor = build.constant(0.5 * (right + ahead))
@@ -128,7 +150,7 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
         )
 
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
-        x, y = gap()
+        x, y = gap(_known(by, instance))
         edge = half(instance)
         if isinstance(reference, Instance) and reference.index is not None:
             edge = build.add(edge, half(reference), span)
@@ -143,21 +165,47 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
     return _specifier(span, "position", evaluate, by, optionally="heading" if oriented else "", needs=needs)
 
 
-def _visible(node: ast.VisibleSpecifier | ast.NotVisibleSpecifier, viewer: ModelValue, around: Surroundings) -> BoundSpecifier:
-    seen = operators.visible_region(viewer, node.span)
-    workspace = around.workspace()
-    if isinstance(node, ast.NotVisibleSpecifier):
-        return _in_region(node.span, fold(RegionDifference(workspace, seen, span=node.span)))
-    return _in_region(node.span, operators.region_intersection(seen, workspace, node.span))
+def _visible(
+    node: ast.VisibleSpecifier | ast.NotVisibleSpecifier, viewer: ModelValue, around: Surroundings
+) -> BoundSpecifier:
+    """`visible`, `not visible`: up to Scenic 2 about the position; in Scenic 3 also about the object, however it is placed."""
+    span, hidden = node.span, isinstance(node, ast.NotVisibleSpecifier)
+    seen = operators.visible_region(viewer, span)
+    if around.version < 3:
+        whole = around.workspace()
+        return _in_region(span, fold(RegionDifference(whole, seen, span=span)) if hidden
+                          else operators.region_intersection(seen, whole, span))  # fmt: skip
+
+    def place(instance: Instance) -> Mapping[str, ModelValue]:
+        if not hidden:
+            return {"position": PointIn(seen, span=span)}
+        within = instance.properties.get("regionContainedIn")
+        area = around.workspace() if within is None else operators.existing(within, span)
+        return {"position": PointIn(operators.region_difference(area, seen, span), span=span)}
+
+    def condition(instance: Instance) -> Node:
+        sight = operators.can_see(viewer, instance, span)
+        return cast(Node, operators.combine("not", [sight], span)) if hidden else sight
+
+    needs = "regionContainedIn" if hidden and around.is_object else ""
+    return _specifier(span, "", place, optionally="position", needs=needs, condition=condition)
 
 
-def _beyond(node: ast.BeyondSpecifier, target: ModelValue, by: ModelValue, origin: ModelValue, around: Surroundings) -> BoundSpecifier:
+def _beyond(
+    node: ast.BeyondSpecifier, target: ModelValue, by: ModelValue, origin: ModelValue, around: Surroundings
+) -> BoundSpecifier:
     span = node.span
     goal = to_vector(target, span)
     sight = build.bearing(build.vector_difference(goal, to_vector(origin, span), span), span)
     is_vector = kind_of_model(by) == "vector" or isinstance(by, tuple | list)
     offset = to_vector(by, span) if is_vector else build.vector(build.constant(0.0), to_scalar(by, span), span)
-    return _position(span, build.offset_local(goal, sight, offset, span), _inherited(origin, around, span))
+    position = build.offset_local(goal, sight, offset, span)
+    if around.version < 3:
+        return _position(span, position)
+    # Scenic 3's manual says the origin's orientation, Scenic 3.1 itself takes the map's axes: either is a match
+    axes, inherited = build.constant(0.0), _inherited(origin, around, span)
+    either = axes if inherited is None else Select(Index((1.0, 1.0), span=span), (axes, inherited), span=span)
+    return _position(span, position, either)
 
 
 def _following(span: Span, end: Instance) -> BoundSpecifier:
@@ -185,7 +233,10 @@ def _facing(node: ast.FacingSpecifier, value: ModelValue) -> BoundSpecifier:
 
 def _facing_point(span: Span, target: ModelValue, *, away: bool) -> BoundSpecifier:
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
-        own, goal = to_vector(property_node(instance, "position", span), span), to_vector(_known(target, instance), span)
+        own, goal = (
+            to_vector(property_node(instance, "position", span), span),
+            to_vector(_known(target, instance), span),
+        )
         line = build.vector_difference(own, goal, span) if away else build.vector_difference(goal, own, span)
         return {"heading": build.bearing(line, span)}
 
@@ -201,7 +252,7 @@ def _apparently(span: Span, heading: ModelValue, origin: ModelValue) -> BoundSpe
     return _specifier(span, "heading", evaluate, heading, needs="position")
 
 
-def bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> BoundSpecifier:  # noqa: PLR0911, PLR0912
+def bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> BoundSpecifier:
     """The specifier that a syntax node stands for, with its arguments evaluated.
 
     Args:
@@ -212,23 +263,76 @@ def bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Bound
     Raises:
         ScenarioError: An argument has the wrong type, or the specifier is not supported.
     """
+    if isinstance(node, ast.WithSpecifier):
+        return _with(node, evaluate(node.value), around)
+    parts = [getattr(node, name) for name in node.__dataclass_fields__]
+    values = {id(part): evaluate(cast(ast.Expression, part)) for part in parts if isinstance(part, ast.Node)}
+    bound = _bind_each(node, values, around)
+    return _as_parent(bound) if around.version == 3 and "heading" in bound.optionally else bound
+
+
+def _as_parent(bound: BoundSpecifier) -> BoundSpecifier:
+    """In Scenic 3, what a place says about the heading is the orientation that `yaw` is added to."""
+
+    def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
+        given = bound.evaluate(instance)
+        return {("parentOrientation" if name == "heading" else name): value for name, value in given.items()}
+
+    return replace(bound, optionally=bound.optionally - {"heading"} | {"parentOrientation"}, evaluate=evaluate)
+
+
+def _bind_each(node: ast.Specifier, values: dict[int, ModelValue], around: Surroundings) -> BoundSpecifier:
+    """The specifier for each outcome of a random choice of objects among its arguments, as one."""
+    choice = next((value for value in values.values() if holds_instances(value)), None)
+    if choice is None:
+        return _bind(node, lambda part: values[id(part)], around)
+    choice = cast(Choice, choice)
+    options = [
+        _bind_each(node, {key: option if value is choice else value for key, value in values.items()}, around)
+        for option in choice.options
+    ]
+    if any(option.condition for option in options):
+        raise fail("unsupported-construct", "this specifier with a random object is not supported", node.span,
+                   "which object is random", ("write the condition with `require`",))  # fmt: skip
+    optional = frozenset[str].intersection(*(option.optionally for option in options))
+
+    def chosen(instance: Instance) -> Mapping[str, ModelValue]:
+        given = [option.evaluate(instance) for option in options]
+        return {name: make_choice(choice.index, [each[name] for each in given], node.span)
+                for name in options[0].gives | optional}  # fmt: skip
+
+    needs = frozenset[str]().union(*(option.needs for option in options))
+    return BoundSpecifier(options[0].gives, optional, needs, chosen, node.span)
+
+
+_IN_SPACE = frozenset({"pitch", "roll", "orientation", "shape"})
+
+
+def _with(node: ast.WithSpecifier, value: ModelValue, around: Surroundings) -> BoundSpecifier:
+    name = FIRST_NAMES.get(node.property, node.property) if around.version == 1 else node.property
+    if name in _IN_SPACE and value != 0:
+        raise fail("unsupported-construct", f"`with {name}` is not supported", node.span, "labels are matched in 2D",
+                   ("state the heading with `facing`",))  # fmt: skip
+    return _specifier(node.span, name, lambda instance: {name: _known(value, instance)}, value)
+
+
+def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> BoundSpecifier:
     span = node.span
 
     def origin(expression: ast.Expression | None) -> ModelValue:
         return around.ego(span) if expression is None else evaluate(expression)
 
     match node:
-        case ast.WithSpecifier():
-            value = evaluate(node.value)
-            name = "length" if node.property == "height" and around.version == 1 else node.property
-            return _specifier(span, name, lambda instance: {name: _known(value, instance)}, value)
         case ast.AtSpecifier():
             return _position(span, evaluate(node.position))
         case ast.OnSpecifier():
             region = evaluate(node.region)
-            if around.version == 3 and kind_of_model(region) == "vector":
+            if around.version == 3 and (kind_of_model(region) == "vector" or isinstance(region, tuple | list)):
                 return _position(span, region)
-            return _in_region(span, region)
+            if isinstance(region, Instance):
+                raise fail("unsupported-construct", "a place on an object is not supported", span,
+                           "labels are matched in 2D", ("place it `at` the object's position, or `ahead of` it",))  # fmt: skip
+            return _in_region(span, region, modifies=around.version == 3)
         case ast.InSpecifier():
             return _in_region(span, evaluate(node.region))
         case ast.ContainedInSpecifier():
@@ -251,7 +355,8 @@ def bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Bound
             by = None if node.distance is None else evaluate(node.distance)
             return _beside(node, evaluate(node.reference), by)
         case ast.FollowingSpecifier():
-            end = operators.follow(evaluate(node.field), origin(node.origin), evaluate(node.distance), span)
+            way, start, length = evaluate(node.field), origin(node.origin), evaluate(node.distance)
+            end = operators.follow(way, start, length, around.version, span)
             return _following(span, end)
         case ast.FacingSpecifier():
             return _facing(node, evaluate(node.heading))
@@ -261,6 +366,8 @@ def bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Bound
             return _facing_point(span, evaluate(node.target), away=True)
         case ast.ApparentlyFacingSpecifier():
             return _apparently(span, evaluate(node.heading), origin(node.origin))
+        case ast.WithSpecifier():
+            raise AssertionError("bound elsewhere")
         case ast.UsingSpecifier():
             raise fail("unsupported-construct", "`using` is not supported", span, "places by a function of its own",
                        ("write the place with the built-in specifiers",))  # fmt: skip

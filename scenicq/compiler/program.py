@@ -6,16 +6,26 @@ A scenario is compiled once per map: the road network is part of the program's w
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import PurePosixPath
 
 from scenicq.compiler import operators
 from scenicq.compiler.builtins import language_names
-from scenicq.compiler.coerce import to_node, to_region, to_scalar, to_vector
+from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.interpreter import Interpreter
-from scenicq.compiler.models import libraries_of, library_text, network_names, plain_module
-from scenicq.compiler.roots import OBJECT, OBJECT_VISIBLE, ORIENTED_POINT, POINT
-from scenicq.compiler.values import Choice, Instance, ModelValue, Module, fail, is_node
+from scenicq.compiler.models import (
+    default_library,
+    is_dynamic,
+    libraries_of,
+    library_text,
+    network_names,
+    plain_module,
+)
+from scenicq.compiler.roots import root_classes
+from scenicq.compiler.sequences import sequence_functions
+from scenicq.compiler.spelling import decide_version
+from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, fail, is_node
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import Constant, Encloses, Intersects, Node, Undefined
@@ -26,13 +36,12 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
 from scenicq.syntax import ast
 from scenicq.syntax.parser import parse
+from scenicq.syntax.walk import walk
 
 __all__ = ["Loader", "compile_scenario"]
 
 Loader = Callable[[str], Source | None]
 """Gives the text of a file beside the program, by its name relative to the program's folder; None if there is none."""
-
-_DEFAULT_VERSION = 3
 
 
 def compile_scenario(
@@ -56,11 +65,58 @@ def compile_scenario(
         ScenarioError: The program is wrong or uses what is not supported.
     """
     module = parse(source, version)
-    chosen = module.version or max(module.versions, default=_DEFAULT_VERSION)
+    chosen = decide_version(module)
     world = _World(network, chosen, initial, loader)
     run = world.interpreter
-    run.run(module.body, Environment({}, world.base))
-    return _scenario(run, module, chosen, network)
+    try:
+        library = _left_out(module, chosen)
+        names = {} if library is None else dict(world.load(library, 0, _start(source)).names)
+        scope = Environment({}, Environment(names, world.base, library=True), user=True)
+        run.run(module.body, scope)
+        return _scenario(run, module, chosen, network, _borrowed(module, scope, names, library))
+    except RecursionError:
+        raise fail("budget-exceeded", "the program is nested too deeply", _start(source), "",
+                   ("make expressions and calls flatter",)) from None  # fmt: skip
+    except ScenarioError as error:
+        raise _on_map(error, network) from None
+
+
+_IMPORTS = (ast.Import, ast.ImportFrom, ast.Model)
+
+
+def _start(source: Source) -> Span:
+    return Span(source, 0, min(1, len(source.text)))
+
+
+def _left_out(module: ast.Module, version: int) -> str | None:
+    """The library that an early program needs without importing any; None where it imports one."""
+    nodes = list(walk(*module.body))
+    if version == 3 or any(isinstance(node, _IMPORTS) for node in nodes):
+        return None
+    return default_library(version, frozenset(node.id for node in nodes if isinstance(node, ast.Name)))
+
+
+def _borrowed(
+    module: ast.Module, scope: Environment, names: dict[str, ModelValue], library: str | None
+) -> tuple[Diagnostic, ...]:
+    """A warning where names come from a library that the program does not import."""
+    for node in walk(*module.body):
+        if isinstance(node, ast.Name) and node.id in names and node.id not in scope.names:
+            message = f"the program imports no model: `{node.id}` is taken from `{library}`"
+            line = f"import {library}" if library == "gtaLib" else f"model {library}"
+            hints = (f"`{line}` says what is meant",)
+            return (Diagnostic("unknown-model", message, node.span, hints=hints, severity="warning"),)
+    return ()
+
+
+def _on_map(error: ScenarioError, network: Network) -> ScenarioError:
+    """The error with the name of the map in it, where the map is what it is about."""
+    told = [
+        replace(each, message=each.message.replace("the map", f"the map `{network.name}`", 1))
+        if each.code == "map-lacks" else each
+        for each in error.diagnostics
+    ]  # fmt: skip
+    return ScenarioError(told)
 
 
 class _World:
@@ -70,28 +126,29 @@ class _World:
         self.network = network
         self.loader = loader
         self.interpreter = Interpreter(version, initial, self.load)
-        names = language_names() | {"Point": POINT, "OrientedPoint": ORIENTED_POINT}
-        names["Object"] = OBJECT if version == 3 else OBJECT_VISIBLE
+        names = language_names() | sequence_functions(self.interpreter) | root_classes(version)
         self.base = Environment(names)
         self.modules: dict[str, Module] = {}
         self.loading: list[str] = []
 
     def load(self, name: str, level: int, span: Span) -> Module:
         """The module of an import or `model` statement."""
+        if is_dynamic(name):
+            self.interpreter.dynamic(f"import of {name}", span)
+            return Module(name, {}, dynamic=True)
         if name not in self.modules:
-            self.modules[name] = self._model(name) or self._file(name, level, span) or plain_module(name, span)
+            self.modules[name] = self._file(name, level, span) or self._model(name) or plain_module(name, span)
         return self.modules[name]
 
     def _model(self, name: str) -> Module | None:
         files = libraries_of(name)
         if not files:
             return None
-        scope = Environment(dict(network_names(self.network)), self.base, library=True)
-        version, self.interpreter.version = self.interpreter.version, 3
+        records = {"_record": Builtin("_record", _record), "_module": Builtin("_module", _module)}
+        scope = Environment(network_names(self.network, files[-1]) | records, self.base, library=True)
         for file in files:
             self.interpreter.run(library_text(file).body, scope)
-        self.interpreter.version = version
-        return Module(name, scope.names)
+        return Module(name, {key: value for key, value in scope.names.items() if not key.startswith("_")})
 
     def _file(self, name: str, level: int, span: Span) -> Module | None:
         path = str(PurePosixPath(*name.split("."))) + ".scenic"
@@ -115,27 +172,48 @@ class _World:
         return Module(name, scope.names)
 
 
-def _scenario(run: Interpreter, module: ast.Module, version: int, network: Network) -> Scenario:
-    whole = Span(module.source, 0, min(1, len(module.source.text)))
+def _record(_: Span, name: str, width: float, length: float) -> Module:
+    return Module(name, {"name": name, "width": width, "length": length, "height": length})
+
+
+def _module(_: Span, name: str, names: dict[str, ModelValue]) -> Module:
+    return Module(name, names)
+
+
+def _no_ego(run: Interpreter, module: ast.Module, version: int) -> ScenarioError:
+    for found in run.ignored:
+        if found.span is not None and found.span.text.startswith(("scenario", "setup")):
+            return fail("no-ego", "the program defines no ego outside of its dynamic parts", found.span,
+                        "what stands in here is not read",
+                        ("write the objects of the initial scene at the top level",))  # fmt: skip
+    example = "ego = new Car" if version == 3 else "ego = Car"
+    return fail("no-ego", "the program defines no ego", _start(module.source), "no object is called `ego`",
+                (f"name one object `ego`, as in `{example}`",))  # fmt: skip
+
+
+def _scenario(
+    run: Interpreter, module: ast.Module, version: int, network: Network, warnings: tuple[Diagnostic, ...]
+) -> Scenario:
     if run.current_ego is None:
-        raise fail("no-ego", "the program defines no ego", whole, "no object is called `ego`",
-                   ("name one object `ego`, as in `ego = new Car`",))  # fmt: skip
+        raise _no_ego(run, module, version)
     ego = run.current_ego
     requirements = [_written(requirement.condition(), requirement.span) for requirement in run.requirements]
+    requirements += [_written(condition, span) for condition, span in run.exclusions()]
     requirements = [requirement for requirement in requirements if requirement is not None]
     requirements += _built_in(run, ego)
+    ego.label = ego.label or "ego"
     names = _names(run.objects)
     objects = tuple(_object(instance, names[number]) for number, instance in enumerate(run.objects))
     params = {
         name: Property(to_node(value, span), explicit=not library, span=span)
         for name, (value, span, library) in run.params.items()
-        if is_node(value) or isinstance(value, Choice | str | int | float | bool)
+        if value is not None and _is_feature(value)
     }
     assert ego.index is not None
     scenario = Scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
-        tuple(run.soft), tuple(run.ignored),
+        tuple(run.soft), tuple(run.ignored), warnings,
     )  # fmt: skip
     return simplify(scenario)
 
@@ -159,21 +237,45 @@ def _property(name: str, value: ModelValue, span: Span | None) -> Node | None:
         return to_scalar(value, span)
     if name == "regionContainedIn" and value is not None:
         return to_region(value, span)
-    plain = isinstance(value, str | int | float | bool) or value is None
-    return to_node(value, span) if plain or is_node(value) or isinstance(value, Choice | NetworkElement) else None
+    return to_node(value, span) if _is_feature(value) else None
+
+
+def _is_feature(value: ModelValue) -> bool:
+    """Whether a property's value is one that a label could have too."""
+    if isinstance(value, Choice):
+        return all(_is_feature(option) for option in value.options)
+    return is_node(value) or value is None or isinstance(value, str | int | float | bool | NetworkElement)
 
 
 def _object(instance: Instance, name: str) -> ScenarioObject:
     properties: dict[str, Property] = {}
     for key, value in instance.properties.items():
+        if key in PARTIAL:
+            continue
         span = instance.spans.get(key) or instance.span
         node = _property(key, value, span)
         if node is not None:
             properties[key] = Property(node, key in instance.explicit, span)
     assert instance.index is not None
-    return ScenarioObject(
-        instance.index, name, instance.cls.category, properties, instance.mutation is not None, instance.span
-    )
+    return ScenarioObject(instance.index, name, instance.cls.category, properties, _mutated(instance), instance.span)
+
+
+def _mutated(instance: Instance) -> bool:
+    """Whether noise is added to an object's position and heading."""
+    scale = instance.mutation if instance.mutation is not None else instance.properties["mutationScale"]
+    if _is_zero(scale):
+        return False
+    still = next((name for name in ("positionStdDev", "headingStdDev") if _is_zero(instance.properties[name])), None)
+    if still is not None:
+        raise fail("unsupported-construct", "noise on only one of position and heading is not supported",
+                   instance.spans.get(still) or instance.span, "no noise here, but `mutate` adds some elsewhere",
+                   ("give the other property a wide distribution instead of `mutate`",))  # fmt: skip
+    return True
+
+
+def _is_zero(value: ModelValue) -> bool:
+    known = value.value if isinstance(value, Constant) else value
+    return isinstance(known, int | float) and known == 0
 
 
 def _written(condition: Node, span: Span) -> Requirement | None:

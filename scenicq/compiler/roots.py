@@ -10,7 +10,7 @@ from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, Sc
 from scenicq.forest import build
 from scenicq.forest.nodes import Node
 
-__all__ = ["OBJECT", "OBJECT_VISIBLE", "ORIENTED_POINT", "POINT", "oriented_point"]
+__all__ = ["oriented_point", "root_classes"]
 
 
 def _constants(**values: ModelValue) -> dict[str, PropertyDefinition]:
@@ -26,18 +26,33 @@ def _velocity(instance: Instance) -> Node:
     return build.rotate(ahead, to_heading(instance, None))
 
 
+def _heading(instance: Instance) -> Node:
+    parent, yaw = (to_heading(instance.properties[name], None) for name in ("parentOrientation", "yaw"))
+    return build.add(parent, yaw)
+
+
 POINT = ScenicClass(
     "Point",
     None,
-    _constants(position=build.constant((0.0, 0.0)), visibleDistance=50.0, width=0.0, length=0.0),
+    _constants(
+        position=build.constant((0.0, 0.0)), visibleDistance=50.0, width=0.0, length=0.0,
+        mutationScale=0.0, positionStdDev=1.0,
+    ),
     {},
     "Point",
-)
+)  # fmt: skip
 
-ORIENTED_POINT = ScenicClass("OrientedPoint", POINT, _constants(heading=0.0, viewAngle=math.tau), {}, "OrientedPoint")
+_ORIENTED = _constants(heading=0.0, viewAngle=math.tau, headingStdDev=math.radians(5))
+_YAWED = {
+    **_ORIENTED,
+    **_constants(parentOrientation=0.0, yaw=0.0),
+    "heading": _property("heading", _heading, "parentOrientation", "yaw"),
+}
+ORIENTED_POINT = ScenicClass("OrientedPoint", POINT, _ORIENTED, {}, "OrientedPoint")
+_ORIENTED_POINT_3 = ScenicClass("OrientedPoint", POINT, _YAWED, {}, "OrientedPoint")
 
 
-def _object(require_visible: bool) -> ScenicClass:
+def _object(base: ScenicClass, require_visible: bool) -> ScenicClass:
     own = _constants(
         width=1.0,
         length=1.0,
@@ -51,14 +66,21 @@ def _object(require_visible: bool) -> ScenicClass:
         behavior=None,
     )
     own["velocity"] = _property("velocity", _velocity, "speed", "heading")
-    return ScenicClass("Object", ORIENTED_POINT, own, {}, "Object")
+    return ScenicClass("Object", base, own, {}, "Object")
 
 
-OBJECT = _object(require_visible=False)
-"""`Object` of Scenic 3."""
+_ROOTS = {
+    1: (POINT, ORIENTED_POINT, _object(ORIENTED_POINT, require_visible=True)),
+    3: (POINT, _ORIENTED_POINT_3, _object(_ORIENTED_POINT_3, require_visible=False)),
+}
 
-OBJECT_VISIBLE = _object(require_visible=True)
-"""`Object` of Scenic 1 and 2, which must be visible from the ego."""
+
+def root_classes(version: int) -> dict[str, ScenicClass]:
+    """`Point`, `OrientedPoint` and `Object` as a version of Scenic has them.
+
+    Objects must be visible from the ego up to Scenic 2; in Scenic 3 a heading is made of `parentOrientation` and `yaw`.
+    """
+    return {cls.name: cls for cls in _ROOTS[3 if version == 3 else 1]}
 
 
 def oriented_point(properties: Mapping[str, ModelValue]) -> Instance:

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, ScenicClass, fail
 from scenicq.errors import Note, Span
+from scenicq.forest.nodes import Node
 
 __all__ = ["BoundSpecifier", "Evaluator", "construct"]
 
@@ -27,6 +29,9 @@ class BoundSpecifier:
         evaluate: Values of the properties, given the object so far.
         span: The specifier in the program.
         explicit: Whether the user's program rather than a library says it.
+        rank: Of several optional specifiers of a property the one of the lowest rank counts (Scenic 3's priorities).
+        modifies: A property that it gives only if no other specifier does; if one does, it adds a condition instead.
+        condition: The condition: requires something of the finished object.
     """
 
     gives: frozenset[str]
@@ -35,6 +40,9 @@ class BoundSpecifier:
     evaluate: Callable[[Instance], Mapping[str, ModelValue]]
     span: Span | None
     explicit: bool = True
+    rank: int = 3
+    modifies: str = ""
+    condition: Callable[[Instance], Node] | None = None
 
 
 class Evaluator(Protocol):
@@ -44,10 +52,12 @@ class Evaluator(Protocol):
         """The value of a property's default for an instance."""
         ...
 
+    def demand(self, condition: Callable[[], Node], span: Span) -> None:
+        """Require a condition, which can be made once all objects are there."""
+        ...
 
-def _default_specifier(
-    name: str, chain: list[PropertyDefinition], evaluator: Evaluator
-) -> BoundSpecifier:
+
+def _default_specifier(name: str, chain: list[PropertyDefinition], evaluator: Evaluator) -> BoundSpecifier:
     first = chain[0]
     additive = "additive" in first.modifiers
     used = chain if additive else chain[:1]
@@ -69,32 +79,35 @@ def _definitions(cls: ScenicClass) -> dict[str, list[PropertyDefinition]]:
 
 
 def _conflict(name: str, first: BoundSpecifier, second: BoundSpecifier) -> Exception:
-    notes = (Note(first.span, f"specifies `{name}` first"),) if first.span else ()
+    shown = "heading" if name == "parentOrientation" else name
+    notes = (Note(first.span, f"specifies `{shown}` first"),) if first.span else ()
     return fail(
         "specifier-conflict",
-        f"`{name}` is specified twice",
+        f"`{shown}` is specified twice",
         second.span,
-        f"also specifies `{name}`",
+        f"also specifies `{shown}`",
         ("keep one of the two specifiers",),
         notes,
     )
 
 
 def _choose(specifiers: Iterable[BoundSpecifier]) -> dict[str, BoundSpecifier]:
-    """Which specifier gives each property: the outright one, else the only optional one."""
-    specifiers = tuple(specifiers)
+    """Which specifier gives each property: the outright one, else the optional one of the lowest rank."""
+    specifiers = sorted(specifiers, key=lambda specifier: bool(specifier.modifies))
     chosen: dict[str, BoundSpecifier] = {}
     for specifier in specifiers:
         for name in sorted(specifier.gives):
-            if name in chosen:
+            if name not in chosen:
+                chosen[name] = specifier
+            elif specifier.modifies != name or chosen[name].modifies:
                 raise _conflict(name, chosen[name], specifier)
-            chosen[name] = specifier
     optional: dict[str, BoundSpecifier] = {}
     for specifier in specifiers:
         for name in sorted(specifier.optionally - chosen.keys()):
-            if name in optional:
+            if name in optional and optional[name].rank == specifier.rank:
                 raise _conflict(name, optional[name], specifier)
-            optional[name] = specifier
+            if name not in optional or specifier.rank < optional[name].rank:
+                optional[name] = specifier
     return chosen | optional
 
 
@@ -133,6 +146,10 @@ def construct(
                 instance.spans[given] = specifier.span
                 if specifier.explicit:
                     instance.explicit.add(given)
+    for specifier in specifiers:
+        replaced = specifier.modifies and chosen[specifier.modifies] is not specifier
+        if specifier.condition is not None and specifier.span is not None and (replaced or not specifier.modifies):
+            evaluator.demand(partial(specifier.condition, instance), specifier.span)
 
 
 def _order(chosen: Mapping[str, BoundSpecifier], instance: Instance) -> list[str]:
@@ -161,7 +178,7 @@ def _order(chosen: Mapping[str, BoundSpecifier], instance: Instance) -> list[str
         stack.append((name, True))
         for needed in sorted(chosen[name].needs, reverse=True):
             if needed not in chosen:
-                raise fail("specifier-missing", f"`{needed}` is needed here but `{instance.cls.name}` has no such property",
+                raise fail("specifier-missing", f"`{instance.cls.name}` has no `{needed}`, which is needed here",
                            chosen[name].span, f"needs `{needed}`")  # fmt: skip
             if state.get(needed) != 2:
                 stack.append((needed, False))

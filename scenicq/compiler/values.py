@@ -4,6 +4,10 @@ A value is a plain Python value (number, string, list, function ...), a forest n
 region), or one of the classes below. Nothing here evaluates syntax.
 """
 
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -85,6 +89,7 @@ class ScenicClass:
         definitions: Its own property lines.
         attributes: Other names that its body defines.
         category: The name in the class tree that label objects are compared with.
+        span: Where it is defined.
     """
 
     name: str
@@ -153,10 +158,17 @@ class Delayed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
-    """One of several values that are not numbers, vectors or regions: which one is random."""
+    """One of several values that are not numbers, vectors or regions: which one is random.
+
+    Attributes:
+        index: Which.
+        options: The values.
+        size: How many outcomes there are, those of nested choices included.
+    """
 
     index: Index
     options: tuple[ModelValue, ...]
+    size: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,19 +191,30 @@ class Builtin:
         name: What programs call it.
         call: Takes the span of the call, positional and keyword arguments.
         lifted: Whether the call waits for delayed arguments.
+        owner: What it is a method of: the call may go through all of it.
+        cost: Steps that a call takes besides.
     """
 
     name: str
     call: Callable[..., ModelValue]
     lifted: bool = True
+    owner: ModelValue = None
+    cost: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Module:
-    """An imported module: names and their values."""
+    """An imported module, or another record of names and their values.
+
+    Attributes:
+        name: What messages call it.
+        names: The values by name.
+        dynamic: Whether it has nothing to say about one instant: any name of it may be imported and stands for nothing.
+    """
 
     name: str
     names: Mapping[str, ModelValue]
+    dynamic: bool = False
 
 
 def lift(needed: Callable[..., ModelValue], *args: ModelValue) -> ModelValue:
@@ -221,6 +244,7 @@ _NAMES: dict[type, str] = {
     ScenicClass: "a class",
     Module: "a module",
     Choice: "a random choice",
+    Delayed: "a value that depends on an object's position",
 }
 
 

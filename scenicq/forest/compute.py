@@ -65,6 +65,7 @@ from scenicq.geometry.regions import (
     intersection,
     union,
 )
+from scenicq.geometry.terms import UndecidedError
 
 __all__ = ["CannotEvaluate", "compute", "directions", "fold"]
 
@@ -229,7 +230,10 @@ def compute(node: Node, args: tuple[Value, ...]) -> Value:
     for arg in args:
         if isinstance(arg, Undefined):
             return arg
-    return _compute(node, args)
+    try:
+        return _compute(node, args)
+    except UndecidedError as error:
+        raise CannotEvaluate(str(error)) from None
 
 
 def _compute(node: Node, args: tuple[Value, ...]) -> Value:

@@ -23,8 +23,8 @@ from scenicq.forest.nodes import (
     Undefined,
     Value,
 )
-from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import features
+from scenicq.forest.scenario import BuiltIn, Scenario
+from scenicq.forest.walk import children, features, leaves
 from scenicq.geometry.regions import Region
 from scenicq.geometry.sampling import sample
 
@@ -54,6 +54,7 @@ class Draw:
         """Take the source of randomness."""
         self.rng = rng
         self.values: dict[Identity, Value] = {}
+        self._picked: dict[int, float] = {}
 
     def __call__(self, leaf: Leaf, args: tuple[Value, ...]) -> Value:
         """The value of a random variable, given its distribution's parameters."""
@@ -86,15 +87,16 @@ class Draw:
                 except ValueError:
                     return Undefined("an empty region")
 
-    def choose(self, _: DirectionAt, allowed: tuple[float, ...]) -> float:
-        """One of several directions."""
-        return self.rng.choice(allowed)
+    def choose(self, node: DirectionAt, allowed: tuple[float, ...]) -> float:
+        """One of several directions, the same one for every reference to one use of a field."""
+        return self._picked.setdefault(id(node), self.rng.choice(allowed))
 
 
 def draw_scene(scenario: Scenario, rng: random.Random, attempts: int = 1000) -> Scene | None:
-    """A scene that satisfies every hard requirement, or None if none came up.
+    """A scene that satisfies every hard requirement, or None if none came up: acceptance is then below 1 in `attempts`.
 
-    Soft requirements are ignored: any scene of the support will do. Mutation noise is not added.
+    What fails is drawn again by itself, the rest is kept: any scene of the support will do. For the same reason soft
+    requirements are ignored. Mutation noise is not added.
 
     Args:
         scenario: The scenario.
@@ -102,11 +104,75 @@ def draw_scene(scenario: Scenario, rng: random.Random, attempts: int = 1000) -> 
         attempts: Scenes to try.
     """
     order = _order(scenario)
-    for _ in range(attempts):
-        scene = _attempt(scenario, order, Draw(rng))
-        if scene is not None:
+    depends = _dependencies(order, scenario)
+    draw = Draw(rng)
+    conditions = [
+        requirement.condition
+        for requirement in scenario.requirements
+        if requirement.built_in in (None, BuiltIn.VISIBILITY)
+    ]
+    for attempt in range(attempts):
+        scene = _attempt(scenario, order, conditions, draw)
+        if isinstance(scene, Scene):
             return scene
+        if scene is None or attempt % _PATIENCE == _PATIENCE - 1:
+            draw.values.clear()
+        else:
+            _forget(draw, scene, depends)
     return None
+
+
+_PATIENCE = 40
+"""Attempts at mending a scene before all of it is drawn anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Dependencies:
+    """What depends on which random variables.
+
+    Attributes:
+        keys: The random variables that each feature depends on.
+        leaves: The random variables that the distribution of each one depends on.
+    """
+
+    keys: Mapping[tuple[int, str], frozenset[Identity]]
+    leaves: Mapping[Identity, frozenset[Identity]]
+
+    def of(self, node: Node) -> frozenset[Identity]:
+        """The random variables that an expression depends on."""
+        own = frozenset(leaf.identity for leaf in leaves(node))
+        return own.union(*(self.keys[key] for key in features(node)))
+
+
+def _dependencies(order: Iterable[tuple[tuple[int, str], Node]], scenario: Scenario) -> _Dependencies:
+    found = _Dependencies({}, {})
+    nodes = [(key, node) for key, node in order]
+    nodes += [(None, requirement.condition) for requirement in scenario.requirements]
+    for key, node in nodes:
+        if key is not None:
+            cast("dict[tuple[int, str], frozenset[Identity]]", found.keys)[key] = found.of(node)
+        for leaf in leaves(node):
+            parameters = frozenset[Identity]().union(*(found.of(child) for child in children(leaf)))
+            cast("dict[Identity, frozenset[Identity]]", found.leaves)[leaf.identity] = parameters
+    return found
+
+
+def _forget(draw: Draw, failed: Node, depends: _Dependencies) -> None:
+    """Forget some of the values that a failed expression depends on, and all that was drawn with their help."""
+    candidates = sorted(depends.of(failed), key=list(draw.values).index) if draw.values else []
+    candidates = [identity for identity in candidates if identity in draw.values]
+    if not candidates:
+        draw.values.clear()
+        return
+    void = {identity for identity in candidates if isinstance(draw.values[identity], Undefined)}
+    gone = void.union(*(depends.leaves[identity] for identity in void))
+    # what was drawn late disturbs least; now and then more goes
+    start = max(0, len(candidates) - 1 - int(draw.rng.expovariate(0.7)))
+    gone |= set() if void else set(candidates[start:])
+    for identity in list(draw.values):
+        if identity in gone or gone & depends.leaves.get(identity, frozenset()):
+            gone.add(identity)
+            del draw.values[identity]
 
 
 def _order(scenario: Scenario) -> list[tuple[tuple[int, str], Node]]:
@@ -126,19 +192,20 @@ def _order(scenario: Scenario) -> list[tuple[tuple[int, str], Node]]:
     return order
 
 
-def _attempt(scenario: Scenario, order: Iterable[tuple[tuple[int, str], Node]], draw: Draw) -> Scene | None:
+def _attempt(
+    scenario: Scenario, order: Iterable[tuple[tuple[int, str], Node]], conditions: Iterable[Node], draw: Draw
+) -> Scene | Node | None:
+    """A scene, or the expression that failed, or None where nothing can be told."""
     values: dict[tuple[int, str], Value] = {}
     try:
         for key, node in order:
             values[key] = evaluate(node, draw, values, draw.choose)
-        for thing in scenario.objects:
-            if any(isinstance(values[thing.index, name], Undefined) for name in ("position", "heading")):
-                return None
-        for requirement in scenario.requirements:
-            if requirement.built_in is None or requirement.built_in.value == "visibility":
-                held = evaluate(requirement.condition, draw, values, draw.choose)
-                if isinstance(held, Undefined) or not held:
-                    return None
+            if key[1] in ("position", "heading") and isinstance(values[key], Undefined):
+                return node
+        for condition in conditions:
+            held = evaluate(condition, draw, values, draw.choose)
+            if isinstance(held, Undefined) or not held:
+                return condition
         params = {name: evaluate(given.value, draw, values, draw.choose) for name, given in scenario.params.items()}
     except CannotEvaluate:
         return None

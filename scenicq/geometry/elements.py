@@ -238,12 +238,15 @@ class Intersection(NetworkElement):
     @property
     def is3Way(self) -> bool:
         """Whether three roads meet here."""
-        return len(self.roads) == 3
+        return self._meeting() == 3
 
     @property
     def is4Way(self) -> bool:
         """Whether four roads meet here."""
-        return len(self.roads) == 4
+        return self._meeting() == 4
+
+    def _meeting(self) -> int:
+        return sum(road.intersection is not self for road in self.roads)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

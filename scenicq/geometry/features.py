@@ -161,7 +161,7 @@ def _shape(identifier: str, kind: str, geometry: Any) -> Shape:
         raise _UnsoundError(identifier, f"a {kind} is a {' or '.join(allowed)}, this is {found or 'no geometry'}")
     try:
         shape = shapes.from_geojson(cast("dict[str, Any]", geometry))
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
         raise _UnsoundError(identifier, f"its geometry cannot be read ({error})") from error
     if shape.is_empty:
         raise _UnsoundError(identifier, "its geometry is empty")

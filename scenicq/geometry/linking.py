@@ -91,7 +91,7 @@ def _make(feature: MapFeature, direction: VectorField, elements: Elements) -> No
     directed = (*plain, direction)
     match feature.kind:
         case "lane":
-            elements.lanes[feature.id] = Lane(*directed, centerline=_centerline(feature))
+            elements.lanes[feature.id] = Lane(*directed, centerline=_centerline(feature, direction))
         case "lane_group":
             elements.groups[feature.id] = LaneGroup(*directed)
         case "road":
@@ -108,9 +108,9 @@ def _make(feature: MapFeature, direction: VectorField, elements: Elements) -> No
             pass
 
 
-def _centerline(feature: MapFeature) -> PolylineSet | None:
+def _centerline(feature: MapFeature, direction: VectorField | None) -> PolylineSet | None:
     lines = centerlines(feature)
-    return PolylineSet(lines, f"centerline of {feature.id}") if lines else None
+    return PolylineSet(lines, f"centerline of {feature.id}", direction) if lines else None
 
 
 def _found(table: dict[str, _Element], feature: MapFeature, key: str) -> tuple[_Element, ...]:
@@ -177,7 +177,7 @@ def _link_sections(section_features: list[MapFeature], lane_features: list[MapFe
         if lane is None:
             continue
         area = cast("Polygon | MultiPolygon", feature.shape)
-        line = _centerline(feature) or lane.centerline
+        line = _centerline(feature, lane.orientation) or lane.centerline
         section = LaneSection(feature.id, area, feature.properties, lane.orientation, centerline=line, lane=lane)
         elements.sections[feature.id] = section
         listed.setdefault(lane.id, []).append(section)
@@ -258,8 +258,9 @@ def _link_intersections(features: list[MapFeature], elements: Elements) -> None:
         crossing = elements.intersections[feature.id]
         named = _found(elements.roads, feature, "roads")
         inside = [road for road in elements.roads.values() if road.intersection is crossing]
-        crossing.roads = tuple(dict.fromkeys([*named, *inside]))
-        crossing.lanes = tuple(lane for road in crossing.roads if road.intersection is crossing for lane in road.lanes)
+        # Scenic counts the roads that meet; those inside only stand in where the map names none
+        crossing.roads = named or tuple(inside)
+        crossing.lanes = tuple(lane for road in inside for lane in road.lanes)
         own = set(crossing.lanes)
         ahead = [other for lane in crossing.lanes for other in lane.successors if other not in own]
         behind = [other for lane in crossing.lanes for other in lane.predecessors if other not in own]

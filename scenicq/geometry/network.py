@@ -17,6 +17,7 @@ import numpy as np
 from shapely.geometry import MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
+from scenicq.geometry.curbs import right_edges
 from scenicq.geometry.elements import (
     Curb,
     Intersection,
@@ -33,7 +34,7 @@ from scenicq.geometry.features import MapFeature, dangling, read_geojson
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.linking import centerlines, link
 from scenicq.geometry.regions import SLACK, PolygonSet, PolylineSet, Region
-from scenicq.geometry.road_direction import DirectedLane, RoadDirection
+from scenicq.geometry.road_direction import DirectedLane, RoadDirection, along_lines
 
 __all__ = ["MapFeature", "Network", "read_geojson"]
 
@@ -139,8 +140,14 @@ class Network:
 
     @cached_property
     def curbRegion(self) -> PolylineSet:
-        """All curbs."""
-        return PolylineSet(tuple(curb.line for curb in self.curbs), "curb", self.roadDirection)
+        """All curbs, in the direction of traffic; where the map names none, the right edges of the outermost lanes.
+
+        Scenic makes its curbs so from its lane groups. Inside intersections there are none.
+        """
+        lines = tuple(self.roadDirection.forward(curb.line) for curb in self.curbs)
+        if not lines:
+            lines = right_edges(self.lanes, [crossing.polygon for crossing in self.intersections])
+        return PolylineSet(lines, "curb", along_lines(lines, "curb"))
 
     @cached_property
     def drivableRegion(self) -> PolygonSet:

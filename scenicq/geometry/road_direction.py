@@ -7,13 +7,14 @@ What ties within a nanometre is all allowed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from shapely import STRtree
+from shapely import LineString, STRtree
 
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import heading_of_array
@@ -21,11 +22,13 @@ from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_cells import lane_cells, segment_distances
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
-__all__ = ["DirectedLane", "RoadDirection"]
+__all__ = ["DirectedLane", "RoadDirection", "along_lines"]
 
 REACH = 20.0
 """Metres within which a point off all lanes takes the direction of the nearest one."""
 _TIE = 1e-9
+_BESIDE = 0.01
+"""Metres beside a polyline that count as on it."""
 _CHUNK = 20_000
 _LARGEST, _SMALLEST = 16.0, 2.0
 """Metres: sides of the squares that cover the surroundings of lanes, at first and where they are no longer split."""
@@ -65,6 +68,16 @@ class RoadDirection:
     def values_many(self, xy: Coordinates) -> list[tuple[float, ...]]:
         """`values` for points of shape (n, 2)."""
         return [value for start in range(0, len(xy), _CHUNK) for value in self._values(xy[start : start + _CHUNK])]
+
+    def forward(self, line: LineString) -> LineString:
+        """The line, turned around if most of it runs against the traffic beside it."""
+        corners = shapes.coordinates(line)
+        along, middle = corners[1:] - corners[:-1], (corners[1:] + corners[:-1]) / 2
+        agreement = 0.0
+        for (dx, dy), headings in zip(along.tolist(), self.values_many(middle), strict=True):
+            if len(headings) == 1:
+                agreement += dy * math.cos(headings[0]) - dx * math.sin(headings[0])
+        return line if agreement >= 0 else line.reverse()
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes stay whole."""
@@ -242,3 +255,10 @@ def _segments(lines: Sequence[Coordinates]) -> NDArray[np.float64]:
     pairs = [np.concatenate([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
     segments = np.concatenate([np.empty((0, 4)), *pairs])
     return segments[np.any(segments[:, :2] != segments[:, 2:], axis=1)]
+
+
+def along_lines(lines: Sequence[Shape], name: str) -> RoadDirection:
+    """The field that follows polylines: at a point the direction of the nearest segment."""
+    parts = shapes.simple_parts(lines)
+    bands = tuple(DirectedLane(shapes.band(part, _BESIDE), (shapes.coordinates(part),)) for part in parts)
+    return RoadDirection(bands, name=name)

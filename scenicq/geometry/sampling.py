@@ -12,6 +12,7 @@ from typing import assert_never
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely.geometry import LineString, Polygon
 
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction, rotate
@@ -85,7 +86,7 @@ def _proposal(region: Region) -> _Proposal | None:
         case UnionOf():
             return _union(region.parts)
         case IntersectionOf():
-            return _filtered(min(region.parts, key=_size), region)
+            return _filtered(_clipped(min(region.parts, key=_size), region.parts), region)
         case DifferenceOf():
             return _filtered(region.base, region)
         case _:
@@ -97,6 +98,43 @@ def _size(region: Region) -> tuple[bool, float]:
     west, south, east, north = bounds(region)
     area = max(east - west, 0.0) * max(north - south, 0.0)
     return not isinstance(region, PolylineSet | PointSet), area if math.isfinite(area) else math.inf
+
+
+def _clipped(source: Region, parts: tuple[Region, ...]) -> Region:
+    """The part of a set of shapes that can lie in the discs and sectors among the parts."""
+    if not isinstance(source, PolygonSet | PolylineSet):
+        return source
+    pieces = list(source.pieces)
+    for window in (_window(part) for part in parts):
+        if window is not None:
+            pieces = [cut for piece in pieces if not (cut := shapes.intersection(piece, window)).is_empty]
+    if isinstance(source, PolylineSet):
+        lines = tuple(piece for piece in shapes.simple_parts(pieces) if isinstance(piece, LineString))
+        return PolylineSet(lines, source.name)
+    polygons = tuple(piece for piece in shapes.simple_parts(pieces) if isinstance(piece, Polygon))
+    return PolygonSet(polygons, source.name)
+
+
+def _window(region: Region) -> shapes.Shape | None:
+    """A polygon that holds a disc or sector, with little to spare; None for other regions."""
+    match region:
+        case Disc():
+            return _fan(region.center, region.radius, 0.0, math.tau)
+        case Sector():
+            return _fan(region.center, region.radius, region.heading, min(region.angle, math.tau))
+        case _:
+            return None
+
+
+_STEPS = 64
+
+
+def _fan(center: XY, radius: float, heading: float, angle: float) -> shapes.Shape:
+    reach = radius / math.cos(angle / _STEPS / 2) + 1e-6
+    first = heading - angle / 2
+    rim = [direction(first + angle * step / _STEPS) for step in range(_STEPS + 1)]
+    ring = [(center[0] + reach * x, center[1] + reach * y) for x, y in rim]
+    return shapes.polygon(ring[:-1] if angle >= math.tau else [center, *ring])
 
 
 def _filtered(source: Region, region: Region) -> _Proposal | None:

@@ -186,6 +186,11 @@ def disc_polygon(x: float, y: float, radius: float, quarter: int = 16) -> Shape:
     return cast(Shape, shapely.buffer(Point(x, y), radius, quad_segs=quarter))
 
 
+def band(shape: Shape, width: float) -> Shape:
+    """The polygon of what lies within `width` metres of a line."""
+    return cast(Shape, shapely.buffer(shape, width, quad_segs=2))
+
+
 def coordinates(shape: Shape) -> Coordinates:
     """All vertices, shape (n, 2)."""
     return shapely.get_coordinates(shape)

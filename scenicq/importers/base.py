@@ -6,7 +6,7 @@ else (columns computed from the map, files, checksums) is the store's. Read next
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, cast
@@ -16,13 +16,16 @@ from scenicq.geometry.features import MapFeature, ProblemSink, dangling, read_ge
 from scenicq.importers.fields import InvalidError, check_characters, parse_json
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
+from scenicq.store.columns import RecordingColumns
 from scenicq.store.labels import Label, LabelObject, Recording
 
 __all__ = [
     "ClassNames",
+    "Entry",
     "Importer",
     "Labels",
     "Options",
+    "Reader",
     "Source",
     "read_class_map",
     "read_maps",
@@ -36,10 +39,43 @@ class Options:
     Attributes:
         maps: GeoJSON file of each map, in addition to and before those of the source.
         class_map: Class of the tree for class names of the source, before the source's own taxonomy.
+        ego: For sources that have no ego: the track that is to be it, "nearest" (in each frame the vehicle nearest to
+            the middle of all objects) or "none"; None is "nearest", and is told.
+        scratch: Folder for temporary files that must outlive `Importer.read`; its owner removes it.
     """
 
     maps: Mapping[str, Path] = field(default_factory=dict[str, Path])
     class_map: Mapping[str, str] = field(default_factory=dict[str, str])
+    scratch: Path | None = None
+    ego: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A recording of a source that is opened but not read.
+
+    Attributes:
+        name: Unique in the source.
+        weight: About how many label objects it has.
+        digest: Changes with what the source says of it.
+    """
+
+    name: str
+    weight: int
+    digest: str
+
+
+class Reader(Protocol):
+    """Reads some recordings, perhaps in another process: it must be possible to pickle it."""
+
+    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording | RecordingColumns]:
+        """The recordings in order of their names, each with at least one label.
+
+        Args:
+            labels: Checks what must hold between labels.
+            report: Takes what is unsound.
+        """
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,16 +85,24 @@ class Source:
     Attributes:
         name: What the source calls itself.
         maps: Elements of each map.
-        recordings: In order of their names, each with at least one label; read while one iterates.
+        entries: The recordings in order of their names.
+        reader: Gives a reader of some of the recordings, by name.
         frames: Number of labels that the source claims, for progress only.
+        context: Changes with everything but maps and recordings that the dataset depends on.
         facts: What the dataset's provenance should say of how values were made.
     """
 
     name: str
     maps: Mapping[str, tuple[MapFeature, ...]]
-    recordings: Generator[Recording]
+    entries: tuple[Entry, ...]
+    reader: Callable[[Sequence[str]], Reader]
     frames: int
+    context: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def recordings(self, report: Report) -> Iterator[Recording | RecordingColumns]:
+        """All recordings, one after the other."""
+        return self.reader([entry.name for entry in self.entries]).recordings(Labels(self.maps, report), report)
 
 
 class Importer(Protocol):
@@ -90,16 +134,20 @@ class Importer(Protocol):
 
 
 class ClassNames:
-    """Translates class names of a source into the class tree."""
+    """Translates class names of a source into the class tree.
 
-    def __init__(self, taxonomy: Mapping[str, str], options: Options, report: Report) -> None:
-        """Combine the source's taxonomy with the user's class map, which comes first."""
-        self._classes = {**taxonomy, **options.class_map}
+    Attributes:
+        known: Class of the tree for each name.
+    """
+
+    def __init__(self, known: Mapping[str, str], report: Report) -> None:
+        """Take the names that are known: the source's taxonomy and, before it, the user's class map."""
+        self.known = known
         self._report = report
 
     def category(self, name: str) -> str:
         """The class of the tree; `Object`, reported, for a name that nothing lists."""
-        if (category := self._classes.get(name)) is not None:
+        if (category := self.known.get(name)) is not None:
             return category
         message = f"class `{name}` is in no taxonomy; its objects become `{ROOT}`"
         hint = f'a class map with {{"{name}": CLASS}} gives it a class: `--class-map FILE`'
@@ -110,11 +158,36 @@ class ClassNames:
 class Labels:
     """Checks what must hold between labels of a source; each check that fails leaves something out and is reported."""
 
-    def __init__(self, maps: Mapping[str, object], report: Report) -> None:
-        """Start without labels; a map that is not among `maps` is missing."""
+    def __init__(
+        self, maps: Collection[str], report: Report, taken: Collection[tuple[str, str]] = frozenset()
+    ) -> None:
+        """Start without labels.
+
+        Args:
+            maps: Names of the maps; any other is missing.
+            report: Takes what is left out.
+            taken: Recording and frame of labels whose name a label of an earlier recording has.
+        """
         self._maps = maps
         self._report = report
+        self._taken = taken
         self._frames: set[str] = set()
+
+    def accept(self, name: str, map_name: str, frames: Sequence[str]) -> bool:
+        """Take the labels of a recording that are sound in themselves, if no name is used twice.
+
+        Args:
+            name: Of the recording.
+            map_name: Of the map of all its labels.
+            frames: Names of the labels.
+        """
+        unique = set(frames)
+        if len(unique) < len(frames) or unique & self._frames or any((name, frame) in self._taken for frame in frames):
+            return False
+        self._frames |= unique
+        if map_name not in self._maps:
+            self._tell_missing(map_name, len(frames))
+        return True
 
     def recording(self, name: str, labels: Sequence[tuple[Label, str]]) -> Recording | None:
         """A recording of the sound labels, sorted; None if there is none.
@@ -127,7 +200,7 @@ class Labels:
         times: dict[int, str] = {}
         map_name = labels[0][0].map if labels else ""
         for label, place in labels:
-            if label.frame in self._frames:
+            if label.frame in self._frames or (name, label.frame) in self._taken:
                 self._leave_out(f"{place}: label id `{label.frame}` is used twice")
             elif label.map != map_name:
                 message = f"label `{label.frame}` has map `{label.map}`, its recording began with `{map_name}`"

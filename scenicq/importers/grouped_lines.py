@@ -1,8 +1,8 @@
 """JSON lines of several files, grouped by recording in bounded memory.
 
-Labels of one recording need not be together. A first pass notes where each line of a recording lies (24 bytes a line);
-a second one jumps there. Files in which one cannot jump (gzip, Parquet) are first written to an anonymous temporary
-file, which the system removes whatever happens.
+Labels of one recording need not be together. A first pass notes where the lines of each recording lie, run by run of
+neighbouring lines; whoever reads a recording jumps there. Files in which one cannot jump (gzip, Parquet) are first
+unpacked into a scratch folder.
 """
 
 # pyarrow has no type stubs.
@@ -12,13 +12,13 @@ file, which the system removes whatever happens.
 from __future__ import annotations
 
 import gzip
+import hashlib
 import json
 import re
-import tempfile
 import zlib
 from array import array
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -29,105 +29,143 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import InvalidError, parse_json
 from scenicq.importers.report import Report
 
-__all__ = ["GroupedLines", "Line"]
+__all__ = ["GroupedLines", "Runs", "group_lines"]
 
-Line = tuple[Any, str]
-"""A parsed line and its place, `file:line`."""
+Runs = tuple[int, ...]
+"""Runs of neighbouring lines, four numbers each: file, number of the first line, its offset, offset of the end."""
 
 _KEY = re.compile(rb'"recording"\s*:\s*"([^"\\]*)"')
 
 
+@dataclass(frozen=True, slots=True)
 class GroupedLines:
-    """The lines of some files by recording; close it after use."""
+    """Where the lines of some recordings lie; can be pickled.
 
-    def __init__(self, files: Sequence[Path], report: Report) -> None:
-        """Note the place of every line.
+    Attributes:
+        files: Files that one can jump in, with their names in messages.
+        runs: Of each recording.
+    """
+
+    files: tuple[tuple[Path, str], ...]
+    runs: Mapping[str, Runs] = field(repr=False)
+
+    def of(self, recordings: Sequence[str]) -> GroupedLines:
+        """The same of some recordings."""
+        return GroupedLines(self.files, {name: self.runs[name] for name in recordings})
+
+    def read(self, recording: str) -> Iterator[tuple[bytes, str]]:
+        """The lines of a recording with their places, `file:line`, in the order of the files.
 
         Raises:
-            DataError: `file-missing` or `file-invalid`, for a file that cannot be read at all.
+            DataError: `file-missing` for a file that has gone since.
         """
-        self._names = [file.name for file in files]
-        self._report = report
-        self._places: dict[str, array[int]] = {}
-        self._open = ExitStack()
-        self.lines = 0
-        with ExitStack() as opening:
-            self._files = [opening.enter_context(_seekable(file, report)) for file in files]
-            for number, file in enumerate(self._files):
-                self._note(number, file)
-            self._open = opening.pop_all()
-
-    @property
-    def recordings(self) -> list[str]:
-        """Names of the recordings, sorted."""
-        return sorted(self._places)
-
-    def close(self) -> None:
-        """Close the files."""
-        self._open.close()
-
-    def read(self, recording: str) -> Iterator[Line]:
-        """The lines of a recording in the order of the files; those that are not JSON are reported and left out."""
-        places = self._places[recording]
-        for first in range(0, len(places), 3):
-            number, offset, line = places[first : first + 3]
-            file = self._files[number]
-            file.seek(offset)
-            place = f"{self._names[number]}:{line}"
+        runs = self.runs[recording]
+        for first in range(0, len(runs), 4):
+            number, line, start, end = runs[first : first + 4]
+            path, name = self.files[number]
             try:
-                yield parse_json(file.readline()), place
-            except InvalidError as error:
-                self._report.left_out("label", "file-invalid", f"{place}: {error}")
+                with path.open("rb") as file:
+                    file.seek(start)
+                    content = file.read(end - start)
+            except OSError as error:
+                raise _unreadable(path, error) from error
+            for count, text in enumerate(content.removesuffix(b"\n").split(b"\n")):
+                yield text, f"{name}:{line + count}"
 
-    def _note(self, number: int, file: IO[bytes]) -> None:
-        offset = 0
-        for line, content in enumerate(file, start=1):
-            if content.strip():
-                recording = self._recording(content, f"{self._names[number]}:{line}")
-                if recording is not None:
-                    self._places.setdefault(recording, array("q")).extend((number, offset, line))
-                self.lines += 1
-            offset += len(content)
 
-    def _recording(self, content: bytes, place: str) -> str | None:
-        # Parsing only to find one key would double the time of an ingest. A key that is there once can be found
-        # without; whoever parses the line later compares it.
-        if content.count(b'"recording"') == 1 and (found := _KEY.search(content)):
-            try:
-                return found[1].decode()
-            except UnicodeDecodeError:
-                pass
+@dataclass(slots=True)
+class _Found:
+    runs: array[int] = field(default_factory=lambda: array("q"))
+    digest: Any = field(default_factory=lambda: hashlib.blake2b(digest_size=16))
+    size: int = 0
+
+
+def group_lines(
+    files: Sequence[Path], scratch: Path | None, report: Report
+) -> tuple[GroupedLines, dict[str, tuple[int, str]], int]:
+    """Note the places of all lines.
+
+    Args:
+        files: JSON lines, packed or not, or Parquet.
+        scratch: Folder for what is unpacked; it must stay as long as lines are read.
+        report: Takes what is unsound.
+
+    Returns:
+        The lines; number of bytes and digest of the content of each recording, by name; and the number of all lines.
+
+    Raises:
+        DataError: `file-missing` or `file-invalid`, for a file that cannot be read at all.
+        ValueError: A file is packed, and there is no scratch folder.
+    """
+    found: dict[str, _Found] = {}
+    readable: list[tuple[Path, str]] = []
+    total = 0
+    for number, path in enumerate(files):
         try:
-            fields = parse_json(content)
-        except InvalidError as error:
-            self._report.left_out("label", "file-invalid", f"{place}: {error}")
-            return None
-        recording = cast(dict[str, object], fields).get("recording") if isinstance(fields, dict) else None
-        if isinstance(recording, str):
-            return recording
-        self._report.left_out("label", "record-invalid", f"{place}: `recording` is missing or is not a text")
+            plain = _seekable(path, scratch, number, report)
+            readable.append((plain, path.name))
+            with plain.open("rb") as file:
+                total += _note(number, file, path.name, found, report)
+        except OSError as error:
+            raise _unreadable(path, error) from error
+    names = sorted(found)
+    about = {name: (found[name].size, found[name].digest.hexdigest()) for name in names}
+    return GroupedLines(tuple(readable), {name: tuple(found[name].runs) for name in names}), about, total
+
+
+def _note(number: int, file: IO[bytes], name: str, found: dict[str, _Found], report: Report) -> int:
+    total = offset = 0
+    for line, content in enumerate(file, start=1):
+        if content.strip():
+            total += 1
+            recording = _recording(content, f"{name}:{line}", report)
+            if recording is not None:
+                entry = found.get(recording)
+                if entry is None:
+                    entry = found[recording] = _Found()
+                runs = entry.runs
+                if runs and runs[-4] == number and runs[-1] == offset:
+                    runs[-1] = offset + len(content)
+                else:
+                    runs.extend((number, line, offset, offset + len(content)))
+                entry.digest.update(content)
+                entry.size += len(content)
+        offset += len(content)
+    return total
+
+
+def _recording(content: bytes, place: str, report: Report) -> str | None:
+    # Parsing only to find one key would double the time of an ingest. A key that is there once can be found
+    # without; whoever parses the line later compares it.
+    if content.count(b'"recording"') == 1 and (found := _KEY.search(content)):
+        try:
+            return found[1].decode()
+        except UnicodeDecodeError:
+            pass
+    try:
+        fields = parse_json(content)
+    except InvalidError as error:
+        report.left_out("label", "file-invalid", f"{place}: {error}")
         return None
+    recording = cast(dict[str, object], fields).get("recording") if isinstance(fields, dict) else None
+    if isinstance(recording, str):
+        return recording
+    report.left_out("label", "record-invalid", f"{place}: `recording` is missing or is not a text")
+    return None
 
 
-def _seekable(file: Path, report: Report) -> IO[bytes]:
-    try:
-        if file.suffix == ".parquet":
-            return _unpacked(_parquet_lines(file, report))
-        if file.suffix == ".gz":
-            return _unpacked(_gzip_lines(file))
-        return file.open("rb")
-    except OSError as error:
-        raise DataError(Diagnostic("file-missing", f"{file} cannot be read: {error.strerror or error}")) from error
+def _unreadable(file: Path, error: OSError) -> DataError:
+    return DataError(Diagnostic("file-missing", f"{file} cannot be read: {error.strerror or error}"))
 
 
-def _unpacked(lines: Iterator[bytes]) -> IO[bytes]:
-    unpacked = tempfile.TemporaryFile()  # noqa: SIM115 - the caller closes it
-    try:
-        unpacked.writelines(lines)
-        unpacked.seek(0)
-    except BaseException:
-        unpacked.close()
-        raise
+def _seekable(file: Path, scratch: Path | None, number: int, report: Report) -> Path:
+    if file.suffix not in (".gz", ".parquet"):
+        return file
+    if scratch is None:
+        raise ValueError(f"{file} is packed, and there is no folder to unpack it")
+    unpacked = scratch / f"labels-{number}.jsonl"
+    with unpacked.open("wb") as lines:
+        lines.writelines(_parquet_lines(file, report) if file.suffix == ".parquet" else _gzip_lines(file))
     return unpacked
 
 

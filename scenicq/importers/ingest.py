@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import platform
+import shutil
 import signal
 import threading
-from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.base import Importer, Options, Source, read_class_map
+from scenicq.importers.base import Entry, Importer, Options, Source, read_class_map
+from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
-from scenicq.store.labels import Recording
-from scenicq.store.manifest import LeftOut, Manifest
-from scenicq.store.schema import ArrowTable
-from scenicq.store.writer import DatasetWriter, check_target
+from scenicq.importers.segments import Job, World, fingerprint, maps_digest, write_segments
+from scenicq.store.manifest import LeftOut, Manifest, is_dataset
+from scenicq.store.segment import SEGMENT_OBJECTS, Segment, read_segments, segments_of
+from scenicq.store.writer import DatasetWriter
 
 __all__ = ["IngestSummary", "Progress", "ingest"]
 
@@ -43,6 +43,7 @@ class IngestSummary:
         target: The dataset's folder.
         importer: Name of the importer.
         frames, objects, tracks, recordings: How many the dataset has.
+        reused: Recordings that were taken over from the dataset or from an ingest that was killed.
         by_class: Label objects of each class of the tree.
         left_out: What was left out or kept with a defect, with counts.
         diagnostics: Warnings that say which, at most a few of each kind.
@@ -54,6 +55,7 @@ class IngestSummary:
     objects: int
     tracks: int
     recordings: int
+    reused: int
     by_class: Mapping[str, int]
     left_out: tuple[LeftOut, ...]
     diagnostics: tuple[Diagnostic, ...]
@@ -66,53 +68,163 @@ def ingest(
     format: str | None = None,
     maps: Sequence[str | Path] = (),
     class_map: str | Path | None = None,
+    ego: str | None = None,
+    map_cache: str | Path | None = None,
     strict: bool = False,
     force: bool = False,
+    update: bool = False,
     jobs: int = 1,
     progress: Callable[[Progress], None] | None = None,
+    segment_objects: int = SEGMENT_OBJECTS,
 ) -> IngestSummary:
     """Make a dataset from a source.
 
-    The target is the whole dataset or, after an error, an interrupt or SIGTERM, what it was before.
+    The target is the whole dataset or, after an error, an interrupt or SIGTERM, what it was before. A process that is
+    killed leaves a hidden folder beside the target; the next ingest takes over what is complete and still true in it.
 
     Args:
         source: A folder that an importer recognises.
         target: Folder of the dataset to be.
         format: Name of the importer; found out by default.
-        maps: GeoJSON maps, `FILE` (the map is called like the file) or `NAME=FILE`; they replace maps of the source.
+        maps: GeoJSON or OpenDRIVE maps, `FILE` (the map is called like the file) or `NAME=FILE`; they replace maps of
+            the source.
         class_map: JSON file {class of the source: class of the tree}, before the source's own classes.
+        ego: For sources without an ego: a track, "nearest" or "none"; see `Options.ego`.
+        map_cache: Folder that keeps what Scenic's parser makes of OpenDRIVE maps; a temporary one by default.
         strict: Whether the first problem of the source is an error.
-        force: Whether a dataset that is there already may be replaced.
-        jobs: Number of threads that compute what depends on the map; the result does not depend on it.
+        force: Whether a dataset that is there already may be replaced, and everything is to be done anew.
+        update: Whether a dataset that is there already is brought up to date: recordings that are new or have changed
+            are read, those that the source no longer has go. The result is that of an ingest of the whole source.
+        jobs: Number of processes; the result does not depend on it.
         progress: Called after each recording; what it raises ends the ingest.
+        segment_objects: About how many label objects a part of the tables has at most.
 
     Raises:
         DataError: The source, an option or the target cannot be used; with `strict` any problem of the source.
     """
     source_path, target_path = Path(source), Path(target)
     importer = choose_importer(source_path, format)
-    options = Options(_map_files(maps), {} if class_map is None else read_class_map(Path(class_map)))
+    given = _map_files(maps)
+    classes = {} if class_map is None else read_class_map(Path(class_map))
     report = Report(strict=strict)
-    check_target(target_path, force=force)  # reading a large source only to find the target taken would be unkind
-    with _terminable():
+    with _terminable(), DatasetWriter(target_path, {}, force=force, update=update) as writer:
+        scratch = _scratch(writer)
+        converted = convert_maps(given, scratch if map_cache is None else Path(map_cache), report)
+        options = Options(converted, classes, scratch, ego)
         opened = importer.read(source_path, options, report)
-        with closing(opened.recordings), DatasetWriter(target_path, opened.maps, force=force) as writer:
-            frames = 0
-            for recording, rows in _prepared(opened.recordings, writer, jobs):
-                writer.add(recording, rows)
-                frames += len(recording.labels)
-                if progress is not None:
-                    progress(Progress(frames, opened.frames, recording.name))
-            if frames == 0:
-                raise DataError([Diagnostic("dataset-empty", f"{source_path} holds no frame"), *report.diagnostics])
-            provenance = _provenance(source_path, opened, options, class_map, strict)
-            manifest = writer.finish(
-                name=opened.name, importer=importer.name, left_out=report.counts, provenance=provenance
-            )
-    return _summary(target_path, importer, manifest, report)
+        writer.maps = opened.maps
+        entries = {entry.name: entry for entry in opened.entries}
+        groups = [
+            [entries[name] for name in names]
+            for names in segments_of([(entry.name, entry.weight) for entry in opened.entries], segment_objects)
+        ]
+        reached = _Reached(opened.frames, progress)
+        known = _known(writer, target_path if update and not force else None)
+        reused = _write_all(opened, writer, groups, known, strict=strict, jobs=jobs, reached=reached)
+        for segment in writer.segments:
+            report.merge(segment.counts, segment.told)
+        if not any(segment.recordings for segment in writer.segments):
+            raise DataError([Diagnostic("dataset-empty", f"{source_path} holds no frame"), *report.diagnostics])
+        provenance = _provenance(source_path, opened, replace(options, maps=given), class_map, strict)
+        manifest = writer.finish(
+            name=opened.name, importer=importer.name, left_out=report.counts, provenance=provenance
+        )
+    return _summary(target_path, importer, manifest, report, reused)
 
 
-def _summary(target: Path, importer: Importer, manifest: Manifest, report: Report) -> IngestSummary:
+class _Reached:
+    """Counts what is done, and says so."""
+
+    def __init__(self, total: int, progress: Callable[[Progress], None] | None) -> None:
+        self._total = total
+        self._progress = progress
+        self._frames = 0
+
+    def __call__(self, recording: str, frames: int) -> None:
+        self._frames += frames
+        if self._progress is not None:
+            self._progress(Progress(self._frames, self._total, recording))
+
+
+def _scratch(writer: DatasetWriter) -> Path:
+    folder = writer.folder / "scratch"
+    try:
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+    except OSError as error:
+        raise writer.unwritable(error) from error
+    return folder
+
+
+_Known = Mapping[tuple[str, int | None], tuple[Segment, tuple[Path, int]]]
+"""Segments that need not be written again, with the dataset and number where their files are.
+
+The key is the fingerprint, and the number that the segment must have; None for any.
+"""
+
+
+def _known(writer: DatasetWriter, target: Path | None) -> _Known:
+    """Those that a killed ingest left, at their places, and those of the dataset that is brought up to date."""
+    old = {} if target is None or not is_dataset(target) else read_segments(target)
+    found: dict[tuple[str, int | None], tuple[Segment, tuple[Path, int]]] = {}
+    for number, segment in old.items():
+        found[segment.fingerprint, None] = segment, (target or writer.folder, number)
+    for number, segment in writer.left.items():
+        found[segment.fingerprint, number] = segment, (writer.folder, number)
+    return found
+
+
+def _write_all(
+    opened: Source,
+    writer: DatasetWriter,
+    groups: Sequence[Sequence[Entry]],
+    known: _Known,
+    *,
+    strict: bool,
+    jobs: int,
+    reached: _Reached,
+) -> int:
+    """Write or take over every segment; the result is the number of recordings that were taken over."""
+    context = (opened.context, maps_digest(opened.maps), str(strict))
+    world = World(writer.folder, opened.maps, strict)
+    reused = 0
+    todo = {number: frozenset[tuple[str, str]]() for number in range(len(groups))}
+    everything = dict(todo)
+    while todo:
+        waiting: list[Job] = []
+        moves: list[tuple[int, Segment, tuple[Path, int]]] = []
+        for number, taken in todo.items():
+            mark = fingerprint(context, groups[number], taken)
+            found = known.get((mark, number)) or known.get((mark, None))
+            if found is not None:
+                moves.append((number, *found))
+            else:
+                names = [entry.name for entry in groups[number]]
+                waiting.append(Job(number, opened.reader(names), mark, taken))
+        reused += _take_over(writer, moves, reached)
+        try:
+            written = write_segments(world, waiting, jobs, reached)
+            for job, segment in zip(waiting, written, strict=True):
+                writer.adopt(job.number, segment)
+        except OSError as error:
+            raise writer.unwritable(error) from error
+        todo = {}
+        for number, recording, frame in writer.repeated_frames():
+            todo[number] = everything[number] = everything[number] | {(recording, frame)}
+    return reused
+
+
+def _take_over(writer: DatasetWriter, moves: Sequence[tuple[int, Segment, tuple[Path, int]]], reached: _Reached) -> int:
+    reused = 0
+    for number, segment, place in moves:
+        writer.adopt(number, segment, None if place == (writer.folder, number) else place)
+        reused += len(segment.recordings)
+        for name, counts in segment.recordings.items():
+            reached(name, counts.frames)
+    return reused
+
+
+def _summary(target: Path, importer: Importer, manifest: Manifest, report: Report, reused: int) -> IngestSummary:
     return IngestSummary(
         target=target,
         importer=importer.name,
@@ -120,35 +232,11 @@ def _summary(target: Path, importer: Importer, manifest: Manifest, report: Repor
         objects=manifest.total.objects,
         tracks=manifest.tracks,
         recordings=len(manifest.by_recording),
+        reused=reused,
         by_class=manifest.by_class,
         left_out=manifest.left_out,
         diagnostics=report.diagnostics,
     )
-
-
-def _prepared(
-    recordings: Iterator[Recording], writer: DatasetWriter, jobs: int
-) -> Iterator[tuple[Recording, Mapping[str, ArrowTable]]]:
-    """Recordings in their order with their rows; at most a few recordings are held."""
-    if jobs <= 1:
-        for recording in recordings:
-            yield recording, writer.prepare(recording)
-        return
-    with ThreadPoolExecutor(jobs) as threads:
-        waiting: deque[tuple[Recording, Future[dict[str, ArrowTable]]]] = deque()
-        try:
-            for recording in recordings:
-                writer.index(recording.map)  # built here, so that no two threads build it
-                waiting.append((recording, threads.submit(writer.prepare, recording)))
-                if len(waiting) > jobs:
-                    first, rows = waiting.popleft()
-                    yield first, rows.result()
-            while waiting:
-                first, rows = waiting.popleft()
-                yield first, rows.result()
-        finally:
-            for _, rows in waiting:
-                rows.cancel()
 
 
 @contextmanager
@@ -187,6 +275,7 @@ def _provenance(
         "options": {
             "maps": {name: str(file) for name, file in options.maps.items()},
             "class_map": None if class_map is None else str(class_map),
+            "ego": options.ego,
             "strict": strict,
         },
         "facts": dict(opened.facts),

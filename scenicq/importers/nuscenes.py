@@ -6,10 +6,12 @@ of the ego is that of the middle of its rear axle. The ego's box and velocities 
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.angles import normalize
 from scenicq.geometry.features import MapFeature
 from scenicq.importers import fields
-from scenicq.importers.base import ClassNames, Labels, Options, Source, read_maps
+from scenicq.importers.base import ClassNames, Entry, Labels, Options, Source, read_maps
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.json_tables import read_list
 from scenicq.importers.nuscenes_map import read_expansion
@@ -25,7 +27,7 @@ from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject, Recording
 
-__all__ = ["NuScenes"]
+__all__ = ["NuScenes", "SceneReader"]
 
 _TABLES = "scene sample sample_annotation instance category attribute sample_data ego_pose calibrated_sensor sensor log"
 _EGO_SIZE_M = (1.730, 4.084, 1.562)
@@ -69,12 +71,16 @@ class NuScenes:
             raise DataError([Diagnostic("file-missing", f"{folder / name}.json is not there") for name in missing])
         tables = _Tables(folder, report)
         maps = _maps(folder.parent, tables.locations, options, report)
-        classes = ClassNames(taxonomy("nuscenes"), options, report)
+        classes = {**taxonomy("nuscenes"), **options.class_map}
+        scenes = sorted(((tables.scene(token) for token in tables.scenes)), key=lambda scene: scene.name)
+        by_name = {scene.name: scene for scene in scenes}
         return Source(
             name=f"nuscenes-{folder.name}",
             maps=maps,
-            recordings=_recordings(tables, classes, maps, report),
+            entries=tuple(Entry(scene.name, scene.weight, scene.digest()) for scene in scenes),
+            reader=lambda names: SceneReader(tuple(by_name[name] for name in names), classes),
             frames=len(tables.samples),
+            context=json.dumps(sorted(classes.items())),
             facts={
                 "ego_size_m": dict(zip(("width", "length", "height"), _EGO_SIZE_M, strict=True)),
                 "ego_centre_ahead_of_rear_axle_m": _AXLE_TO_CENTRE_M,
@@ -132,6 +138,25 @@ class _Tables:
         self.classes = self._read_classes()
         self.boxes: defaultdict[str, list[_Box]] = defaultdict(list)
         self._read_boxes()
+
+    def scene(self, token: str) -> _SceneContent:
+        """All that belongs to a scene."""
+        scene = self.scenes[token]
+        samples = sorted(self.samples_of[token], key=lambda sample: (sample.time, sample.token))
+        instants = tuple(
+            _Instant(
+                sample.token,
+                sample.time,
+                sample.place,
+                self.poses.get(sample.token),
+                tuple(sorted(self.sensors[sample.token].items())),
+                tuple(self.boxes.pop(sample.token, ())),
+            )
+            for sample in samples
+        )
+        tracks = sorted({box.track for instant in instants for box in instant.boxes})
+        classes = tuple((track, self.classes[track]) for track in tracks)
+        return _SceneContent(scene.name, scene.location, tuple(scene.params.items()), instants, classes)
 
     def _add_scene(self, token: str, row: Record, place: str, logs: Mapping[str, tuple[str, str | None]]) -> None:
         name = fields.text(row, "name")
@@ -214,11 +239,13 @@ class _Tables:
     def _rows(self, table: str, what: str) -> Iterator[tuple[str, Record, str]]:
         """Token, fields and place of each row."""
         path = self._folder / f"{table}.json"
+        escapes = _has_escapes(path)
         for element, line in read_list(path):
             place = f"{path.name}:{line}"
             try:
                 row = fields.record(element, "it")
-                fields.check_characters(row)
+                if escapes:
+                    fields.check_characters(row)
                 token = fields.text(row, "token")
             except InvalidError as error:
                 self._report.left_out(what, "record-invalid", f"{place}: {error}")
@@ -233,41 +260,81 @@ class _Tables:
             return None
 
 
-def _recordings(
-    tables: _Tables, classes: ClassNames, maps: Mapping[str, object], report: Report
-) -> Generator[Recording]:
-    checked = Labels(maps, report)
-    for token, scene in sorted(tables.scenes.items(), key=lambda item: item[1].name):
-        samples = sorted(tables.samples_of[token], key=lambda sample: (sample.time, sample.token))
-        posed: list[_Sample] = []
-        for sample in samples:
-            if sample.token in tables.poses:
-                posed.append(sample)
-            else:
-                message = f"{sample.place}: sample `{sample.token}` has no sound {_POSE_CHANNEL} pose"
-                report.left_out("label", "record-invalid", message)
-        labels = list(_labels(scene, posed, tables, classes))
-        recording = checked.recording(scene.name, labels)
-        if recording is not None:
-            yield recording
-        for sample in samples:  # read once: nothing keeps them from here on
-            tables.boxes.pop(sample.token, None)
+@dataclass(frozen=True, slots=True)
+class _Instant:
+    """A sample with all that belongs to it; `pose` is that of the ego: x, y, heading."""
+
+    token: str
+    time: int
+    place: str
+    pose: tuple[float, float, float] | None
+    sensors: tuple[tuple[str, str], ...]
+    boxes: tuple[_Box, ...]
 
 
-def _labels(scene: _Scene, samples: list[_Sample], tables: _Tables, classes: ClassNames) -> Iterator[tuple[Label, str]]:
-    egos = [tables.poses[sample.token] for sample in samples]
+@dataclass(frozen=True, slots=True)
+class _SceneContent:
+    """A scene with all that belongs to it.
+
+    Attributes:
+        instants: In order of time.
+        classes: Class name of each track.
+    """
+
+    name: str
+    location: str
+    params: tuple[tuple[str, str | float | bool], ...]
+    instants: tuple[_Instant, ...]
+    classes: tuple[tuple[str, str], ...]
+
+    @property
+    def weight(self) -> int:
+        return sum(len(instant.boxes) for instant in self.instants)
+
+    def digest(self) -> str:
+        return hashlib.blake2b(repr(self).encode(errors="backslashreplace"), digest_size=16).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class SceneReader:
+    """Reads some scenes, which it holds.
+
+    Attributes:
+        scenes: In order of their names.
+        classes: Class of the tree for each class name.
+    """
+
+    scenes: tuple[_SceneContent, ...] = field(repr=False)
+    classes: Mapping[str, str]
+
+    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording]:
+        """The recordings in order of their names."""
+        classes = ClassNames(self.classes, report)
+        for scene in self.scenes:
+            for instant in scene.instants:
+                if instant.pose is None:
+                    message = f"{instant.place}: sample `{instant.token}` has no sound {_POSE_CHANNEL} pose"
+                    report.left_out("label", "record-invalid", message)
+            found = labels.recording(scene.name, list(_labels(scene, classes)))
+            if found is not None:
+                yield found
+
+
+def _labels(scene: _SceneContent, classes: ClassNames) -> Iterator[tuple[Label, str]]:
+    posed = [(instant, instant.pose) for instant in scene.instants if instant.pose is not None]
     centres = [
-        (sample.time, x - _AXLE_TO_CENTRE_M * math.sin(heading), y + _AXLE_TO_CENTRE_M * math.cos(heading))
-        for sample, (x, y, heading) in zip(samples, egos, strict=True)
+        (instant.time, x - _AXLE_TO_CENTRE_M * math.sin(heading), y + _AXLE_TO_CENTRE_M * math.cos(heading))
+        for instant, (x, y, heading) in posed
     ]
     tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
     step: dict[str, int] = {}
-    for sample in samples:
-        for box in tables.boxes[sample.token]:
+    for instant, _ in posed:
+        for box in instant.boxes:
             step[box.token] = len(tracks[box.track])
-            tracks[box.track].append((sample.time, box.x, box.y))
+            tracks[box.track].append((instant.time, box.x, box.y))
     width, length, height = _EGO_SIZE_M
-    for number, sample in enumerate(samples):
+    names, params = dict(scene.classes), dict(scene.params)
+    for number, (instant, pose) in enumerate(posed):
         _, x, y = centres[number]
         ego = LabelObject(
             id="ego",
@@ -275,7 +342,7 @@ def _labels(scene: _Scene, samples: list[_Sample], tables: _Tables, classes: Cla
             source_class="vehicle.ego",
             x=x,
             y=y,
-            heading=egos[number][2],
+            heading=pose[2],
             width=width,
             length=length,
             height=height,
@@ -284,8 +351,8 @@ def _labels(scene: _Scene, samples: list[_Sample], tables: _Tables, classes: Cla
         objects = tuple(
             LabelObject(
                 id=box.token,
-                category=classes.category(tables.classes[box.track]),
-                source_class=tables.classes[box.track],
+                category=classes.category(names[box.track]),
+                source_class=names[box.track],
                 x=box.x,
                 y=box.y,
                 heading=box.heading,
@@ -296,11 +363,11 @@ def _labels(scene: _Scene, samples: list[_Sample], tables: _Tables, classes: Cla
                 track=box.track,
                 attributes=box.attributes,
             )
-            for box in tables.boxes[sample.token]
+            for box in instant.boxes
         )
-        sensors = dict(sorted(tables.sensors[sample.token].items()))
-        label = Label(sample.token, scene.name, sample.time, scene.location, ego, objects, scene.params, sensors)
-        yield label, sample.place
+        sensors = dict(instant.sensors)
+        label = Label(instant.token, scene.name, instant.time, scene.location, ego, objects, params, sensors)
+        yield label, instant.place
 
 
 def _velocity(track: list[tuple[int, float, float]], step: int) -> tuple[float, float] | None:
@@ -310,6 +377,15 @@ def _velocity(track: list[tuple[int, float, float]], step: int) -> tuple[float, 
     after = track[step + 1] if step + 1 < len(track) and track[step + 1][0] - here[0] <= _LONGEST_STEP_US else here
     seconds = (after[0] - before[0]) / 1e6
     return None if seconds <= 0 else ((after[1] - before[1]) / seconds, (after[2] - before[2]) / seconds)
+
+
+def _has_escapes(path: Path) -> bool:
+    """Whether a file may name a character by its number; only so can it have half of one."""
+    try:
+        with path.open("rb") as file:
+            return any(b"\\u" in line for line in file)
+    except OSError:
+        return True  # whoever reads it says so
 
 
 def _log(row: Record) -> tuple[str, str | None]:

@@ -6,9 +6,16 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.argoverse2 import Argoverse2
+from scenicq.importers.argoverse2_forecasting import Argoverse2Forecasting
 from scenicq.importers.base import Importer
+from scenicq.importers.commonroad import CommonRoad
+from scenicq.importers.interaction import Interaction
 from scenicq.importers.interchange import Interchange
+from scenicq.importers.kitti import Kitti
 from scenicq.importers.nuscenes import NuScenes
+from scenicq.importers.openlabel import OpenLabel
+from scenicq.importers.waymo import Waymo
 from scenicq.store.manifest import is_dataset
 
 __all__ = ["ENTRY_POINTS", "choose_importer", "importers"]
@@ -19,7 +26,17 @@ ENTRY_POINTS = "scenicq.importers"
 
 def importers() -> dict[str, Importer]:
     """All importers by name: the built-in ones, then those of installed packages."""
-    built_in: tuple[Importer, ...] = (Interchange(), NuScenes())
+    built_in: tuple[Importer, ...] = (
+        Interchange(),
+        NuScenes(),
+        Argoverse2(),
+        Argoverse2Forecasting(),
+        Waymo(),
+        CommonRoad(),
+        Kitti(),
+        OpenLabel(),
+        Interaction(),
+    )
     found: dict[str, Importer] = {importer.name: importer for importer in built_in}
     for entry in sorted(entry_points(group=ENTRY_POINTS), key=lambda entry: (entry.name, entry.value)):
         if entry.name not in found:

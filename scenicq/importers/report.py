@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.manifest import LeftOut
+from scenicq.store.segment import Problem
 
 __all__ = ["Report"]
 
@@ -27,7 +29,7 @@ class Report:
         """
         self._strict = strict
         self._counts: Counter[tuple[bool, str, str, str]] = Counter()
-        self._told: list[Diagnostic] = []
+        self._told: list[Problem] = []
         self._told_of: Counter[tuple[str, str]] = Counter()
 
     def left_out(self, what: str, code: str, message: str, *, hints: tuple[str, ...] = ()) -> None:
@@ -42,7 +44,7 @@ class Report:
         Raises:
             DataError: The ingest is strict.
         """
-        self._add((False, what, code, ""), Diagnostic(code, message, hints=hints, severity="warning"))
+        self._add(Problem(what, code, "", False, message, hints))
 
     def kept(self, what: str, code: str, message: str, *, name: str = "", hints: tuple[str, ...] = ()) -> None:
         """Something is taken with a defect.
@@ -61,7 +63,27 @@ class Report:
         if name and key in self._counts:
             self._counts[key] += 1
         else:
-            self._add(key, Diagnostic(code, message, hints=hints, severity="warning"))
+            self._add(Problem(what, code, name, True, message, hints))
+
+    def merge(self, counts: Iterable[tuple[str, str, str, bool, int]], told: Iterable[Problem]) -> None:
+        """Take in the `tally` and the `told` of another report, as if its problems had been reported here."""
+        before = {key for key in self._counts if key[0] and key[3]}
+        for problem in told:
+            if _key(problem) not in before and self._told_of[problem.what, problem.code] < _TOLD:
+                self._told.append(problem)
+                self._told_of[problem.what, problem.code] += 1
+        for what, code, name, kept, count in counts:
+            self._counts[kept, what, code, name] += count
+
+    @property
+    def tally(self) -> tuple[tuple[str, str, str, bool, int], ...]:
+        """How often each problem occurred: what, code, name, kept, count."""
+        return tuple((entry.what, entry.code, entry.name, entry.kept, entry.count) for entry in self.counts)
+
+    @property
+    def told(self) -> tuple[Problem, ...]:
+        """The first problems of each kind."""
+        return tuple(self._told)
 
     @property
     def counts(self) -> tuple[LeftOut, ...]:
@@ -74,20 +96,24 @@ class Report:
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Warnings: the first of each kind, then how many there were where more than those were kept."""
         more = [
-            Diagnostic(code, f"{self._total(what, code)} {what}s like this in all", severity="warning")
+            Diagnostic(code, f"{total} {what}s like this in all", severity="warning")
             for (what, code), told in sorted(self._told_of.items())
-            if told > _TOLD
+            if told >= _TOLD and (total := self._total(what, code)) > _TOLD
         ]
-        return (*self._told, *more)
+        return (*(Diagnostic(p.code, p.message, hints=p.hints, severity="warning") for p in self._told), *more)
 
     def _total(self, what: str, code: str) -> int:
         return sum(count for (_, *key, _name), count in self._counts.items() if key == [what, code])
 
-    def _add(self, key: tuple[bool, str, str, str], diagnostic: Diagnostic) -> None:
+    def _add(self, problem: Problem) -> None:
         if self._strict:
-            raise DataError(Diagnostic(diagnostic.code, diagnostic.message, hints=diagnostic.hints))
-        self._counts[key] += 1
-        _, what, code, _ = key
-        self._told_of[what, code] += 1
-        if self._told_of[what, code] <= _TOLD:
-            self._told.append(diagnostic)
+            raise DataError(Diagnostic(problem.code, problem.message, hints=problem.hints))
+        self._counts[_key(problem)] += 1
+        kind = problem.what, problem.code
+        if self._told_of[kind] < _TOLD:
+            self._told_of[kind] += 1
+            self._told.append(problem)
+
+
+def _key(problem: Problem) -> tuple[bool, str, str, str]:
+    return problem.kept, problem.what, problem.code, problem.name

@@ -1,0 +1,1 @@
+"""Does a label match a scenario? Read `matcher` first."""

@@ -6,29 +6,25 @@ Depends on what label objects observe (their *signature*), not on their values, 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
-from dataclasses import dataclass
 
 from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
 from scenicq.forest.nodes import Feature, Intersects, Logic, LogicOp, Node, RectangleAt
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
-from scenicq.forest.show import show
 from scenicq.match.options import MatchOptions
 
-__all__ = ["Signature", "build_groups", "describe_constraint", "twins"]
+__all__ = ["Signature", "build_groups", "describe_constraint"]
 
 Signature = tuple[frozenset[str], ...]
 """What is observed of each object of the scenario, by index; of the parameters at the end."""
 
 _ALWAYS = ("position", "heading")
-_SIZES = ("width", "length", "height")
 
 
-def _definition(scenario: Scenario, signature: Signature, feature: Feature) -> Node | None:
-    """The expression of a feature that is not observed (or whose observed value has noise added)."""
+def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, noisy: bool = False) -> Node | None:
+    """The expression of a feature that is not observed (or, unless `noisy`, whose observed value has noise added)."""
     thing = scenario.objects[feature.object]
-    hidden = thing.mutated and feature.property in _ALWAYS
+    hidden = thing.mutated and feature.property in _ALWAYS and not noisy
     if feature.property in signature[feature.object] and not hidden:
         return None
     return thing.properties[feature.property].value
@@ -38,9 +34,7 @@ def compared(thing: ScenarioObject, seen: frozenset[str]) -> list[str]:
     """The properties of an object that are compared with the label, in the order in which they are checked."""
     always = [name for name in _ALWAYS if name in seen and not thing.mutated]
     others = sorted(
-        name
-        for name, given in thing.properties.items()
-        if name in seen and name not in _ALWAYS and given.explicit
+        name for name, given in thing.properties.items() if name in seen and name not in _ALWAYS and given.explicit
     )
     return always + others
 
@@ -57,6 +51,10 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
     def observed(root: Node) -> Node:
         return expand(root, lambda feature: _definition(scenario, signature, feature))
 
+    def after_noise(root: Node) -> Node:
+        # built-in requirements are checked once the noise is added (language paper, figure 11)
+        return expand(root, lambda feature: _definition(scenario, signature, feature, noisy=True))
+
     found: list[Constraint] = []
     for name in sorted(signature[PARAMS] & scenario.params.keys() - options.ignore_params):
         given = scenario.params[name]
@@ -67,12 +65,14 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
             given = thing.properties[name]
             found.append(Comparison(thing.index, name, observed(given.value), given.span))
     for requirement in scenario.requirements:
-        if requirement.built_in is None or requirement.built_in in options.enforce:
+        if requirement.built_in is None:
             found.append(Condition(requirement, observed(requirement.condition)))
+        elif requirement.built_in in options.enforce:
+            found.append(Condition(requirement, after_noise(requirement.condition)))
     if BuiltIn.COLLISION in options.enforce:
         for first, second in itertools.combinations(scenario.solid, 2):
             requirement = _apart(scenario, first, second)
-            found.append(Condition(requirement, observed(requirement.condition)))
+            found.append(Condition(requirement, after_noise(requirement.condition)))
     return group_constraints(found)
 
 
@@ -103,37 +103,3 @@ def describe_constraint(scenario: Scenario, constraint: Constraint) -> str:
     if requirement.span is None:
         return "requirement"
     return " ".join(requirement.span.text.split())
-
-
-def twins(scenario: Scenario, groups: tuple[Group, ...]) -> Mapping[int, int]:
-    """Interchangeable objects: for each, the one before it that swapping with changes nothing.
-
-    Two objects are interchangeable if their constraints are the same text with the same shape, involve no object but
-    themselves and the ego, and share no random variable with anything else.
-    """
-    private: dict[int, list[Group]] = {}
-    shared: set[int] = set()
-    for group in groups:
-        others = [index for index in group.objects if index != scenario.ego]
-        if len(others) == 1:
-            private.setdefault(others[0], []).append(group)
-        else:
-            shared.update(others)
-    last: dict[object, int] = {}
-    found: dict[int, int] = {}
-    for thing in scenario.objects:
-        if thing.index == scenario.ego or thing.index in shared:
-            continue
-        key = (thing.category, tuple(sorted(_shape(group, thing.index) for group in private.get(thing.index, ()))))
-        if key in last:
-            found[thing.index] = last[key]
-        last[key] = thing.index
-    return found
-
-
-def _shape(group: Group, index: int) -> tuple[object, ...]:
-    """A key that is equal for groups that differ only in which object and which random variables they are about."""
-    return tuple(
-        (type(item).__name__, item.property if isinstance(item, Comparison) else "", show(item.expression, {index: 0}))
-        for item in group.constraints
-    )

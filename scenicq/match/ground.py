@@ -76,6 +76,8 @@ def replay(
 ) -> bool:
     """Whether a witness, evaluated plainly, satisfies every constraint within tolerance plus slack.
 
+    Where a field allows several directions, one use of it has one of them in all constraints that refer to it.
+
     Args:
         items: Constraints with what conditioning left of their expressions, and the label's values.
         assignment: Values of the random variables.
@@ -83,16 +85,33 @@ def replay(
         slack: The solver's precision.
     """
     return all(
-        any(_replay_one(item, assignment, tolerance, slack, turn) for turn in range(_choices(item[1], assignment)))
-        for item in items
+        any(_holds_with(part, assignment, tolerance, slack, turn) for turn in range(_choices(part)))
+        for part in _sharing(items)
     )
 
 
-MOST_CHOICES = 64
+_Items = list[tuple[Constraint, Node, Value]]
+
+MOST_CHOICES = 256
+"""Combinations of directions that are tried where a field allows several."""
 
 
-def _choices(node: Node, assignment: Mapping[Identity, Value]) -> int:
-    fields = sum(isinstance(below, DirectionAt) for below in postorder((node,)))
+def _sharing(items: _Items) -> list[_Items]:
+    """The items in parts that have no use of a field in common: one use is one direction, whoever refers to it."""
+    parts: list[tuple[set[int], _Items]] = []
+    for item in items:
+        uses = {id(below) for below in postorder((item[1],)) if isinstance(below, DirectionAt)}
+        joined: _Items = []
+        for part in [part for part in parts if part[0] & uses]:
+            parts.remove(part)
+            uses |= part[0]
+            joined += part[1]
+        parts.append((uses, [*joined, item]))
+    return [part for _, part in parts]
+
+
+def _choices(items: _Items) -> int:
+    fields = sum(isinstance(below, DirectionAt) for below in postorder([node for _, node, _ in items]))
     return min(MOST_CHOICES, 4**fields) if fields else 1
 
 
@@ -106,21 +125,19 @@ def _chooser(turn: int) -> Callable[[DirectionAt, tuple[float, ...]], float]:
     return choose
 
 
-def _replay_one(
-    item: tuple[Constraint, Node, Value],
-    assignment: Mapping[Identity, Value],
-    tolerance: Tolerance,
-    slack: float,
-    turn: int,
+def _holds_with(
+    items: _Items, assignment: Mapping[Identity, Value], tolerance: Tolerance, slack: float, turn: int
 ) -> bool:
-    constraint, node, observed = item
+    roots = tuple(node for _, node, _ in items)
     try:
-        values = evaluate_all((node,), assignment, None, _chooser(turn))
+        values = evaluate_all(roots, assignment, None, _chooser(turn))
     except CannotEvaluate:
         return False
-    for below in postorder((node,)):
+    for below in postorder(roots):
         if is_leaf(below):
             args = tuple(values[id(child)] for child in children(below))
             if not admits(cast(Leaf, below), args, values[id(below)], slack + ROUNDING):
                 return False
-    return holds(constraint, values[id(node)], observed, tolerance, slack + ROUNDING)
+    return all(
+        holds(constraint, values[id(node)], seen, tolerance, slack + ROUNDING) for constraint, node, seen in items
+    )

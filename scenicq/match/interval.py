@@ -5,6 +5,8 @@ meets the set of values that its expression takes: an interval for a number, an 
 for a position.
 """
 
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import itertools
@@ -20,6 +22,7 @@ from scenicq.forest.nodes import Constant, Identity, Leaf, Normal, PointIn, Rang
 from scenicq.geometry.meeting import meets, witness_point
 from scenicq.geometry.regions import Region
 from scenicq.match.affine import Affine, AffineVector, Variable
+from scenicq.match.ground import ROUNDING
 from scenicq.match.options import Tolerance
 
 __all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position", "tolerance_shape"]
@@ -109,7 +112,7 @@ def reach_number(form: Affine, leaves: Mapping[Identity, Leaf], observed: float,
         return _OPEN
     low, high = limits
     value = min(max(observed, low), high)
-    if abs(value - observed) > tolerance:
+    if abs(value - observed) > tolerance + ROUNDING:
         return _NO
     return Reach(True, _reaching(form, leaves, value))
 
@@ -150,6 +153,8 @@ def reach_position(
     points = {identity for identity, _ in variables if isinstance(leaves[identity], PointIn)}
     scalars = [variable for variable in variables if variable[0] not in points]
     limits = [ends(leaves[identity]) for identity, _ in scalars]
+    if not points:
+        limits = _cut(form, scalars, limits, observed, tolerance)
     bounded = [pair for pair in limits if pair is not None and all(map(math.isfinite, pair)) and pair[0] <= pair[1]]
     if len(points) > 1 or len(bounded) != len(limits) or len(bounded) > _MOST_CORNERS:
         return _OPEN
@@ -160,10 +165,31 @@ def reach_position(
     places = np.array([_offset(form, scalars, corner) for corner in corners])
     shape, radius = tolerance_shape(observed, tolerance)
     hull = shapely.MultiPoint(places).convex_hull
-    if shapely.distance(hull, shape) > radius + 1e-9:
+    if shapely.distance(hull, shape) > radius + ROUNDING:
         return _NO
     target = shapely.shortest_line(hull, shape).coords[0]
     return Reach(True, _solve(form, scalars, bounded, target))
+
+
+def _cut(
+    form: AffineVector,
+    scalars: list[Variable],
+    limits: list[tuple[float, float] | None],
+    observed: tuple[float, float],
+    tolerance: Tolerance,
+) -> list[tuple[float, float] | None]:
+    """The limits, a single infinite one cut to where it can lead to the observed position."""
+    free = [number for number, pair in enumerate(limits) if pair is not None and not all(map(math.isfinite, pair))]
+    if len(free) != 1 or None in limits:
+        return limits
+    reach = math.hypot(form[0].constant - observed[0], form[1].constant - observed[1]) + tolerance.reach + 1.0
+    steps = [math.hypot(*(part.terms.get(variable, 0.0) for part in form)) for variable in scalars]
+    for number, pair in enumerate(limits):
+        if number not in free and pair is not None:
+            reach += steps[number] * max(map(abs, pair))
+    size = reach / steps[free[0]]
+    low, high = cast("tuple[float, float]", limits[free[0]])
+    return [*limits[: free[0]], (max(low, -size), min(high, size)), *limits[free[0] + 1 :]]
 
 
 def _offset(form: AffineVector, variables: list[Variable], values: tuple[float, ...]) -> tuple[float, float]:

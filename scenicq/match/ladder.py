@@ -8,42 +8,26 @@ that it does not know.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 
-from scenicq.forest.bounds import Box, leaf_boxes, scalar_bounds, vector_bounds
+from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.condition import condition
 from scenicq.forest.evaluate import Observation
 from scenicq.forest.groups import Comparison, Constraint, Group
-from scenicq.forest.nodes import (
-    Compare,
-    CompareOp,
-    Constant,
-    DirectionAt,
-    DiscreteRange,
-    Identity,
-    Index,
-    Leaf,
-    Logic,
-    LogicOp,
-    Node,
-    PointIn,
-    Undefined,
-    Value,
-)
+from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Leaf, Node, Undefined, Value
 from scenicq.forest.walk import leaves, postorder
-from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.fields import VectorField
-from scenicq.geometry.membership import bounds as region_bounds
-from scenicq.geometry.regions import Disc, IntersectionOf, PolygonSet, Rectangle, Region, UnionOf
-from scenicq.match.affine import Affine, affine_scalar, affine_vector
+from scenicq.match.affine import AffineVector, affine_scalar, affine_vector
 from scenicq.match.ground import holds, replay, show_value
-from scenicq.match.interval import Reach, ends, reach_heading, reach_number, reach_position
+from scenicq.match.interval import Reach, reach_heading, reach_number, reach_position
+from scenicq.match.linear import NotLinear, inside, position_boxes, solve_affine
 from scenicq.match.options import Tolerance
-from scenicq.match.program import LinearSystem, Row
+from scenicq.match.program import Row
 
 __all__ = ["Item", "Maybe", "No", "Outcome", "Yes", "condition_group", "decide", "ground_cause"]
 
@@ -77,8 +61,10 @@ class Maybe:
 Outcome = Yes | No | Maybe
 
 _MOST_BRANCHES = 4096
-_SIDES = 32
-"""Corners of the polygons around and inside a disc of tolerance."""
+_MOST_PARTS = 200
+"""Parts of one cell that are looked at."""
+_LINEAR_SLACK = 1e-6
+"""Metres or radians that the witness of a linear program may be off."""
 
 
 def condition_group(group: Group, observed: Observation, scope: Mapping[Identity, Value] | None = None) -> list[Item]:
@@ -106,7 +92,7 @@ def ground_cause(item: Item) -> str:
 
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
     """Decide a group without a solver; `Maybe` with reason "nonlinear" where one is needed."""
-    return _Ladder(tolerance).decide(items, {}, [], exact=True)
+    return _Ladder(tolerance).decide(items, {}, [])
 
 
 class _Ladder:
@@ -116,14 +102,13 @@ class _Ladder:
         self.tolerance = tolerance
         self.branches = 0
 
-    def decide(self, items: list[Item], given: dict[Identity, Value], rows: list[Row], *, exact: bool) -> Outcome:
+    def decide(self, items: list[Item], given: dict[Identity, Value], rows: list[Row]) -> Outcome:
         """Decide constraints, given values of discrete variables and linear facts about the rest.
 
         Args:
             items: The constraints.
             given: Values chosen so far.
             rows: Facts that came with cells chosen so far.
-            exact: Whether those cells hold nothing but points where the field has their heading.
         """
         open_items: list[Item] = []
         for item in items:
@@ -136,17 +121,17 @@ class _Ladder:
         for leaf in leaves(*(node for _, node, _ in open_items)):
             options = _options(leaf)
             if options is not None:
-                return self._try_each(items, leaf, options, given, rows, exact=exact)
+                return self._try_each(items, leaf, options, given, rows)
         if len(open_items) == 1 and not rows and isinstance(open_items[0][0], Comparison):
             reached = self._invert(open_items[0])
-            if reached.possible:
+            if reached.possible and all(leaf.identity in reached.values for leaf in leaves(open_items[0][1])):
                 return Yes(given | dict(reached.values))
             if reached.possible is False:
                 return No(open_items[0][0])
         field = _free_direction(open_items)
         if field is not None:
-            return self._try_cells(items, field, given, rows, exact=exact)
-        return self._linear(open_items, given, rows, exact=exact)
+            return self._try_cells(items, field, given, rows)
+        return self._linear(open_items, given, rows)
 
     def _branch(self, constraint: Constraint, outcomes: Iterator[Outcome]) -> Outcome:
         blamed: Outcome = No(constraint)
@@ -167,15 +152,13 @@ class _Ladder:
         options: range,
         given: dict[Identity, Value],
         rows: list[Row],
-        *,
-        exact: bool,
     ) -> Outcome:
         def outcomes() -> Iterator[Outcome]:
             for option in options:
                 chosen = {leaf.identity: float(option)}
                 memo: dict[int, Node] = {}
                 fixed = [(c, condition(node, {}, chosen, memo), value) for c, node, value in items]
-                yield self.decide(fixed, given | chosen, rows, exact=exact)
+                yield self.decide(fixed, given | chosen, rows)
 
         return self._branch(items[0][0], outcomes())
 
@@ -195,132 +178,92 @@ class _Ladder:
             return reach_heading(scalar, variables, observed, self.tolerance.heading)
         return reach_number(scalar, variables, observed, self.tolerance.other)
 
-    def _boxes(self, items: list[Item]) -> dict[Identity, Box]:
-        reach = self.tolerance.reach
-        targets: list[tuple[Node, Box]] = []
-        for constraint, node, observed in items:
-            if isinstance(constraint, Comparison) and constraint.property == "position":
-                x, y = cast("tuple[float, float]", observed)
-                targets.append((node, ((x - reach, x + reach), (y - reach, y + reach))))
-        return leaf_boxes(targets)
-
     def _try_cells(
-        self, items: list[Item], field: DirectionAt, given: dict[Identity, Value], rows: list[Row], *, exact: bool
+        self, items: list[Item], field: DirectionAt, given: dict[Identity, Value], rows: list[Row]
     ) -> Outcome:
         """A field at a random point: one branch per cell near where the point can be."""
         constraint = items[0][0]
         place = affine_vector(field.point)
         if place is None or not isinstance(field.field, Constant):
             return Maybe(constraint, "nonlinear")
-        (x0, x1), (y0, y1) = vector_bounds(field.point, self._boxes(items))
+        (x0, x1), (y0, y1) = vector_bounds(field.point, position_boxes(items, self.tolerance))
         if not all(map(math.isfinite, (x0, x1, y0, y1))):
             return Maybe(constraint, "nonlinear")
         vector_field = cast(VectorField, field.field.value)
 
+        given_heading: dict[float, tuple[list[Item], Box] | No] = {}
+
         def outcomes() -> Iterator[Outcome]:
             for cell in vector_field.cells((x0, y0, x1, y1)):
-                memo: dict[int, Node] = {id(field): Constant(cell.heading, span=field.span)}
-                fixed = [(c, condition(node, {}, None, memo), value) for c, node, value in items]
-                inside = _inside(place, cell.polygon)
-                yield self.decide(fixed, given, [*rows, *inside], exact=exact and cell.exact)
+                if cell.heading not in given_heading:
+                    given_heading[cell.heading] = self._with_heading(items, field, cell.heading)
+                known = given_heading[cell.heading]
+                if isinstance(known, No):
+                    yield known
+                    continue
+                fixed, box = known
+                if _apart(cell.polygon, box):
+                    yield No(constraint)
+                    continue
+                more = [*rows, *inside(place, cell.polygon)]
+                outcome = self.decide(fixed, given, more)
+                if not cell.exact and not isinstance(outcome, No) and not self._confirmed(items, outcome):
+                    outcome = self._refine(items, fixed, given, more, place, cell.polygon)
+                yield outcome
 
         return self._branch(constraint, outcomes())
 
-    def _linear(self, items: list[Item], given: dict[Identity, Value], rows: list[Row], *, exact: bool) -> Outcome:
-        """Affine constraints: linear programs, one per combination of map cells and turns."""
+    def _with_heading(self, items: list[Item], field: DirectionAt, heading: float) -> tuple[list[Item], Box] | No:
+        """The constraints where the field has a heading, and where its point can then be."""
+        memo: dict[int, Node] = {id(field): Constant(heading, span=field.span)}
+        fixed = [(c, condition(node, {}, None, memo), value) for c, node, value in items]
+        for item in fixed:
+            if isinstance(item[1], Constant) and not holds(item[0], item[1].value, item[2], self.tolerance):
+                return No(item[0], ground_cause(item))
+        return fixed, vector_bounds(field.point, position_boxes(fixed, self.tolerance))
+
+    def _confirmed(self, items: list[Item], outcome: Outcome) -> bool:
+        """Whether a witness found in a cell that covers too much holds where the field is asked itself."""
+        return isinstance(outcome, Yes) and replay(items, outcome.values, self.tolerance, _LINEAR_SLACK)
+
+    def _refine(
+        self,
+        items: list[Item],
+        fixed: list[Item],
+        given: dict[Identity, Value],
+        rows: list[Row],
+        place: AffineVector,
+        cell: np.ndarray,
+    ) -> Outcome:
+        """A cell that covers too much, halved again and again: until a witness holds, or no part is left."""
+        (x0, y0), (x1, y1) = cell.min(axis=0).tolist(), cell.max(axis=0).tolist()
+        todo: deque[Box] = deque([((x0, x1), (y0, y1))])
+        for _ in range(_MOST_PARTS):
+            if not todo:
+                return No(items[0][0])
+            x, y = todo.popleft()
+            here = [*rows, Row(place[0], *x), Row(place[1], *y)]
+            outcome = self.decide(fixed, given, here)
+            if self._confirmed(items, outcome):
+                return outcome
+            if not isinstance(outcome, No):
+                wide = x[1] - x[0] >= y[1] - y[0]
+                low, high = x if wide else y
+                for half in ((low, (low + high) / 2), ((low + high) / 2, high)):
+                    todo.append((half, y) if wide else (x, half))
+        return Maybe(items[0][0], "nonlinear")
+
+    def _linear(self, items: list[Item], given: dict[Identity, Value], rows: list[Row]) -> Outcome:
         constraint = items[0][0]
-        system = LinearSystem(list(rows))
-        alternatives: list[list[list[Row]]] = []
-        round_rows: list[tuple[Affine, Affine, float]] = []
-        for item in items:
-            if not self._add(item, system, alternatives, round_rows):
-                return Maybe(constraint, "nonlinear")
-        variables = {leaf.identity: leaf for leaf in leaves(*(node for _, node, _ in items))}
-        boxes = self._boxes(items)
-        for leaf in variables.values():
-            if isinstance(leaf, PointIn):
-                cells, discs = _cells(leaf, boxes.get(leaf.identity))
-                if cells is None:
-                    return Maybe(constraint, "nonlinear")
-                x, y = (Affine(0.0, {(leaf.identity, axis): 1.0}) for axis in (0, 1))
-                alternatives.append([_inside((x, y), cell) for cell in cells])
-                for disc in discs:
-                    cx, cy = disc.center
-                    round_rows.append((x.plus(Affine(-cx, {})), y.plus(Affine(-cy, {})), disc.radius))
-            else:
-                limits = ends(leaf)
-                if limits is None:
-                    return Maybe(constraint, "nonlinear")
-                system.rows.append(Row(Affine(0.0, {(leaf.identity, 0): 1.0}), *limits))
-        outer = [*_discs(round_rows, outer=True)]
-        found = _search(system, sorted(alternatives, key=len), outer)
+        try:
+            found = solve_affine(items, rows, self.tolerance)
+        except NotLinear:
+            return Maybe(constraint, "nonlinear")
         if found is None:
             return No(constraint)
-        if round_rows:
-            found = _search(system, sorted(alternatives, key=len), [*_discs(round_rows, outer=False)])
-        if found is None:
-            return Maybe(constraint, "nonlinear")
-        values = given | _values(variables, found)
-        if not replay(items, values, self.tolerance, 1e-6):
-            return Maybe(constraint, "nonlinear")
-        return Yes(values) if exact or replay(items, values, self.tolerance, 0.0) else Maybe(constraint, "nonlinear")
-
-    def _add(
-        self,
-        item: Item,
-        system: LinearSystem,
-        alternatives: list[list[list[Row]]],
-        round_rows: list[tuple[Affine, Affine, float]],
-    ) -> bool:
-        """Add a constraint's rows to a system; False if it is not linear."""
-        constraint, node, observed = item
-        if not isinstance(constraint, Comparison):
-            return _add_condition(node, system)
-        if isinstance(observed, tuple):
-            form = affine_vector(node)
-            if form is None:
-                return False
-            x, y = (part.plus(Affine(value, {}), -1.0) for part, value in zip(form, observed, strict=True))
-            tolerance = self.tolerance
-            if constraint.property == "position" and tolerance.x is not None and tolerance.y is not None:
-                system.rows += [Row(x, -tolerance.x, tolerance.x), Row(y, -tolerance.y, tolerance.y)]
-            else:
-                radius = tolerance.position if constraint.property == "position" else tolerance.other
-                round_rows.append((x, y, radius))
-            return True
-        scalar = affine_scalar(node)
-        if scalar is None or not isinstance(observed, float):
-            return False
-        off = scalar.plus(Affine(observed, {}), -1.0)
-        if constraint.property != "heading":
-            system.rows.append(Row(off, -self.tolerance.other, self.tolerance.other))
-            return True
-        low, high = scalar_bounds(node)
-        allowed = self.tolerance.heading
-        if not (math.isfinite(low) and math.isfinite(high)):
-            return False
-        turns = range(
-            math.ceil((low - observed - allowed) / math.tau), math.floor((high - observed + allowed) / math.tau) + 1
-        )
-        alternatives.append([[Row(off, math.tau * k - allowed, math.tau * k + allowed)] for k in turns])
-        return True
-
-
-def _add_condition(node: Node, system: LinearSystem) -> bool:
-    if isinstance(node, Logic) and node.op is LogicOp.AND:
-        return all(_add_condition(part, system) for part in node.args)
-    if isinstance(node, Constant):
-        return node.value is True
-    if not isinstance(node, Compare) or node.op in (CompareOp.EQ, CompareOp.NE):
-        return False
-    left, right = affine_scalar(node.left), affine_scalar(node.right)
-    if left is None or right is None:
-        return False
-    off = left.plus(right, -1.0)
-    strict = node.op in (CompareOp.LT, CompareOp.GT)
-    below = node.op in (CompareOp.LT, CompareOp.LE)
-    system.rows.append(Row(off, -math.inf if below else 0.0, 0.0 if below else math.inf, strict))
-    return True
+        values = given | found
+        holding = replay(items, values, self.tolerance, _LINEAR_SLACK)
+        return Yes(values) if holding else Maybe(constraint, "nonlinear")
 
 
 def _options(leaf: Leaf) -> range | None:
@@ -341,77 +284,8 @@ def _free_direction(items: list[Item]) -> DirectionAt | None:
     return None
 
 
-def _inside(place: tuple[Affine, Affine], polygon: np.ndarray) -> list[Row]:
-    """Rows that keep a point in a convex polygon whose corners run counter-clockwise."""
-    rows: list[Row] = []
-    x, y = place
-    for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        length = math.hypot(bx - ax, by - ay)
-        if length > 0:
-            nx, ny = (by - ay) / length, (ax - bx) / length
-            side = x.times(nx).plus(y, ny).plus(Affine(float(nx * ax + ny * ay), {}), -1.0)
-            rows.append(Row(side, -math.inf, 0.0))
-    return rows
-
-
-def _cells(leaf: PointIn, box: Box | None) -> tuple[list[np.ndarray] | None, list[Disc]]:
-    """Convex cells of the region near where the point can be, and discs that hold it as well.
-
-    None for the cells if the region is anything but polygons, possibly cut to discs.
-    """
-    if not isinstance(leaf.region, Constant):
-        return None, []
-    region = cast(Region, leaf.region.value)
-    met = region.parts if isinstance(region, IntersectionOf) else (region,)
-    discs = [part for part in met if isinstance(part, Disc)]
-    others = [part for part in met if not isinstance(part, Disc)]
-    if len(others) != 1:
-        return None, []
-    base = others[0]
-    parts = base.parts if isinstance(base, UnionOf) else (base,)
-    if not all(isinstance(part, PolygonSet | Rectangle) for part in parts):
-        return None, []
-    west, south, east, north = region_bounds(region)
-    (x0, x1), (y0, y1) = box or ((west, east), (south, north))
-    limits = (max(x0, west), max(y0, south), min(x1, east), min(y1, north))
-    if limits[0] > limits[2] or limits[1] > limits[3]:
-        return [], discs
-    return convex_cells(base, limits), discs
-
-
-def _discs(
-    rounds: list[tuple[Affine, Affine, float]], *, outer: bool
-) -> Iterator[Row]:
-    """Rows that keep vectors in a regular polygon around (outer) or inside their disc."""
-    for x, y, radius in rounds:
-        reach = radius if outer else radius * math.cos(math.pi / _SIDES)
-        for side in range(_SIDES):
-            angle = math.tau * side / _SIDES
-            yield Row(x.times(math.cos(angle)).plus(y, math.sin(angle)), -math.inf, reach)
-
-
-def _search(
-    system: LinearSystem, alternatives: list[list[list[Row]]], rows: list[Row]
-) -> Mapping[tuple[Identity, int], float] | None:
-    """A solution under one choice of each alternative, depth first with early failure."""
-    if not alternatives:
-        return system.solve(rows)
-    if len(alternatives) > 1 and system.solve(rows) is None:
-        return None
-    for choice in alternatives[0]:
-        found = _search(system, alternatives[1:], [*rows, *choice])
-        if found is not None:
-            return found
-    return None
-
-
-def _values(
-    variables: Mapping[Identity, Leaf], found: Mapping[tuple[Identity, int], float]
-) -> dict[Identity, Value]:
-    values: dict[Identity, Value] = {}
-    for identity, leaf in variables.items():
-        if isinstance(leaf, PointIn):
-            values[identity] = (found.get((identity, 0), 0.0), found.get((identity, 1), 0.0))
-        else:
-            values[identity] = found.get((identity, 0), 0.0)
-    return values
+def _apart(polygon: np.ndarray, box: Box) -> bool:
+    """Whether a polygon lies outside of a box."""
+    low, high = polygon.min(axis=0), polygon.max(axis=0)
+    (x0, x1), (y0, y1) = box
+    return bool(low[0] > x1 or high[0] < x0 or low[1] > y1 or high[1] < y0)

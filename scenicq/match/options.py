@@ -16,7 +16,9 @@ Method = Literal["auto", "smt", "monolithic"]
 
 DEFAULT_TOLERANCE = 1e-3
 
-EXEMPT_PARAMS = frozenset({"map", "carla_map", "lgsvl_map", "render", "use2DMap", "time_step", "timestep", "weather_file"})
+EXEMPT_PARAMS = frozenset(
+    {"map", "carla_map", "lgsvl_map", "render", "use2DMap", "time_step", "timestep", "weather_file"}
+)
 """Parameters that say how to simulate, not what the scene is."""
 
 

@@ -10,7 +10,11 @@ from typing import Any
 
 from scenicq.match.affine import Affine, Variable
 
-__all__ = ["LinearSystem", "Row"]
+__all__ = ["LinearSystem", "NotSolved", "Row"]
+
+
+class NotSolved(Exception):
+    """The linear program came to no answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,9 @@ class LinearSystem:
 
         Strict rows are satisfied with the largest margin there is; none at all means no solution. Exact up to the
         feasibility tolerance of the linear program, 1e-9.
+
+        Raises:
+            NotSolved: The solver came to no answer.
         """
         rows = [*self.rows, *more]
         for row in rows:
@@ -61,7 +68,8 @@ def _solve(rows: list[Row], variables: list[Variable]) -> Mapping[Variable, floa
     margin = len(variables)
     count = margin + strict
     model = highs.HighsLp()
-    starts, indices, values, lows, highs_ = [0], [], [], [], []
+    starts, indices = [0], list[int]()
+    values, lows, highs_ = list[float](), list[float](), list[float]()
     for row in rows:
         sides = [(row.low, row.high, 0.0)]
         if row.strict:
@@ -91,8 +99,11 @@ def _solve(rows: list[Row], variables: list[Variable]) -> Mapping[Variable, floa
     solver.setOptionValue("threads", 1)
     solver.passModel(model)
     solver.run()
-    if solver.getModelStatus() != highs.HighsModelStatus.kOptimal:
+    status = solver.getModelStatus()
+    if status == highs.HighsModelStatus.kInfeasible:
         return None
+    if status != highs.HighsModelStatus.kOptimal:
+        raise NotSolved
     found = list(solver.getSolution().col_value)
     if strict and found[margin] <= _MARGIN:
         return None

@@ -1,13 +1,14 @@
 """Object correspondence search: which candidate each slot gets (query paper, algorithm 1, lines 3-9 and 15).
 
 Knows slots, candidates and causes, nothing of geometry. A callable judges partial assignments; the search backtracks to
-what is to blame, and never looks at more than it must: slots with fewest candidates first, a matching of all slots to
-distinct candidates as a necessary condition, interchangeable slots in one order only.
+what is to blame, and never looks at more than it must: slots that hang together and have few candidates first, a
+matching of all open slots to free candidates at every step, interchangeable slots in one order only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import itertools
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
@@ -29,7 +30,7 @@ class Slot:
 
     Attributes:
         name: Its index among the objects.
-        candidates: Indices of the candidates that pass its own conditions, in order of preference.
+        candidates: Indices of the candidates that pass its own conditions, ascending.
     """
 
     name: int
@@ -73,37 +74,72 @@ Check = Callable[[int, Mapping[int, int]], tuple[Answer, frozenset[int]]]
 """Judges an assignment after its newest slot got a candidate: the answer and the slots it rests on."""
 
 
-def matchable(slots: Sequence[Slot]) -> Mapping[int, int] | None:
-    """A way to give all slots distinct candidates, or None if there is none (augmenting paths)."""
-    holder: dict[int, int] = {}
-    by_name = {slot.name: slot for slot in slots}
+class _Matching:
+    """A matching of all slots to distinct candidates, kept while slots are pinned to candidates and released."""
 
-    def place(name: int) -> bool:
-        # Iterative depth-first augmentation: each frame is a slot and an iterator over its candidates.
+    def __init__(self, slots: Sequence[Slot]) -> None:
+        self.options = {slot.name: slot.candidates for slot in slots}
+        self.mate: dict[int, int] = {}
+        self.holder: dict[int, int] = {}
+        self.pinned: dict[int, int] = {}
+
+    def _augment(self, name: int) -> set[int]:
+        """Match a slot along an augmenting path; empty on success, else the pinned slots that stand in the way."""
+        blocked: set[int] = set()
         seen: set[int] = set()
-        path: list[tuple[int, Iterator[int], int]] = [(name, iter(by_name[name].candidates), -1)]
+        path: list[tuple[int, Iterator[int], int]] = [(name, iter(self.options[name]), -1)]
         while path:
             slot, options, _ = path[-1]
             for candidate in options:
                 if candidate in seen:
                     continue
                 seen.add(candidate)
+                if candidate in self.pinned:
+                    blocked.add(self.pinned[candidate])
+                    continue
                 path[-1] = (slot, options, candidate)
-                if candidate not in holder:
+                owner = self.holder.get(candidate)
+                if owner is None:
                     for taker, _, taken in path:
-                        holder[taken] = taker
-                    return True
-                owner = holder[candidate]
-                path.append((owner, iter(by_name[owner].candidates), -1))
+                        self.mate[taker], self.holder[taken] = taken, taker
+                    return set()
+                path.append((owner, iter(self.options[owner]), -1))
                 break
             else:
                 path.pop()
-        return False
+        return blocked | {name}
 
-    for slot in slots:
-        if not place(slot.name):
-            return None
-    return {slot: candidate for candidate, slot in holder.items()}
+    def complete(self) -> bool:
+        """Match every slot, if that is possible."""
+        return not any(self._augment(name) for name in self.options if name not in self.mate)
+
+    def pin(self, slot: int, candidate: int) -> set[int]:
+        """Fix a slot on a free candidate and keep the rest matched; empty on success, else whose pins forbid it."""
+        old, displaced = self.mate[slot], self.holder.get(candidate)
+        self.pinned[candidate] = slot
+        if old == candidate:
+            return set()
+        before = (dict(self.mate), dict(self.holder)) if displaced is not None else None
+        del self.holder[old]
+        self.mate[slot], self.holder[candidate] = candidate, slot
+        if displaced is None or before is None:
+            return set()
+        del self.mate[displaced]
+        blocked = self._augment(displaced)
+        if blocked:
+            self.mate, self.holder = before
+            del self.pinned[candidate]
+        return blocked
+
+    def release(self, candidate: int) -> None:
+        """Let a slot move again."""
+        del self.pinned[candidate]
+
+
+def matchable(slots: Sequence[Slot]) -> Mapping[int, int] | None:
+    """A way to give all slots distinct candidates, or None if there is none (augmenting paths)."""
+    matching = _Matching(slots)
+    return matching.mate if matching.complete() else None
 
 
 @dataclass(slots=True)
@@ -119,6 +155,7 @@ def find_assignments(
     *,
     fixed: Mapping[int, int] | None = None,
     twins: Mapping[int, int] | None = None,
+    links: Mapping[int, Collection[int]] | None = None,
     budget: int = 1_000_000,
     reporter: Reporter | None = None,
 ) -> Iterator[dict[int, int]]:
@@ -130,6 +167,7 @@ def find_assignments(
             every extension fail.
         fixed: Slots assigned beforehand.
         twins: For a slot, an earlier one that is interchangeable with it: it then takes later candidates only.
+        links: For a slot, those that it shares conditions with: they are assigned soon after it.
         budget: Candidates to try at most.
         reporter: Watches.
 
@@ -139,33 +177,45 @@ def find_assignments(
     watch = reporter or SilentReporter()
     assignment = dict(fixed or {})
     used = {candidate: slot for slot, candidate in assignment.items()}
-    order = _order(slots, twins or {})
-    if matchable([Slot(s.name, tuple(c for c in s.candidates if c not in used)) for s in order]) is None:
+    twin_of = twins or {}
+    order = _order(slots, twin_of, links or {})
+    matching = _Matching([Slot(s.name, tuple(c for c in s.candidates if c not in used)) for s in order])
+    if not matching.complete():
         return
     if not order:
         yield dict(assignment)
         return
     names = {slot.name for slot in order}
     frames = [_Frame(order[0], iter(order[0].candidates))]
+
+    def drop(slot: int) -> None:
+        candidate = assignment.pop(slot)
+        del used[candidate]
+        matching.release(candidate)
+
     while frames:
         frame = frames[-1]
         slot = frame.slot.name
         if slot in assignment:
-            del used[assignment.pop(slot)]
+            drop(slot)
         advanced = False
         for candidate in frame.options:
-            budget -= 1
-            if budget < 0:
-                raise Exhausted
             if candidate in used:
                 frame.blamed |= {used[candidate]} & names
                 continue
-            twin = (twins or {}).get(slot)
+            twin = twin_of.get(slot)
             if twin is not None and twin in assignment and candidate <= assignment[twin]:
                 frame.blamed.add(twin)
                 continue
+            budget -= 1
+            if budget < 0:
+                raise Exhausted
             assignment[slot] = candidate
             answer, blamed = check(slot, assignment)
+            if answer is not Answer.NO:
+                blocked = matching.pin(slot, candidate)
+                # the open slots that are left without a candidate are so because of the assigned ones alone
+                answer, blamed = (Answer.NO, frozenset(blocked & assignment.keys())) if blocked else (answer, blamed)
             if answer is Answer.NO:
                 del assignment[slot]
                 frame.blamed |= (blamed - {slot}) & names
@@ -177,40 +227,42 @@ def find_assignments(
             break
         if not advanced:
             frames.pop()
-            _jump(frames, frame, assignment, used, watch)
+            _jump(frames, frame, assignment, drop, watch)
         elif len(frames) == len(order):
             yield dict(assignment)
-            # Everything below a solution has to be tried for the next one: blame all that came before.
-            for earlier, later in zip(order, order[1:], strict=False):
-                frames[order.index(later)].blamed.add(earlier.name)
+            # below a solution nothing may be skipped: each slot goes back to the one before it
+            for earlier, later in itertools.pairwise(frames):
+                later.blamed.add(earlier.slot.name)
         else:
             following = order[len(frames)]
             frames.append(_Frame(following, iter(following.candidates)))
 
 
 def _jump(
-    frames: list[_Frame], failed: _Frame, assignment: dict[int, int], used: dict[int, int], watch: Reporter
+    frames: list[_Frame], failed: _Frame, assignment: Mapping[int, int], drop: Callable[[int], None], watch: Reporter
 ) -> None:
     """Go back to the latest slot that the failed one blames, dropping those in between (conflict-directed)."""
     while frames and frames[-1].slot.name not in failed.blamed:
         dropped = frames.pop().slot.name
         if dropped in assignment:
-            del used[assignment.pop(dropped)]
+            drop(dropped)
     if frames:
         back = frames[-1]
         back.blamed |= failed.blamed - {back.slot.name}
         watch.jumped(failed.slot.name, back.slot.name)
 
 
-def _order(slots: Sequence[Slot], twins: Mapping[int, int]) -> list[Slot]:
-    """Fewest candidates first; a twin right after the slot it follows, so that their order can prune."""
-    followers = {earlier: later for later, earlier in twins.items()}
-    by_name = {slot.name: slot for slot in slots}
-    heads = [slot for slot in slots if slot.name not in twins or twins[slot.name] not in by_name]
+def _order(slots: Sequence[Slot], twins: Mapping[int, int], links: Mapping[int, Collection[int]]) -> list[Slot]:
+    """Slots most linked to those before them first, then fewest candidates; a twin never before the one it follows."""
+    open_slots = {slot.name: slot for slot in slots}
+    linked = dict.fromkeys(open_slots, 0)
     ordered: list[Slot] = []
-    for slot in sorted(heads, key=lambda slot: (len(slot.candidates), slot.name)):
-        current: int | None = slot.name
-        while current is not None and current in by_name:
-            ordered.append(by_name[current])
-            current = followers.get(current)
+    while open_slots:
+        ready = [slot for slot in open_slots.values() if twins.get(slot.name) not in open_slots]
+        chosen = min(ready, key=lambda slot: (-linked[slot.name], len(slot.candidates), slot.name))
+        del open_slots[chosen.name]
+        ordered.append(chosen)
+        for other in links.get(chosen.name, ()):
+            if other in linked:
+                linked[other] += 1
     return ordered

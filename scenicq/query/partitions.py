@@ -157,12 +157,13 @@ def _lines(path: Path) -> list[dict[str, Any]]:
     return cast("list[dict[str, Any]]", lines)
 
 
-def gather(folder: Path, question: str | None = None) -> Gathered:
+def gather(folder: Path, question: str | None = None, *, only: int | None = None) -> Gathered:
     """Put the pieces in a folder together.
 
     Args:
         folder: Where the pieces are.
         question: Which question's; there must be only one if not given.
+        only: The number of a single piece, from 0; all of them by default.
 
     Raises:
         DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions.
@@ -173,14 +174,14 @@ def gather(folder: Path, question: str | None = None) -> Gathered:
         raise DataError(Diagnostic("file-invalid", f"{folder} holds pieces of {len(questions)} different questions",
                                    hints=("gather each from a folder of its own",)))  # fmt: skip
     chosen = question or next(iter(questions), "")
-    found = [path for path in found if path.name.startswith(f"{chosen}-")]
+    found = [path for path in found if path.name.startswith(f"{chosen}-{'' if only is None else f'{only:05}-'}")]
     if not found:
         raise DataError(Diagnostic("file-missing", f"{folder} holds no piece of a result",
                                    hints=("run `scenicq match ... --shard i/n -o` with this folder first",)))  # fmt: skip
     counts = {int(path.stem.rsplit("-", 1)[1]) for path in found}
     count = max(counts)
     missing = [str(n + 1) for n in range(count) if not is_done(folder, chosen, n, count)]
-    if missing or len(counts) > 1:
+    if only is None and (missing or len(counts) > 1):
         shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
         raise DataError(Diagnostic("file-missing", f"{len(missing)} of {count} pieces are missing: {shown}",
                                    hints=("run their shards again",)))  # fmt: skip

@@ -77,6 +77,16 @@ class Plan:
                 yield Excluded(row["frame"], row["recording"], row["timestamp_us"], step)
 
 
+    def left(self, connection: Any) -> list[int]:
+        """How many frames of the map are left before the first step and after each."""
+        sql = f"SELECT missed, count(*) FROM ({self.sql}) GROUP BY missed"
+        missed: dict[int | None, int] = dict(connection.execute(sql).fetchall())
+        left = [sum(missed.values())]
+        for number in range(len(self.steps)):
+            left.append(left[-1] - missed.get(number, 0))
+        return left
+
+
 def _text(value: str) -> str:
     return "'" + value.replace("'", "''") + "'"
 

@@ -6,8 +6,9 @@ Candidates go through the matcher in batches, in this process or in workers; res
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -20,11 +21,12 @@ from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
 from scenicq.query.plan import Excluded, Plan, frames_sql, make_plan
 from scenicq.query.results import Funnel, Result
 from scenicq.query.solving import LazySolver
 from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.labels import Label
 
 __all__ = ["Query", "QueryOptions", "read_program"]
 
@@ -44,6 +46,7 @@ class QueryOptions:
         jobs: Processes that match.
         limit: Matches after which to stop; None for all.
         every: Whether frames that do not match are results too.
+        all_matches: Whether every correspondence of a frame is a result of its own.
     """
 
     match: MatchOptions = MatchOptions()
@@ -54,6 +57,7 @@ class QueryOptions:
     jobs: int = 1
     limit: int | None = None
     every: bool = False
+    all_matches: bool = False
 
 
 def read_program(path: str | Path) -> Source:
@@ -139,13 +143,15 @@ class Query:
                 self.funnel.excluded[f"map {name}"] += count
         if errors and not found:
             raise errors[0]
+        if found:
+            self.funnel.warnings += _remarks(found[0][1])
         return found
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
         return [make_plan(s, network, self.options.match, self.recordings) for _, s, network in self._worlds()]
 
-    def results(self, progress: Callable[[int], None] | None = None) -> Iterator[Result]:
+    def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.
 
         Args:
@@ -183,19 +189,20 @@ class Query:
             else:
                 rows = _all_frames(connection, name, self.recordings)
             batches = _batches(rows)
-            decided = pool.run(name, batches) if pool else ((b, _decide(self.dataset, matcher, b)) for b in batches)
+            decided = pool.run(name, batches) if pool else ((b, _decide(self, matcher, b)) for b in batches)
             for batch, found in decided:
                 yield from self._merge(batch, found)
         finally:
             connection.close()
 
-    def _merge(self, batch: list[Excluded], found: dict[str, Result]) -> Iterator[tuple[Result | None, int]]:
+    def _merge(self, batch: list[Excluded], found: dict[str, list[Result]]) -> Iterator[tuple[Result | None, int]]:
         for row in batch:
             if row.step is None:
-                result = found[row.frame]
-                self.funnel.count(result.verdict)
-                shown = self.options.every or isinstance(result.verdict, Match | Unknown)
-                yield (result if shown else None), 1
+                first, *more = found[row.frame]
+                self.funnel.count(first.verdict)
+                shown = self.options.every or isinstance(first.verdict, Match | Unknown)
+                yield (first if shown else None), 1
+                yield from ((result, 0) for result in more)
             else:
                 self.funnel.exclude(row.step.what)
                 excluded = None
@@ -203,6 +210,22 @@ class Query:
                     cause = Cause(row.step.what, row.step.detail, row.step.span)
                     excluded = Result(row.frame, row.recording, row.timestamp_us, NoMatch(cause))
                 yield excluded, 1
+
+
+def _remarks(scenario: Scenario) -> list[Diagnostic]:
+    """What the author should know: parts that say nothing about whether a label matches."""
+    soft = [
+        Diagnostic(
+            "soft-requirement",
+            "this requirement excludes nothing",
+            span,
+            "holds only with a probability",
+            hints=("a scene that breaks it is still possible: write `require` for a condition that must hold",),
+            severity="warning",
+        )
+        for span in scenario.soft
+    ]
+    return [*scenario.warnings, *scenario.ignored, *soft]
 
 
 def _all_frames(connection: object, name: str, recordings: tuple[str, str] | None) -> Iterator[Excluded]:
@@ -227,12 +250,20 @@ def _batches(rows: Iterator[Excluded]) -> Iterator[list[Excluded]]:
         yield batch
 
 
-def _decide(dataset: Dataset, matcher: Matcher, batch: Sequence[Excluded]) -> dict[str, Result]:
+def _decide(query: Query, matcher: Matcher, batch: Sequence[Excluded]) -> dict[str, list[Result]]:
     frames = [row.frame for row in batch if row.step is None]
     return {
-        label.frame: Result(label.frame, label.recording, label.timestamp_us, matcher.match(label), label.sensors)
-        for label in (dataset.labels(frames) if frames else ())
+        label.frame: [
+            Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors)
+            for verdict in _verdicts(query, matcher, label)
+        ]
+        for label in (query.dataset.labels(frames) if frames else ())
     }
+
+
+def _verdicts(query: Query, matcher: Matcher, label: Label) -> list[Match] | list[Verdict]:
+    """The verdict on a label, or one for each correspondence by which it matches."""
+    return (list(matcher.matches(label)) if query.options.all_matches else []) or [matcher.match(label)]
 
 
 class _Pool:
@@ -250,9 +281,11 @@ class _Pool:
     def __exit__(self, *_: object) -> None:
         self.pool.shutdown(wait=True, cancel_futures=True)
 
-    def run(self, name: str, batches: Iterator[list[Excluded]]) -> Iterator[tuple[list[Excluded], dict[str, Result]]]:
+    def run(
+        self, name: str, batches: Iterator[list[Excluded]]
+    ) -> Iterator[tuple[list[Excluded], dict[str, list[Result]]]]:
         """Decide batches side by side, a bounded number ahead."""
-        pending: deque[tuple[list[Excluded], Future[dict[str, Result]]]] = deque()
+        pending: deque[tuple[list[Excluded], Future[dict[str, list[Result]]]]] = deque()
         for batch in batches:
             frames = [row for row in batch if row.step is None]
             pending.append((batch, self.pool.submit(_work, name, frames)))
@@ -276,12 +309,13 @@ _worker: list[_Worker] = []
 
 
 def _start_worker(path: Path, source: Source, options: QueryOptions) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, too, and ends the workers
     _worker[:] = [_Worker(Query(open_dataset(path), source, options), LazySolver(options.solver))]
 
 
-def _work(name: str, frames: Sequence[Excluded]) -> dict[str, Result]:
+def _work(name: str, frames: Sequence[Excluded]) -> dict[str, list[Result]]:
     (worker,) = _worker
     query = worker.query
     if name not in worker.matchers:
         worker.matchers[name] = Matcher(query.compile(name)[0], query.options.match, worker.solver)
-    return _decide(query.dataset, worker.matchers[name], frames)
+    return _decide(query, worker.matchers[name], frames)

@@ -18,45 +18,57 @@ from scenicq.forest.nodes import (
     ArithmeticOp,
     Bearing,
     Compare,
-    CompareOp,
     Constant,
     Contains,
     Coordinate,
     DirectionAt,
+    DiscAt,
     DiscreteRange,
     Distance,
+    Encloses,
     Feature,
     Identity,
     Index,
     Intersects,
-    Encloses,
     Logic,
-    LogicOp,
     Node,
     Norm,
     Normal,
     PointIn,
     Range,
+    RectangleAt,
+    RegionDifference,
+    RegionIntersection,
+    RegionUnion,
     Rotate,
     Scale,
+    SectorAt,
     Select,
     TruncatedNormal,
     Undefined,
     Value,
     VectorOf,
     VectorSum,
-    DiscAt,
-    SectorAt,
-    RectangleAt,
-    RegionDifference,
-    RegionIntersection,
-    RegionUnion,
 )
 from scenicq.forest.walk import children, postorder
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.regions import Rectangle
+from scenicq.smt.codes import (
+    Choice,
+    between,
+    cases,
+    compare_codes,
+    connect,
+    constant_code,
+    equal,
+    is_box,
+    known_region,
+    rotated,
+    same,
+    truth,
+)
 from scenicq.smt.formula import (
     FALSE,
-    TRUE,
     Formula,
     Num,
     Operator,
@@ -70,7 +82,8 @@ from scenicq.smt.formula import (
     disjunction,
     negation,
 )
-from scenicq.smt.inside import UnsupportedError, Vector, convex_cell, disc, inside_region
+from scenicq.smt.inside import UnsupportedError, Vector, convex_cell, disc, inside_region, picked
+from scenicq.smt.measure import Frame, box_holds, box_meets, boxes_meet, distance_term
 
 __all__ = ["Encoding", "Item", "Target", "UnsupportedError", "encode"]
 
@@ -99,16 +112,20 @@ class Encoding:
     Attributes:
         problem: The problem.
         names: The names of the variables of each random variable: one, or two for a point.
+        whole: The random variables that are whole numbers.
     """
 
     problem: Problem
     names: Mapping[Identity, tuple[str, ...]]
+    whole: frozenset[Identity] = frozenset()
 
     def values(self, witness: Mapping[str, float]) -> dict[Identity, Value]:
         """The values of the random variables in a witness."""
         found: dict[Identity, Value] = {}
         for identity, names in self.names.items():
             numbers = [float(witness[name]) for name in names]
+            if identity in self.whole:
+                numbers = [float(round(number)) for number in numbers]
             found[identity] = (numbers[0], numbers[1]) if len(numbers) == 2 else numbers[0]
         return found
 
@@ -126,7 +143,7 @@ def encode(groups: Sequence[Sequence[Item]]) -> Encoding:
     encoder = _Encoder()
     parts = [encoder.group(items) for items in groups]
     constraint = conjunction([*parts, *encoder.side])
-    return Encoding(Problem(tuple(encoder.variables), constraint), encoder.names)
+    return Encoding(Problem(tuple(encoder.variables), constraint), encoder.names, frozenset(encoder.whole))
 
 
 _SCALAR: dict[ArithmeticOp, Operator] = {
@@ -159,6 +176,7 @@ class _Encoder:
         self.variables: list[Variable] = []
         self.side: list[Formula] = []
         self.names: dict[Identity, tuple[str, ...]] = {}
+        self.whole: set[Identity] = set()
         self.terms: dict[int, object] = {}
         self.boxes: Mapping[Identity, Box] = {}
         self.keep: list[Node] = []
@@ -181,32 +199,34 @@ class _Encoder:
         if isinstance(code, Undefined):
             return FALSE
         if target.shape is None:
-            return _formula(code)
+            return truth(code)
         if isinstance(observed, tuple):
             x, y = cast(Vector, code)
             dx, dy = apply(Operator.SUB, x, observed[0]), apply(Operator.SUB, y, observed[1])
             if target.shape == "box":
-                return conjunction([*_between(dx, -target.a, target.a), *_between(dy, -target.b, target.b)])
+                return conjunction([*between(dx, -target.a, target.a), *between(dy, -target.b, target.b)])
             return disc(dx, dy, target.a)
-        if not isinstance(observed, float) or isinstance(observed, bool):
-            return TRUE if code == observed else FALSE
-        off = apply(Operator.SUB, cast(Term, code), observed)
+        if not isinstance(observed, float):
+            return same(code, observed)
+        if not isinstance(code, Term):
+            return FALSE
+        off = apply(Operator.SUB, code, observed)
         if target.shape == "angle":
             return self._near_angle(off, scalar_bounds(node, self.boxes), observed, target.a)
-        return conjunction(_between(off, -target.a, target.a))
+        return conjunction(between(off, -target.a, target.a))
 
     def _near_angle(self, off: Term, limits: tuple[float, float], observed: float, width: float) -> Formula:
         """An angle within `width` of a multiple of 2 pi: one case per turn, or by sine where it is unbounded."""
         low, high = limits[0] - observed, limits[1] - observed
         if math.isfinite(low) and math.isfinite(high):
             turns = range(math.ceil((low - width) / math.tau), math.floor((high + width) / math.tau) + 1)
-            return disjunction(
-                conjunction(_between(off, math.tau * k - width, math.tau * k + width)) for k in turns
-            )
+            return disjunction(conjunction(between(off, math.tau * k - width, math.tau * k + width)) for k in turns)
         if width >= math.pi / 2:
             return compare(">=", apply(Operator.COS, off), math.cos(min(width, math.pi)))
         sine = apply(Operator.SIN, off)
-        return conjunction([*_between(sine, -math.sin(width), math.sin(width)), compare(">", apply(Operator.COS, off), 0.0)])
+        return conjunction(
+            [*between(sine, -math.sin(width), math.sin(width)), compare(">", apply(Operator.COS, off), 0.0)]
+        )
 
     def _fresh(self, prefix: str, low: float = -math.inf, high: float = math.inf) -> Var:
         name = f"{prefix}{len(self.variables)}"
@@ -225,11 +245,11 @@ class _Encoder:
                 self.terms[id(node)] = lost if lost is not None and not decided else self._node(node, args)
         return self.terms[id(root)]
 
-    def _node(self, node: Node, args: list[object]) -> object:  # noqa: PLR0911, PLR0912
+    def _node(self, node: Node, args: list[object]) -> object:
         terms = cast("list[Term]", args)
         match node:
             case Constant():
-                return _constant(node.value)
+                return constant_code(node.value)
             case Feature():
                 raise UnsupportedError("a feature that was not conditioned")
             case Range() | Normal() | TruncatedNormal() | DiscreteRange() | Index():
@@ -251,27 +271,31 @@ class _Encoder:
                 x, y = cast(Vector, args[0])
                 return (apply(Operator.MUL, x, terms[1]), apply(Operator.MUL, y, terms[1]))
             case Rotate():
-                return _rotated(cast(Vector, args[0]), terms[1])
+                return rotated(cast(Vector, args[0]), terms[1])
             case Norm():
                 x, y = cast(Vector, args[0])
-                return apply(Operator.SQRT, apply(Operator.ADD, apply(Operator.POW, x, 2.0), apply(Operator.POW, y, 2.0)))
+                return apply(
+                    Operator.SQRT, apply(Operator.ADD, apply(Operator.POW, x, 2.0), apply(Operator.POW, y, 2.0))
+                )
             case Bearing():
                 x, y = cast(Vector, args[0])
                 return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
             case DirectionAt():
                 return self._direction(node, cast(Vector, args[1]))
             case Compare():
-                return _compare(node.op, args[0], args[1])
+                return compare_codes(node.op, args[0], args[1])
             case Logic():
-                return _logic(node.op, args)
+                return connect(node.op, args)
             case Contains():
                 return inside_region(node.region, cast(Vector, args[1]), self._around(node.point), self._code)
             case DiscAt() | SectorAt() | RectangleAt() | RegionUnion() | RegionIntersection() | RegionDifference():
                 return None
             case Distance():
-                raise UnsupportedError("the distance from a random point to a region")
-            case Intersects() | Encloses():
-                raise UnsupportedError("whether a random box lies in or meets a region")
+                return self._distance(node, cast(Vector, args[1]))
+            case Intersects():
+                return self._meeting(node)
+            case Encloses():
+                return box_holds(self._frame(node.inner).corners(), known_region(node.outer))
 
     def _around(self, point: Node) -> Box:
         return vector_bounds(point, self.boxes)
@@ -292,6 +316,7 @@ class _Encoder:
                 if not math.isfinite(high - low) or high - low > _MOST_INTEGERS:
                     raise UnsupportedError("an integer from a random or very long range")
                 numbers = range(math.ceil(low), math.floor(high) + 1)
+                self.whole.add(node.identity)
                 self.side.append(disjunction(compare("==", variable, float(n)) for n in numbers))
             case _:
                 pass
@@ -311,24 +336,62 @@ class _Encoder:
         return point
 
     def _select(self, node: Select, args: list[object]) -> object:
-        index, options = cast(Term, args[0]), args[1:]
-        if isinstance(options[0], Term):
+        index, options = args[0], args[1:]
+        if not isinstance(index, Term):
+            return index
+        defined = [option for option in options if not isinstance(option, Undefined)]
+        if not defined:
+            return options[0]
+        if all(isinstance(option, Term) for option in defined):
             chosen = self._fresh("pick")
-            self.side.append(_cases(index, [_equal(chosen, option) for option in options]))
+            self.side.append(cases(index, [equal(chosen, option) for option in options]))
             return chosen
-        if isinstance(options[0], tuple):
+        if all(isinstance(option, tuple) for option in defined):
             pair = (self._fresh("pick"), self._fresh("pick"))
             both = [
                 FALSE
                 if isinstance(option, Undefined)
-                else conjunction([_equal(mine, theirs) for mine, theirs in zip(pair, cast(Vector, option), strict=True)])
+                else conjunction([equal(mine, theirs) for mine, theirs in zip(pair, cast(Vector, option), strict=True)])
                 for option in options
             ]
-            self.side.append(_cases(index, both))
+            self.side.append(cases(index, both))
             return pair
-        if all(option is None or isinstance(option, Formula) for option in options) and options[0] is not None:
-            return _cases(index, cast("list[Formula]", options))
-        return None
+        if all(isinstance(option, Formula) for option in defined):
+            return cases(index, [option if isinstance(option, Formula) else FALSE for option in options])
+        return Choice(tuple((picked(index, n), option) for n, option in enumerate(options)))
+
+    def _distance(self, node: Distance, point: Vector) -> Term:
+        outside, inner = distance_term(known_region(node.region), point, self._around(node.point))
+        if not inner:
+            return outside
+        result = self._fresh("distance", 0.0)
+        inside = [conjunction([where, compare("==", result, term)]) for where, term in inner]
+        away = conjunction([*(negation(where) for where, _ in inner), compare("==", result, outside)])
+        self.side.append(disjunction([*inside, away]))
+        return result
+
+    def _meeting(self, node: Intersects) -> Formula:
+        boxes = [side for side in (node.left, node.right) if is_box(side)]
+        if len(boxes) == 2:
+            return boxes_meet(self._frame(boxes[0]), self._frame(boxes[1]))
+        if not boxes:
+            raise UnsupportedError("whether two random regions meet")
+        other = node.right if boxes[0] is node.left else node.left
+        return box_meets(self._frame(boxes[0]), known_region(other))
+
+    def _frame(self, node: Node) -> Frame:
+        """A box whose place may be random."""
+        match node:
+            case RectangleAt():
+                center = cast(Vector, self._code(node.center))
+                sizes = [cast(Term, self._code(part)) for part in (node.heading, node.width, node.length)]
+                return Frame.of(center, *sizes)
+            case Constant(value=Rectangle() as box):
+                return Frame.of(
+                    (Num(box.center[0]), Num(box.center[1])), Num(box.heading), Num(box.width), Num(box.length)
+                )
+            case _:
+                raise UnsupportedError("whether a random region lies in another")
 
     def _arithmetic(self, node: Arithmetic, args: list[Term]) -> Term:
         op = node.op
@@ -350,9 +413,7 @@ class _Encoder:
             return apply(Operator.ATAN2, apply(Operator.SIN, angle), apply(Operator.COS, angle))
         turns = range(math.ceil((low - math.pi) / math.tau), math.floor((high + math.pi) / math.tau) + 1)
         result = self._fresh("angle", -math.pi, math.pi)
-        self.side.append(
-            disjunction(_equal(result, apply(Operator.SUB, angle, math.tau * k)) for k in turns)
-        )
+        self.side.append(disjunction(equal(result, apply(Operator.SUB, angle, math.tau * k)) for k in turns))
         return result
 
     def _direction(self, node: DirectionAt, point: Vector) -> Term:
@@ -364,66 +425,9 @@ class _Encoder:
             raise UnsupportedError("the direction of a field at an unbounded point")
         heading = self._fresh("heading", -math.pi, math.pi)
         cells = cast(VectorField, node.field.value).cells((x0, y0, x1, y1))
-        cases = [
-            conjunction([compare("==", heading, cell.heading), convex_cell(point, cell.polygon)]) for cell in cells
-        ]
-        self.side.append(disjunction(cases))
+        self.side.append(
+            disjunction(
+                conjunction([compare("==", heading, cell.heading), convex_cell(point, cell.polygon)]) for cell in cells
+            )
+        )
         return heading
-
-
-def _constant(value: Value) -> object:
-    if isinstance(value, bool):
-        return TRUE if value else FALSE
-    if isinstance(value, float):
-        return Num(value)
-    if isinstance(value, tuple):
-        return (Num(value[0]), Num(value[1]))
-    return value
-
-
-def _formula(code: object) -> Formula:
-    if isinstance(code, Formula):
-        return code
-    if isinstance(code, Term):
-        return disjunction([compare("<", code, 0.0), compare("<", 0.0, code)])
-    return TRUE if code else FALSE
-
-
-def _between(term: Term, low: float, high: float) -> list[Formula]:
-    return [compare("<=", low, term), compare("<=", term, high)]
-
-
-def _equal(left: Term, right: object) -> Formula:
-    return FALSE if isinstance(right, Undefined) else compare("==", left, cast(Term, right))
-
-
-def _cases(index: Term, options: Sequence[Formula]) -> Formula:
-    return disjunction(
-        conjunction([compare("==", index, float(number)), option]) for number, option in enumerate(options)
-    )
-
-
-def _rotated(vector: Vector, angle: Term) -> Vector:
-    x, y = vector
-    c, s = apply(Operator.COS, angle), apply(Operator.SIN, angle)
-    return (
-        apply(Operator.SUB, apply(Operator.MUL, x, c), apply(Operator.MUL, y, s)),
-        apply(Operator.ADD, apply(Operator.MUL, x, s), apply(Operator.MUL, y, c)),
-    )
-
-
-def _compare(op: CompareOp, left: object, right: object) -> Formula:
-    if not (isinstance(left, Term) and isinstance(right, Term)):
-        if isinstance(left, Formula) or isinstance(right, Formula):
-            raise UnsupportedError("a comparison of truth values")
-        return TRUE if (left == right) == (op is CompareOp.EQ) else FALSE
-    if op is CompareOp.NE:
-        return negation(compare("==", left, right))
-    return compare(op.value, left, right)
-
-
-def _logic(op: LogicOp, args: list[object]) -> object:
-    parts = [FALSE if isinstance(arg, Undefined) else _formula(arg) for arg in args]
-    if op is LogicOp.NOT:
-        return FALSE if isinstance(args[0], Undefined) else negation(parts[0])
-    return conjunction(parts) if op is LogicOp.AND else disjunction(parts)

@@ -20,6 +20,7 @@ from scenicq.forest.nodes import (
     SectorAt,
     Select,
 )
+from scenicq.geometry import shapes
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import (
@@ -28,21 +29,29 @@ from scenicq.geometry.regions import (
     Everywhere,
     IntersectionOf,
     Nowhere,
+    PointSet,
     PolygonSet,
+    PolylineSet,
     Rectangle,
     Region,
     Sector,
     UnionOf,
 )
+from scenicq.geometry.shapes import Bounds
 from scenicq.smt.formula import FALSE, TRUE, Formula, Operator, Term, apply, compare, conjunction, disjunction, negation
 
-__all__ = ["UnsupportedError", "Vector", "convex_cell", "disc", "inside_region"]
+__all__ = ["UnsupportedError", "Vector", "convex_cell", "disc", "inside_region", "picked"]
 
 Vector: TypeAlias = tuple[Term, Term]
 
 
 class UnsupportedError(Exception):
     """A construct that has no formula; the message says which."""
+
+
+def picked(index: Term, number: int) -> Formula:
+    """That an index, known to be a whole number, is this one; wide of it, so that the opposite is robust, too."""
+    return conjunction([compare("<=", number - 0.25, index), compare("<=", index, number + 0.25)])
 
 
 def disc(dx: Term, dy: Term, radius: Term | float) -> Formula:
@@ -101,6 +110,32 @@ def _offset(point: Vector, center: tuple[Term | float, Term | float]) -> Vector:
     return apply(Operator.SUB, point[0], center[0]), apply(Operator.SUB, point[1], center[1])
 
 
+def _near(edge: np.ndarray, limits: Bounds) -> bool:
+    """Whether the box around an edge (x0, y0, x1, y1) meets the limits."""
+    x0, y0, x1, y1 = edge
+    west, south, east, north = limits
+    return min(x0, x1) <= east and max(x0, x1) >= west and min(y0, y1) <= north and max(y0, y1) >= south
+
+
+def _segment(point: Vector, edge: np.ndarray) -> Formula:
+    """A point on an edge (x0, y0, x1, y1)."""
+    x0, y0, x1, y1 = map(float, edge)
+    length = math.hypot(x1 - x0, y1 - y0)
+    if length == 0:
+        return conjunction([compare("==", point[0], x0), compare("==", point[1], y0)])
+    ux, uy = (x1 - x0) / length, (y1 - y0) / length
+    along = apply(Operator.ADD, apply(Operator.MUL, point[0], ux), apply(Operator.MUL, point[1], uy))
+    across = apply(Operator.SUB, apply(Operator.MUL, point[0], uy), apply(Operator.MUL, point[1], ux))
+    start = ux * x0 + uy * y0
+    return conjunction(
+        [
+            compare("==", across, uy * x0 - ux * y0),
+            compare(">=", along, start),
+            compare("<=", along, start + length),
+        ]
+    )
+
+
 def _known_region(region: Region, point: Vector, around: Box) -> Formula:
     match region:
         case Everywhere():
@@ -120,6 +155,18 @@ def _known_region(region: Region, point: Vector, around: Box) -> Formula:
             if limits[0] > limits[2] or limits[1] > limits[3]:
                 return FALSE
             return disjunction(convex_cell(point, cell) for cell in convex_cells(region, limits))
+        case PolylineSet():
+            (x0, x1), (y0, y1) = around
+            west, south, east, north = region_bounds(region)
+            limits = (max(x0, west), max(y0, south), min(x1, east), min(y1, north))
+            if limits[0] > limits[2] or limits[1] > limits[3]:
+                return FALSE
+            edges = (edge for line in region.near(limits) for edge in shapes.edges(line))
+            return disjunction(_segment(point, edge) for edge in edges if _near(edge, limits))
+        case PointSet():
+            return disjunction(
+                conjunction([compare("==", point[0], x), compare("==", point[1], y)]) for x, y in region.points
+            )
         case UnionOf():
             return disjunction(_known_region(part, point, around) for part in region.parts)
         case IntersectionOf():
@@ -127,8 +174,6 @@ def _known_region(region: Region, point: Vector, around: Box) -> Formula:
         case DifferenceOf():
             removed = _known_region(region.removed, point, around)
             return conjunction([_known_region(region.base, point, around), negation(removed)])
-        case _:
-            raise UnsupportedError(f"a random point on a {type(region).__name__}")
 
 
 def inside_region(region: Node, point: Vector, around: Box, code: Callable[[Node], object]) -> Formula:
@@ -141,7 +186,7 @@ def inside_region(region: Node, point: Vector, around: Box, code: Callable[[Node
         code: Gives the term of a subexpression.
 
     Raises:
-        UnsupportedError: The region is a line, finitely many points, or a sector of random angle.
+        UnsupportedError: The region is a sector of random angle.
     """
     match region:
         case Constant():
@@ -168,7 +213,7 @@ def inside_region(region: Node, point: Vector, around: Box, code: Callable[[Node
         case Select():
             index = cast(Term, code(region.index))
             return disjunction(
-                conjunction([compare("==", index, float(number)), inside_region(option, point, around, code)])
+                conjunction([picked(index, number), inside_region(option, point, around, code)])
                 for number, option in enumerate(region.options)
             )
         case _:

@@ -32,6 +32,7 @@ ROOT = "Object"
 Granularity = Literal["fine", "coarse"]
 """`coarse` folds all vehicles into `Car` and all people into `Pedestrian`, as the query paper's experiments did."""
 
+_SOURCES = ("argoverse2", "commonroad", "interaction", "kitti", "nuscenes", "openlabel", "waymo")
 _COARSE = {"Vehicle": "Car", "Pedestrian": "Pedestrian"}
 
 
@@ -99,7 +100,7 @@ def fold(category: str, granularity: Granularity) -> str:
 
 def taxonomy_names() -> tuple[str, ...]:
     """Names that `taxonomy` knows."""
-    return ("nuscenes", "scenic")
+    return (*_SOURCES, "scenic")
 
 
 @cache
@@ -107,14 +108,14 @@ def taxonomy(name: str) -> Mapping[str, str]:
     """Translation of a dataset's class names into the tree.
 
     Args:
-        name: "nuscenes", or "scenic" for the tree's own names.
+        name: One of `taxonomy_names()`; "scenic" is the tree's own names.
 
     Raises:
         KeyError: There is no such taxonomy.
     """
     if name == "scenic":
         return MappingProxyType({category: category for category in _tree()})
-    if name != "nuscenes":
+    if name not in _SOURCES:
         raise KeyError(name)
     return MappingProxyType({source: category for source, category in _load(name).items() if category is not None})
 

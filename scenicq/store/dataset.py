@@ -16,6 +16,7 @@ import duckdb
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
+from scenicq.store.frame_index import find_rows
 from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, Part, read_manifest
 from scenicq.store.reader import read_labels
@@ -81,11 +82,15 @@ class Dataset:
     def labels(self, frames: Iterable[str] | None = None) -> Iterator[Label]:
         """Labels in order of recording, time and frame, read in batches: memory does not grow with the dataset.
 
+        Of chosen frames only the row groups that hold them are read, each once.
+
         Args:
             frames: Only these frames; names that the dataset lacks are ignored. All by default.
         """
         wanted = None if frames is None else frozenset(frames)
-        return read_labels(self.files("labels"), self.files("objects"), self.files("sensors"), wanted)
+        parts = list(zip(*(self.files(table) for table in ("labels", "objects", "sensors")), strict=True))
+        rows = None if wanted is None else find_rows(self.files("frame_index"), wanted)
+        return read_labels(parts, rows, wanted)
 
     def verify(self) -> None:
         """Compare every file with its checksum.

@@ -1,4 +1,4 @@
-"""Writing one table as one Parquet file: bounded memory, temporary name, checksum."""
+"""Writing one Parquet file of a table: bounded memory, temporary name, checksum."""
 
 # pyarrow has no type stubs.
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
@@ -17,20 +17,28 @@ from scenicq.store.manifest import Part
 from scenicq.store.regions import GEO_METADATA
 from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS, ArrowTable
 
-__all__ = ["TableWriter", "sync_folder", "write_synced"]
+__all__ = ["TableWriter", "part_path", "sync_folder", "write_synced"]
 
 _ROW_GROUP = 122_880
+_DISTINCT = ("id", "properties")
+"""Columns of texts that hardly repeat: a dictionary of them would only cost."""
+
+
+def part_path(table: str, number: int) -> str:
+    """Path of a part of a table, relative to the dataset."""
+    return f"{table}/part-{number:05}.parquet"
 
 
 class TableWriter:
     """Collects rows of a table and writes them in row groups of one size, however they come in."""
 
-    def __init__(self, folder: Path, table: str) -> None:
-        """Open `TABLE/part-00000.parquet` under a temporary name.
+    def __init__(self, folder: Path, table: str, number: int = 0) -> None:
+        """Open the file `part_path(table, number)` under a temporary name.
 
         Args:
             folder: Of the dataset.
             table: A key of `SCHEMAS`.
+            number: Of the part.
 
         Raises:
             OSError: The folder cannot be written.
@@ -38,13 +46,13 @@ class TableWriter:
         metadata = {"scenicq_schema": str(SCHEMA_VERSION)} | ({"geo": GEO_METADATA} if table == "regions" else {})
         self._schema = SCHEMAS[table].with_metadata(metadata)
         self._folder = folder
-        self._path = folder / table / "part-00000.parquet"
-        self._temporary = self._path.with_suffix(".tmp")
-        self._path.parent.mkdir()
+        self._path = folder / part_path(table, number)
+        self._temporary = self._path.with_name(f"{self._path.name}.{os.getpid()}.tmp")
+        self._path.parent.mkdir(exist_ok=True)
         self._pending: list[ArrowTable] = []
         self._pending_rows = 0
         self._rows = 0
-        texts = [field.name for field in self._schema if field.type == pa.string()]
+        texts = [field.name for field in self._schema if field.type == pa.string() and field.name not in _DISTINCT]
         reals = [field.name for field in self._schema if field.type == pa.float64()]
         self._writer = pq.ParquetWriter(
             self._temporary,
@@ -76,9 +84,15 @@ class TableWriter:
         relative = self._path.relative_to(self._folder).as_posix()
         return Part(relative, self._path.stat().st_size, digest, self._rows)
 
+    @property
+    def rows(self) -> int:
+        """Rows added so far."""
+        return self._rows
+
     def abandon(self) -> None:
-        """Close the file without finishing it."""
+        """Close the file without finishing it, and remove it."""
         self._writer.close()
+        self._temporary.unlink(missing_ok=True)
 
     def _flush(self, rows: int) -> None:
         table = pa.concat_tables(self._pending).combine_chunks()
@@ -90,7 +104,7 @@ class TableWriter:
 
 def write_synced(path: Path, text: str) -> None:
     """Write a text file so that it is there completely or not at all, even if the machine stops."""
-    temporary = path.with_name(path.name + ".tmp")
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     with temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(text)
         file.flush()

@@ -1,5 +1,9 @@
 """What a map says about positions: regions around them, lane, direction of the road. Computed once, at ingest."""
 
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -7,12 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import shapely
 from numpy.typing import NDArray
 
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
-from scenicq.store.schema import MEMBERSHIP_RADIUS_M
+from scenicq.store.schema import MEMBERSHIP_RADIUS_M, ArrowArray
 
 __all__ = ["MapIndex", "Memberships"]
 
@@ -53,21 +58,27 @@ class MapIndex:
         point, feature = point[order], feature[order]
         return Memberships(point, feature, _distance(points[point], self._shapes[feature]))
 
-    def lanes(self, xy: NDArray[np.float64], near: Memberships) -> list[str | None]:
+    def lanes(self, xy: NDArray[np.float64], near: Memberships) -> ArrowArray:
         """The lane that contains each position; of several, as in intersections, that with the nearest centreline."""
         chosen = (near.distance == 0) & self._is_lane[near.feature] if len(self.ids) else np.zeros(0, dtype=bool)
         point, feature = near.point[chosen], near.feature[chosen]
-        lines = self._centerlines[feature]
-        offset = np.nan_to_num(_distance(np.asarray(shapely.points(xy[point])), lines), nan=np.inf)
-        lanes: list[str | None] = [None] * len(xy)
-        # Written from the farthest to the nearest, so that the nearest stays; of equals the first in the map.
-        for number in np.lexsort((-feature, -offset)):
-            lanes[point[number]] = self.ids[feature[number]]
-        return lanes
+        lane = np.full(len(xy), -1, dtype=np.int64)
+        if len(point):
+            first = np.flatnonzero(np.diff(point, prepend=-1))
+            alone = np.diff(first, append=len(point)) == 1
+            lane[point[first[alone]]] = feature[first[alone]]
+            several = np.repeat(~alone, np.diff(first, append=len(point)))
+            point, feature = point[several], feature[several]
+            lines = self._centerlines[feature]
+            offset = np.nan_to_num(_distance(np.asarray(shapely.points(xy[point])), lines), nan=np.inf)
+            # Written from the farthest to the nearest, so that the nearest stays; of equals the first in the map.
+            order = np.lexsort((-feature, -offset))
+            lane[point[order]] = feature[order]
+        return pa.array(self.ids, pa.string()).take(pa.array(lane, mask=lane < 0))
 
-    def road_directions(self, xy: NDArray[np.float64]) -> list[tuple[float, ...]]:
-        """The headings that the road has at positions of shape (n, 2); none where it has none."""
-        return self._network.roadDirection.values_many(xy)
+    def road_directions(self, xy: NDArray[np.float64]) -> ArrowArray:
+        """The headings that the road has at positions of shape (n, 2), as lists; none where it has none."""
+        return pa.array(self._network.roadDirection.values_many(xy), pa.list_(pa.float64()))
 
 
 def _distance(points: NDArray[Any], shapes: NDArray[Any]) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """From rows back to labels, in batches.
 
-The tables share one order, and `labels` counts the rows that each frame has in the others; so reading needs no join and
-no search: the rows of a frame start where those of the frame before it end.
+Parts of one number hold the same recordings, and each row of `labels` says where its rows in the other tables begin; so
+reading needs no join, and of chosen frames only the row groups that hold them are read.
 """
 
 # pyarrow has no type stubs.
@@ -11,15 +11,14 @@ no search: the rows of a frame start where those of the frame before it end.
 from __future__ import annotations
 
 import json
-from bisect import bisect_right
-from collections.abc import Iterator, Sequence
-from itertools import accumulate
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from scenicq.store.labels import Label, LabelObject
 from scenicq.store.schema import ArrowTable
@@ -33,88 +32,88 @@ _EGO_COLUMNS = [f"ego_{name}" for name in _OBJECT_COLUMNS[1:]]
 _REPEATED = ("class", "track", "recording", "map", "channel", "attributes", "params")
 """Ends of the names of columns with few distinct texts in many rows: decoding each once is several times faster."""
 _LABEL_COLUMNS = ["frame", "recording", "timestamp_us", "map", "params", "object_count", "sensor_count"]
+_LABEL_COLUMNS.extend(("first_object", "first_sensor"))
 
 
 def read_labels(
-    labels: Sequence[Path], objects: Sequence[Path], sensors: Sequence[Path], wanted: frozenset[str] | None
+    parts: Sequence[tuple[Path, Path, Path]], rows: NDArray[np.int64] | None, wanted: Collection[str] | None
 ) -> Iterator[Label]:
     """Labels in the order of the store.
 
     Args:
-        labels: Files of the table `labels`.
-        objects: Files of the table `objects`.
-        sensors: Files of the table `sensors`.
-        wanted: Frames to read; None for all.
+        parts: Files of the tables `labels`, `objects` and `sensors`, part by part.
+        rows: Rows of `labels` to look at, counted over all parts, in order; None for all.
+        wanted: Frames to yield; None for all that are looked at.
     """
-    with (
-        _Rows(labels, [*_LABEL_COLUMNS, *_EGO_COLUMNS]) as frame_rows,
-        _Rows(objects, _OBJECT_COLUMNS) as object_rows,
-        _Rows(sensors, ["channel", "path"]) as sensor_rows,
-    ):
-        first_object = first_sensor = 0
-        for start in range(0, len(frame_rows), _BATCH):
-            table = frame_rows.read(start, min(start + _BATCH, len(frame_rows)))
-            object_ends = list(accumulate(table["object_count"].to_pylist(), initial=first_object))
-            sensor_ends = list(accumulate(table["sensor_count"].to_pylist(), initial=first_sensor))
-            first_object, first_sensor = object_ends[-1], sensor_ends[-1]
-            frames: list[str] = table["frame"].to_pylist()
-            chosen = [number for number, frame in enumerate(frames) if wanted is None or frame in wanted]
-            if chosen:
-                yield from _labels(
-                    _picked(table, chosen),
-                    _members(object_rows, object_ends, chosen),
-                    _members(sensor_rows, sensor_ends, chosen),
-                )
+    first = 0
+    for labels, objects, sensors in parts:
+        if rows is not None and not len(rows):
+            return
+        with _Rows(labels, [*_LABEL_COLUMNS, *_EGO_COLUMNS]) as frame_rows:
+            size = len(frame_rows)
+            if rows is None:
+                chosen = np.arange(size)
+            else:
+                inside = np.searchsorted(rows, first + size)
+                chosen, rows = rows[:inside] - first, rows[inside:]
+            first += size
+            if len(chosen):
+                with _Rows(objects, _OBJECT_COLUMNS) as object_rows, _Rows(sensors, ["channel", "path"]) as sensor_rows:
+                    for start in range(0, len(chosen), _BATCH):
+                        table = frame_rows.take(chosen[start : start + _BATCH])
+                        if wanted is not None:
+                            kept = [number for number, name in enumerate(table["frame"].to_pylist()) if name in wanted]
+                            table = table if len(kept) == len(table) else table.take(kept)
+                        others, channels = (
+                            _members(object_rows, table, "object"),
+                            _members(sensor_rows, table, "sensor"),
+                        )
+                        yield from _labels(table, others, channels)
 
 
-def _members(rows: _Rows, ends: list[int], chosen: list[int]) -> ArrowTable:
-    """The rows that belong to the chosen frames of a batch; those of frame i are `ends[i]` to `ends[i + 1]`."""
-    start = ends[chosen[0]]
-    table = rows.read(start, ends[chosen[-1] + 1])
-    return _picked(table, [row - start for number in chosen for row in range(ends[number], ends[number + 1])])
-
-
-def _picked(table: ArrowTable, rows: list[int]) -> ArrowTable:
-    return table if len(rows) == len(table) else table.take(rows)
+def _members(rows: _Rows, frames: ArrowTable, what: str) -> ArrowTable:
+    """The rows of another table that belong to some frames."""
+    first = frames[f"first_{what}"].to_numpy().astype(np.int64)
+    counts = frames[f"{what}_count"].to_numpy().astype(np.int64)
+    ends = np.cumsum(counts)
+    return rows.take(np.repeat(first - (ends - counts), counts) + np.arange(counts.sum()))
 
 
 class _Rows:
-    """The rows of a table as one range of numbers, decoded one row group at a time."""
+    """The rows of a file as one range of numbers, decoded one row group at a time."""
 
-    def __init__(self, paths: Sequence[Path], columns: list[str]) -> None:
+    def __init__(self, path: Path, columns: list[str]) -> None:
         self._columns = columns
         shared = [name for name in columns if name.endswith(_REPEATED)]
-        self._files = [pq.ParquetFile(path, read_dictionary=shared) for path in paths]
-        self._groups = [(file, group) for file in self._files for group in range(file.num_row_groups)]
-        sizes = (file.metadata.row_group(group).num_rows for file, group in self._groups)
-        self._starts = list(accumulate(sizes, initial=0))
-        self._empty = pa.table({name: [] for name in columns})
+        self._file = pq.ParquetFile(path, read_dictionary=shared)
+        sizes = [self._file.metadata.row_group(group).num_rows for group in range(self._file.num_row_groups)]
+        self._starts = np.cumsum([0, *sizes])
         self._decoded: tuple[int, ArrowTable] | None = None
 
     def __enter__(self) -> _Rows:
         return self
 
     def __exit__(self, *error: object) -> None:
-        for file in self._files:
-            file.close()
+        self._file.close()
 
     def __len__(self) -> int:
-        return self._starts[-1]
+        return int(self._starts[-1])
 
-    def read(self, start: int, stop: int) -> ArrowTable:
-        """Rows `start` to `stop`, exclusive."""
+    def take(self, rows: NDArray[np.int64]) -> ArrowTable:
+        """Some rows, given in order."""
         pieces: list[ArrowTable] = []
-        while start < stop:
-            group = bisect_right(self._starts, start) - 1
-            end = min(stop, self._starts[group + 1])
-            pieces.append(self._group(group).slice(start - self._starts[group], end - start))
-            start = end
-        return pa.concat_tables(pieces) if pieces else self._empty
+        while len(rows):
+            group = int(np.searchsorted(self._starts, rows[0], side="right")) - 1
+            inside = int(np.searchsorted(rows, self._starts[group + 1]))
+            local, rows = rows[:inside] - self._starts[group], rows[inside:]
+            table = self._group(group)
+            together = local[-1] - local[0] + 1 == len(local)
+            pieces.append(table.slice(local[0], len(local)) if together else table.take(local))
+        return pa.concat_tables(pieces) if pieces else pa.table({name: [] for name in self._columns})
 
     def _group(self, group: int) -> ArrowTable:
         if self._decoded is None or self._decoded[0] != group:
-            file, number = self._groups[group]
-            self._decoded = group, file.read_row_group(number, columns=self._columns)
+            self._decoded = group, self._file.read_row_group(group, columns=self._columns)
         return self._decoded[1]
 
 
@@ -124,7 +123,7 @@ def _labels(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> Ite
     channels = zip(_values(sensors, "channel"), _values(sensors, "path"), strict=True)
     first = 0
     columns = [_values(frames, name) for name in _LABEL_COLUMNS]
-    for ego, (frame, recording, time, map_name, params, count, sensor_count) in zip(
+    for ego, (frame, recording, time, map_name, params, count, sensor_count, *_) in zip(
         egos, zip(*columns, strict=True), strict=True
     ):
         paths = dict(next(channels) for _ in range(sensor_count))

@@ -3,6 +3,8 @@
 Units: metres, radians, seconds, microseconds for time; positions in the frame of the label's map. Rows of `labels`,
 `objects`, `memberships` and `sensors` are sorted by recording, time and frame (`objects` then by `ordinal`), so the
 objects of one frame lie together and in the order of the labels. Columns marked * are computed at ingest.
+
+These four tables are split into parts of whole recordings; parts of one number hold the same recordings.
 """
 
 # pyarrow has no type stubs.
@@ -15,12 +17,15 @@ from typing import Any, TypeAlias
 
 import pyarrow as pa
 
-__all__ = ["MEMBERSHIP_RADIUS_M", "SCHEMAS", "SCHEMA_VERSION", "ArrowTable"]
+__all__ = ["MEMBERSHIP_RADIUS_M", "SCHEMAS", "SCHEMA_VERSION", "SEGMENT_TABLES", "ArrowArray", "ArrowTable"]
 
 ArrowTable: TypeAlias = Any
 """A `pyarrow.Table`; pyarrow has no type stubs, so checkers know nothing of it."""
 
-SCHEMA_VERSION = 1
+ArrowArray: TypeAlias = Any
+"""A `pyarrow.Array`."""
+
+SCHEMA_VERSION = 2
 """Changes with every change of a table that a reader could notice."""
 
 MEMBERSHIP_RADIUS_M = 2.0
@@ -32,6 +37,9 @@ _TEXT, _REAL, _COUNT = pa.string(), pa.float64(), pa.int32()
 def _required(name: str, kind: Any) -> Any:
     return pa.field(name, kind, nullable=False)
 
+
+SEGMENT_TABLES = ("labels", "objects", "memberships", "sensors")
+"""The tables that are split into parts."""
 
 SCHEMAS: dict[str, Any] = {
     # One row a frame.
@@ -57,7 +65,9 @@ SCHEMAS: dict[str, Any] = {
             pa.field("ego_lane", _TEXT),  # * the lane at the position; of several the one with the nearest centreline
             pa.field("params", _TEXT),  # JSON; null where there is none
             _required("object_count", _COUNT),
+            _required("first_object", _COUNT),  # where its rows begin in the part of `objects` of the same number
             _required("sensor_count", _COUNT),
+            _required("first_sensor", _COUNT),
             _required("class_counts", pa.map_(_TEXT, _COUNT)),  # * tree class -> label objects of exactly that class
         ]
     ),
@@ -122,5 +132,7 @@ SCHEMAS: dict[str, Any] = {
         ]
     ),
     "sensors": pa.schema([_required("frame", _TEXT), _required("channel", _TEXT), _required("path", _TEXT)]),
+    # One row a frame, in order of `hash`: where to find a frame without reading the names of all.
+    "frame_index": pa.schema([_required("hash", pa.uint64()), _required("row", pa.int64())]),
 }
 """Name of each table, which is also its folder and its SQL view, with its columns as a `pyarrow.Schema`."""

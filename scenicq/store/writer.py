@@ -3,33 +3,38 @@
 The same recordings and maps give byte-identical files but for the manifest's `provenance`.
 """
 
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
 from __future__ import annotations
 
-import os
-import shutil
-import socket
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
-from glob import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pyarrow.parquet as pq
+
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature
-from scenicq.store.columns import recording_rows
+from scenicq.store.columns import RecordingColumns, columns_of
+from scenicq.store.frame_index import frame_hashes, index_rows, repeated_rows
 from scenicq.store.labels import Recording
-from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest, is_dataset
-from scenicq.store.parquet import TableWriter, sync_folder, write_synced
+from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest
+from scenicq.store.parquet import TableWriter, part_path, write_synced
+from scenicq.store.partial import Partial, check_target
 from scenicq.store.placement import MapIndex
 from scenicq.store.regions import lane_rows, region_rows
-from scenicq.store.schema import SCHEMAS, ArrowTable
+from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowTable
+from scenicq.store.segment import SEGMENT_OBJECTS, Segment, SegmentWriter, read_segments, take_over
 
-__all__ = ["DatasetWriter", "check_target", "write_dataset"]
+__all__ = ["DatasetWriter", "write_dataset"]
 
 
 class DatasetWriter:
-    """Writes one dataset, recording by recording, as a context manager.
+    """Writes one dataset, recording by recording or segment by segment, as a context manager.
 
     Leaving the context before `finish`, for whatever reason, removes everything that was written.
 
@@ -40,92 +45,140 @@ class DatasetWriter:
             manifest = writer.finish(name="mine")
     """
 
-    def __init__(self, target: str | Path, maps: Mapping[str, Sequence[MapFeature]], *, force: bool = False) -> None:
+    def __init__(
+        self,
+        target: str | Path,
+        maps: Mapping[str, Sequence[MapFeature]],
+        *,
+        force: bool = False,
+        update: bool = False,
+        segment_objects: int = SEGMENT_OBJECTS,
+    ) -> None:
         """Check the target; nothing is written yet.
 
         Args:
             target: Folder of the dataset to be.
-            maps: Elements of each map.
-            force: Whether a dataset that is there already may be replaced.
+            maps: Elements of each map; the attribute may be set anew until something is added.
+            force: Whether a dataset that is there already may be replaced, and what a killed process left is no use.
+            update: Whether a dataset that is there already may be replaced by one with more in it.
+            segment_objects: Label objects after which `add` begins another part of the tables.
 
         Raises:
             DataError: `target-exists`; a folder that is not a dataset of ours is never replaced.
         """
         self._target = Path(target)
-        self._maps = maps
-        self._force = force
-        check_target(self._target, force=self._force)
-        mark = f"{socket.gethostname()}-{os.getpid()}"
-        self._partial = self._target.with_name(f".{self._target.name}.partial-{mark}")
-        self._aside = self._target.with_name(f".{self._target.name}.replaced-{mark}")
-        self._tables: dict[str, TableWriter] = {}
+        self.maps = maps
+        self._force, self._update = force, update
+        self._segment_objects = segment_objects
+        self._partial = Partial(self._target)
+        self._segments: dict[int, Segment] = {}
         self._indexes: dict[str, MapIndex] = {}
+        self._open: SegmentWriter | None = None
         self._last = ""
-        self._tracks = 0
-        self._span: tuple[int, int] | None = None
-        self._by_class: Counter[str] = Counter()
-        self._by_source_class: Counter[str] = Counter()
-        self._by_recording: dict[str, Counts] = {}
-        self._by_map: defaultdict[str, list[Counts]] = defaultdict(list)
+        self.left: dict[int, Segment] = {}
+        check_target(self._target, force=force, update=update)
+
+    @property
+    def folder(self) -> Path:
+        """Where the dataset grows; other processes may write segments there."""
+        return self._partial.folder
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The segments that are complete, in order."""
+        return [self._segments[number] for number in sorted(self._segments)]
 
     def __enter__(self) -> DatasetWriter:
-        """Open the files.
+        """Take the place.
+
+        `left` then holds the complete segments that a killed process left, by number; none with `force`.
 
         Raises:
-            DataError: `target-unwritable`, or `target-exists` where an interrupted replacement was undone.
+            DataError: `target-unwritable`, or `target-exists` where an interrupted replacement was undone or another
+                process writes.
         """
         try:
-            _recover(self._target)
-            check_target(self._target, force=self._force)
-            self._partial.mkdir()
-            for table in SCHEMAS:
-                self._tables[table] = TableWriter(self._partial, table)
+            self._partial.open()
+            check_target(self._target, force=self._force, update=self._update)
+            if self._force:
+                self._partial.clear()
+            self.left = read_segments(self.folder)
         except OSError as error:
-            self._clean()
-            raise self._unwritable(error) from error
+            self._partial.remove()
+            raise self.unwritable(error) from error
         except BaseException:
-            self._clean()
+            self._partial.remove()
             raise
         return self
 
     def __exit__(self, *error: object) -> None:
         """Remove what is not finished."""
-        self._clean()
+        if self._open is not None:
+            self._open.abandon()
+        self._partial.remove()
 
-    def prepare(self, recording: Recording) -> dict[str, ArrowTable]:
-        """Rows of a recording. May run in several threads, since it changes nothing that `add` reads."""
-        return recording_rows(recording, self.index(recording.map))
-
-    def index(self, map_name: str) -> MapIndex:
-        """The prepared map; empty where there is no such map."""
-        if map_name not in self._indexes:
-            self._indexes[map_name] = MapIndex(map_name, self._maps.get(map_name, ()))
-        return self._indexes[map_name]
-
-    def add(self, recording: Recording, rows: Mapping[str, ArrowTable] | None = None) -> None:
+    def add(self, recording: Recording | RecordingColumns) -> None:
         """Append a recording.
 
         Args:
             recording: With labels in order of time, then of frame; recordings come in order of their names.
-            rows: What `prepare` gave for it; computed here by default.
 
         Raises:
             ValueError: The order is broken.
             DataError: `target-unwritable`.
         """
-        if recording.name <= self._last and self._by_recording:
+        if recording.name <= self._last and self._last:
             raise ValueError(f"recording {recording.name!r} comes after {self._last!r}")
-        keys = [(label.timestamp_us, label.frame) for label in recording.labels]
+        columns = columns_of(recording) if isinstance(recording, Recording) else recording
+        keys = list(zip(columns.times_us, columns.frames, strict=True))
         if keys != sorted(keys):
             raise ValueError(f"the labels of recording {recording.name!r} are not in order of time")
         self._last = recording.name
-        rows = self.prepare(recording) if rows is None else rows
         try:
-            for table, content in rows.items():
-                self._tables[table].add(content)
+            if self._open is not None and self._open.objects + len(columns.objects.x) > self._segment_objects:
+                self._close_segment()
+            if self._open is None:
+                self._open = SegmentWriter(self.folder, len(self._segments))
+                self._open.open()
+            self._open.add(columns, self._index(columns.map))
         except OSError as error:
-            raise self._unwritable(error) from error
-        self._count(recording)
+            raise self.unwritable(error) from error
+
+    def adopt(self, number: int, segment: Segment, source: tuple[Path, int] | None = None) -> None:
+        """Count in a segment.
+
+        Args:
+            number: Its number; in the end they are 0, 1, 2 ... in the order of their recordings.
+            segment: What it holds.
+            source: Dataset and number where its files are; they are at their place already by default.
+
+        Raises:
+            DataError: `target-unwritable`.
+        """
+        if source is not None:
+            try:
+                take_over(*source, self.folder, number)
+            except OSError as error:
+                raise self.unwritable(error) from error
+        self._segments[number] = segment
+
+    def repeated_frames(self) -> list[tuple[int, str, str]]:
+        """Label rows with a frame that occurs in a segment before: number of the segment, recording, frame."""
+        rows = repeated_rows(self._hashes()).tolist()
+        seen: set[str] = set()
+        repeated: list[tuple[int, str, str]] = []
+        start = 0
+        for number in sorted(self._segments) if rows else ():
+            size = self._segments[number].files["labels"].rows
+            inside = [row - start for row in rows if start <= row < start + size]
+            start += size
+            if inside:
+                table = self._read(number, ["recording", "frame"]).take(inside)
+                for recording, frame in zip(*(column.to_pylist() for column in table.columns), strict=True):
+                    if frame in seen:
+                        repeated.append((number, recording, frame))
+                    seen.add(frame)
+        return repeated
 
     def finish(
         self,
@@ -135,103 +188,76 @@ class DatasetWriter:
         left_out: Iterable[LeftOut] = (),
         provenance: Mapping[str, Any] | None = None,
     ) -> Manifest:
-        """Write the maps and the manifest, and give the dataset its name.
+        """Write the maps, the index and the manifest, and give the dataset its name.
 
         Raises:
             DataError: `target-unwritable`, or `target-exists` where something came into the way meanwhile.
         """
         try:
-            self._tables["regions"].add(region_rows(self._maps))
-            self._tables["lanes"].add(lane_rows(self._maps))
-            parts = {table: (writer.finish(),) for table, writer in self._tables.items()}
-            self._tables.clear()
+            if self._open is not None:
+                self._close_segment()
+            segments = self.segments
+            tables = {table: tuple(s.part(table, n) for n, s in enumerate(segments)) for table in SEGMENT_TABLES}
+            for table, rows in (
+                ("regions", region_rows(self.maps)),
+                ("lanes", lane_rows(self.maps)),
+                ("frame_index", index_rows(self._hashes())),
+            ):
+                writer = TableWriter(self.folder, table)
+                writer.add(rows)
+                tables[table] = (writer.finish(),)
             manifest = Manifest(
                 name=name,
                 importer=importer,
-                tables=parts,
-                maps={key: len(self._maps[key]) for key in sorted(self._maps)},
-                total=_sum(self._by_recording.values()),
-                tracks=self._tracks,
-                span_us=self._span,
-                by_class=dict(sorted(self._by_class.items())),
-                by_source_class=dict(sorted(self._by_source_class.items())),
-                by_map={key: _sum(self._by_map[key]) for key in sorted(self._by_map)},
-                by_recording=self._by_recording,
+                tables={table: tables[table] for table in SCHEMAS},
+                maps={key: len(self.maps[key]) for key in sorted(self.maps)},
                 left_out=tuple(left_out),
                 provenance=dict(provenance or {}),
+                **_totals(segments),
             )
-            write_synced(self._partial / MANIFEST, manifest.to_json())
-            self._put_in_place()
+            write_synced(self.folder / MANIFEST, manifest.to_json())
+            parts = {Path(part.path) for files in tables.values() for part in files}
+            about = {Path("segments") / f"part-{number:05}.json" for number in range(len(segments))}
+            self._partial.keep({*parts, *about, Path(MANIFEST)})
+            check_target(self._target, force=self._force, update=self._update)
+            self._partial.put_in_place()
         except OSError as error:
-            raise self._unwritable(error) from error
+            raise self.unwritable(error) from error
         return manifest
 
-    def _count(self, recording: Recording) -> None:
-        objects = [member for label in recording.labels for member in label.objects]
-        counts = Counts(len(recording.labels), len(objects))
-        self._by_recording[recording.name] = counts
-        self._by_map[recording.map].append(counts)
-        self._by_class.update(member.category for member in objects)
-        self._by_source_class.update(member.source_class for member in objects)
-        self._tracks += len({member.track for member in objects} - {None})
-        times = [label.timestamp_us for label in recording.labels]
-        self._span = min([*times, *(self._span or ())]), max([*times, *(self._span or ())])
-
-    def _put_in_place(self) -> None:
-        check_target(self._target, force=self._force)
-        replaces = self._target.exists()
-        if replaces:
-            self._target.rename(self._aside)
-        try:
-            self._partial.rename(self._target)
-        except BaseException:
-            if replaces:
-                self._aside.rename(self._target)
-            raise
-        sync_folder(self._target.parent)
-        shutil.rmtree(self._aside, ignore_errors=True)
-
-    def _clean(self) -> None:
-        for writer in self._tables.values():
-            with suppress(OSError):
-                writer.abandon()
-        self._tables.clear()
-        shutil.rmtree(self._partial, ignore_errors=True)
-
-    def _unwritable(self, error: OSError) -> DataError:
+    def unwritable(self, error: OSError) -> DataError:
+        """The error that says that the target cannot be written."""
         return DataError(
             Diagnostic("target-unwritable", f"{self._target} cannot be written: {error.strerror or error}")
         )
 
+    def _index(self, map_name: str) -> MapIndex:
+        if map_name not in self._indexes:
+            self._indexes[map_name] = MapIndex(map_name, self.maps.get(map_name, ()))
+        return self._indexes[map_name]
 
-def check_target(target: Path, *, force: bool = False) -> None:
-    """Refuse a target that must not be written.
+    def _close_segment(self) -> None:
+        assert self._open is not None
+        self._segments[len(self._segments)] = self._open.finish()
+        self._open = None
 
-    Args:
-        target: Folder of the dataset to be.
-        force: Whether a dataset that is there already may be replaced.
+    def _hashes(self) -> Any:
+        hashes = [frame_hashes(self._read(n, ["frame"])["frame"].to_pylist()) for n in sorted(self._segments)]
+        return np.concatenate([np.empty(0, np.uint64), *hashes])
 
-    Raises:
-        DataError: `target-exists`, or `target-unwritable` for a path without a name of its own.
-    """
-    if not target.name or target.name == "..":
-        raise DataError(Diagnostic("target-unwritable", f"{target} is not the name of a new folder"))
-    if not os.path.lexists(target):
-        return
-    if not is_dataset(target):
-        hint = "choose another name: only a dataset can be replaced"
-        raise DataError(Diagnostic("target-exists", f"{target} exists and is not a dataset of scenicq", hints=(hint,)))
-    if not force:
-        raise DataError(Diagnostic("target-exists", f"the dataset {target} exists", hints=("`--force` replaces it",)))
+    def _read(self, number: int, columns: list[str]) -> ArrowTable:
+        with pq.ParquetFile(self.folder / part_path("labels", number)) as file:
+            return file.read(columns=columns)
 
 
 def write_dataset(
     target: str | Path,
-    recordings: Iterable[Recording],
+    recordings: Iterable[Recording | RecordingColumns],
     maps: Mapping[str, Sequence[MapFeature]],
     *,
     name: str,
     force: bool = False,
+    segment_objects: int = SEGMENT_OBJECTS,
 ) -> Manifest:
     """Write a dataset from values in memory.
 
@@ -241,41 +267,41 @@ def write_dataset(
         maps: Elements of each map that the recordings refer to.
         name: What the dataset is called.
         force: Whether a dataset that is there already may be replaced.
+        segment_objects: Label objects after which another part of the tables begins.
 
     Raises:
         DataError: `target-exists` or `target-unwritable`.
         ValueError: The order is broken.
     """
-    with DatasetWriter(target, maps, force=force) as writer:
+    with DatasetWriter(target, maps, force=force, segment_objects=segment_objects) as writer:
         for recording in recordings:
             writer.add(recording)
         return writer.finish(name=name)
 
 
+def _totals(segments: Sequence[Segment]) -> dict[str, Any]:
+    """The fields of a manifest that add up over segments."""
+    by_class: Counter[str] = Counter()
+    by_source_class: Counter[str] = Counter()
+    by_map: dict[str, Counts] = {}
+    for segment in segments:
+        by_class.update(segment.by_class)
+        by_source_class.update(segment.by_source_class)
+        for name, counts in segment.by_map.items():
+            by_map[name] = _sum((by_map.get(name, Counts()), counts))
+    by_recording = {name: counts for segment in segments for name, counts in segment.recordings.items()}
+    times = [time for segment in segments for time in segment.span_us or ()]
+    return {
+        "total": _sum(by_recording.values()),
+        "tracks": sum(segment.tracks for segment in segments),
+        "span_us": (min(times), max(times)) if times else None,
+        "by_class": dict(sorted(by_class.items())),
+        "by_source_class": dict(sorted(by_source_class.items())),
+        "by_map": dict(sorted(by_map.items())),
+        "by_recording": by_recording,
+    }
+
+
 def _sum(counts: Iterable[Counts]) -> Counts:
     every = list(counts)
     return Counts(sum(count.frames for count in every), sum(count.objects for count in every))
-
-
-def _recover(target: Path) -> None:
-    """Undo what a process of this machine left behind when it was killed in the middle."""
-    for folder in target.parent.glob(f".{escape(target.name)}.*-{escape(socket.gethostname())}-*"):
-        kind, _, process = folder.name.removeprefix(f".{target.name}.").partition(f"-{socket.gethostname()}-")
-        if not process.isdecimal() or _is_running(int(process)):
-            continue
-        if kind == "replaced" and not target.exists():
-            folder.rename(target)
-        elif kind in ("partial", "replaced"):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-def _is_running(process: int) -> bool:
-    if os.name != "posix":
-        return True  # signal 0 would end it on other systems
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True

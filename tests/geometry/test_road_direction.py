@@ -12,7 +12,7 @@ from shapely.geometry import LineString, Point, Polygon, box
 
 from scenicq.geometry.angles import distance
 from scenicq.geometry.fields import ConstantField, FieldCell, VectorField
-from scenicq.geometry.road_direction import DirectedLane, RoadDirection
+from scenicq.geometry.road_direction import DirectedLane, RoadDirection, along_lines
 
 NORTH, WEST, SOUTH, EAST = 0.0, math.pi / 2, math.pi, -math.pi / 2
 
@@ -141,3 +141,18 @@ def test_constant_field() -> None:
     assert cell.exact
     assert Polygon(cell.polygon).equals(box(0, 1, 2, 3))
     assert cell.heading == pytest.approx(1.5)
+
+
+def test_a_polyline_is_its_own_direction() -> None:
+    field = along_lines([LineString([(0, 0), (0, 10), (-10, 10)])], "bend")
+    assert field.values(0, 4) == (0.0,)
+    assert field.values(-4, 10) == pytest.approx((math.pi / 2,))
+    assert len(field.values(0, 10)) == 2, "both segments end in the corner"
+
+
+def test_a_line_against_the_traffic_is_turned_around() -> None:
+    lane = DirectedLane(box(0, 0, 4, 20), (np.array([(2.0, 0.0), (2.0, 20.0)]),))
+    direction = RoadDirection((lane,))
+    line = LineString([(4, 15), (4, 5)])
+    assert list(direction.forward(line).coords) == [(4, 5), (4, 15)]
+    assert direction.forward(line.reverse()).equals_exact(line.reverse(), 0)

@@ -194,6 +194,16 @@ def test_unsound_map_elements(source: Path, tmp_path: Path) -> None:
     assert refused(source, tmp_path / "e") == {"file-invalid"}
 
 
+def test_a_coordinate_that_no_number_holds(source: Path, tmp_path: Path) -> None:
+    file = source / "maps" / "crossroads.geojson"
+    content = json.loads(file.read_text())
+    content["features"][0]["geometry"]["coordinates"][0][1][0] = 10**400
+    file.write_text(json.dumps(content))
+    summary = ingest(source, tmp_path / "d")
+    assert left_out(summary)["map element", "map-invalid"] >= 1
+    assert any("its geometry cannot be read" in diagnostic.message for diagnostic in summary.diagnostics)
+
+
 def test_empty_source(source: Path, tmp_path: Path) -> None:
     (source / "labels.jsonl").write_text("\n\n")
     assert refused(source, tmp_path / "d") == {"dataset-empty"}

@@ -13,12 +13,19 @@ import pytest
 from shapely import box, unary_union
 
 from scenicq.geometry import angles
+from scenicq.importers.argoverse2 import Argoverse2
+from scenicq.importers.argoverse2_forecasting import Argoverse2Forecasting
 from scenicq.importers.base import Importer, Options
+from scenicq.importers.commonroad import CommonRoad
 from scenicq.importers.ingest import ingest
+from scenicq.importers.interaction import Interaction
 from scenicq.importers.interchange import Interchange
+from scenicq.importers.kitti import Kitti
 from scenicq.importers.nuscenes import NuScenes
+from scenicq.importers.openlabel import OpenLabel
 from scenicq.importers.registry import importers
 from scenicq.importers.report import Report
+from scenicq.importers.waymo import Waymo
 from scenicq.store.classes import ROOT, is_class, is_subclass
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label, Recording
@@ -46,9 +53,16 @@ class Case:
     margin_m: float = 60.0
 
 
+def by_label() -> Interchange:
+    """The reader of columns is compared with this one in `test_interchange_columns`."""
+    importer = Interchange()
+    importer.columnar = False
+    return importer
+
+
 CASES = {
     "crossroads": Case(
-        Interchange(),
+        by_label(),
         SAMPLES / "crossroads",
         156,
         676,
@@ -73,8 +87,102 @@ CASES = {
             ("Adult", 50.0, -4.0, 0.0, (0.0, 1.0)),
         ],
     ),
+    # --- further formats
+    "argoverse2_tiny": Case(
+        Argoverse2(),
+        SAMPLES / "argoverse2_tiny",
+        6,
+        12,
+        2,
+        "5ce0c0de-0000-4000-8000-000000000001/1700000000100000000",
+        [
+            ("Car", 49.2, 1.75, math.pi / 2, (-8.0, 0.0)),
+            ("Pedestrian", 40.0, -4.85, 0.0, (0.0, 1.5)),
+        ],
+    ),
+    "argoverse2": Case(
+        Argoverse2(),
+        REAL / "argoverse2",
+        312,
+        23442,
+        260,
+        "7fab2350-7eaf-3b7e-a39d-6937a4c1bede/315966254659660000",
+        # Composed with rotation matrices from the files, apart from the importer.
+        [("Bicycle", 5219.975816947425, 2398.1309706453403, -2.038165584305748, (0.146339193, -0.106351570))],
+    ),
+    "forecasting_tiny": Case(
+        Argoverse2Forecasting(),
+        SAMPLES / "forecasting_tiny",
+        6,
+        12,
+        2,
+        "5ce0c0de-0000-4000-8000-000000000002/1",
+        [
+            ("Vehicle", 49.2, 1.75, math.pi / 2, (-8.0, 0.0)),
+            ("Pedestrian", 40.0, -4.85, 0.0, (0.0, 1.5)),
+        ],
+    ),
+    "waymo_tiny": Case(
+        Waymo(),
+        SAMPLES / "waymo_tiny",
+        12,
+        22,
+        4,
+        "5ce0c0de00000001/1",
+        [
+            ("Vehicle", 49.2, 1.75, math.pi / 2, (-8.0, 0.0)),
+            ("Pedestrian", 40.0, -4.85, 0.0, (0.0, 1.5)),
+        ],
+    ),
+    "commonroad_tiny": Case(
+        CommonRoad(),
+        SAMPLES / "commonroad_tiny",
+        12,
+        24,
+        4,
+        "ZAM_Tiny-1_1_T-1_2020a/1",
+        [
+            ("Car", 11.0, -1.75, -math.pi / 2, (10.0, 0.0)),
+            ("Pedestrian", 40.0, -4.85, 0.0, (0.0, 1.5)),
+        ],
+    ),
+    "kitti_tiny": Case(
+        Kitti(),
+        SAMPLES / "kitti_tiny",
+        6,
+        12,
+        2,
+        "0000/000001",
+        # The map frame begins where the ego begins.
+        [
+            ("Car", 39.2, 3.5, math.pi / 2, (-8.0, 0.0)),
+            ("Pedestrian", 30.0, -3.1, 0.0, (0.0, 1.5)),
+        ],
+    ),
+    "openlabel_tiny": Case(
+        OpenLabel(),
+        SAMPLES / "openlabel_tiny",
+        6,
+        12,
+        2,
+        "tiny/1",
+        [
+            ("Car", 49.2, 1.75, math.pi / 2, None),
+            ("Pedestrian", 40.0, -4.85, 0.0, None),
+        ],
+    ),
+    "interaction_tiny": Case(
+        Interaction(),
+        SAMPLES / "interaction_tiny",
+        6,
+        12,
+        2,
+        "TINY_Street/000/2",
+        [("Car", 11.0, -1.75, -math.pi / 2, (10.0, 0.0))],
+    ),
+    # --- end of them
     "boston": Case(
-        Interchange(),
+        by_label(),
         REAL / "boston",
         707,
         725,
@@ -107,7 +215,9 @@ def case(request: pytest.FixtureRequest) -> Case:
 
 
 def read(case: Case) -> list[Recording]:
-    return list(case.importer.read(case.path, Options(case.maps), Report()).recordings)
+    report = Report()
+    found = list(case.importer.read(case.path, Options(case.maps), report).recordings(report))
+    return [recording for recording in found if isinstance(recording, Recording)]
 
 
 def read_labels(case: Case) -> list[Label]:
@@ -192,7 +302,7 @@ def test_egos_lie_on_the_map(case: Case) -> None:
         name: box(*unary_union([feature.shape for feature in features]).bounds).buffer(case.margin_m)
         for name, features in source.maps.items()
     }
-    for recording in source.recordings:
+    for recording in read(case):
         for label in recording.labels:
             if label.map in area:
                 assert area[label.map].contains(box(label.ego.x, label.ego.y, label.ego.x + 0.1, label.ego.y + 0.1))

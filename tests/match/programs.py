@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - a program is easier to read on one line
 """Small programs that between them use every step of the decision ladder, and every specifier of the first scenarios."""
 
 HEADER = "model scenic.domains.driving.model\n"
@@ -33,5 +34,7 @@ PROGRAMS: dict[str, str] = {
     "mutated": "ego = new Car\nother = new Car ahead of ego by 5\nmutate other",
     "speed": "ego = new Car\nother = new Car ahead of ego by Range(2, 5), with width Range(1, 3)",
     "follow": "ego = new Car on network.laneRegion\nother = new Car following roadDirection from ego for Range(5, 10)",
+    "badly parked": "ego = new Car\nspot = new OrientedPoint on visible curb\n"
+    "parked = new Car left of spot by 0.5, facing Uniform(-1, 1) * Range(10, 20) deg relative to roadDirection",
     "wide view": "ego = new Car with viewAngle 300 deg, with visibleDistance 30\nother = new Pedestrian in visible road, facing Range(0, 360) deg",
 }

@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from scenicq.errors import Source
 from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.standin import street
+from scenicq.errors import Source
 from scenicq.forest.improvise import Scene, draw_scene
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
@@ -44,7 +44,9 @@ def label_of(
 ) -> Label:
     """A scene as a label: objects shuffled among distractors of the same classes."""
     ego = thing(scenario, scene, scenario.ego, sizes=sizes)
-    things = [thing(scenario, scene, each.index, sizes=sizes) for each in scenario.objects if each.index != scenario.ego]
+    things = [
+        thing(scenario, scene, each.index, sizes=sizes) for each in scenario.objects if each.index != scenario.ego
+    ]
     for number in range(distractors):
         model = rng.choice(things) if things else ego
         things.append(

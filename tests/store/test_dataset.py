@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -193,9 +189,10 @@ def test_two_writes_are_byte_identical(tmp_path: Path) -> None:
 
 
 def test_order_is_the_callers_duty(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="comes after"), DatasetWriter(tmp_path / "d", {}) as writer:
-        for name in ("r2", "r1"):
-            writer.add(Recording(name, "town", (label(name, name),)))
+    with pytest.raises(ValueError, match="comes after"):
+        write_dataset(
+            tmp_path / "d", [Recording(name, "town", (label(name, name),)) for name in ("r2", "r1")], {}, name="d"
+        )
     with pytest.raises(ValueError, match="order of time"), DatasetWriter(tmp_path / "d", {}) as writer:
         writer.add(Recording("r", "town", (label("a", time=2), label("b", time=1))))
     assert list(tmp_path.iterdir()) == []
@@ -249,20 +246,27 @@ def test_target_that_cannot_be_written(tmp_path: Path) -> None:
 
 
 def test_what_a_killed_process_left_is_removed(tmp_path: Path) -> None:
-    process = subprocess.Popen([sys.executable, "-c", ""])
-    process.wait()
-    dead, alive = (tmp_path / f".d.partial-{socket.gethostname()}-{id}" for id in (process.pid, os.getppid()))
-    dead.mkdir()
-    alive.mkdir()
-    write(tmp_path / "d", label("f"))
-    assert not dead.exists()
-    assert alive.exists()
+    (tmp_path / ".d.partial" / "objects").mkdir(parents=True)
+    (tmp_path / ".d.partial" / "objects" / "part-00007.parquet").write_text("cut off")
+    (tmp_path / ".d.partial" / "lock").write_text("")
+    dataset = write(tmp_path / "d", label("f"))
+    assert [path.name for path in tmp_path.iterdir()] == ["d"]
+    assert [path.name for path in (dataset.path / "objects").iterdir()] == ["part-00000.parquet"]
+    assert not (dataset.path / "lock").exists()
+
+
+def test_two_processes_do_not_write_one_target(tmp_path: Path) -> None:
+    with DatasetWriter(tmp_path / "d", {"town": MAP}) as writer:
+        with pytest.raises(DataError, match="another ingest is writing") as error:
+            write_dataset(tmp_path / "d", [], {}, name="other")
+        assert codes(error) == {"target-exists"}
+        writer.add(Recording("r1", "town", (label("f"),)))
+        writer.finish(name="mine")
+    assert [entry.frame for entry in open_dataset(tmp_path / "d").labels()] == ["f"]
 
 
 def test_a_replacement_that_was_killed_is_undone(tmp_path: Path) -> None:
-    process = subprocess.Popen([sys.executable, "-c", ""])
-    process.wait()
-    write(tmp_path / "d", label("old")).path.rename(tmp_path / f".d.replaced-{socket.gethostname()}-{process.pid}")
+    write(tmp_path / "d", label("old")).path.rename(tmp_path / ".d.replaced")
     with pytest.raises(DataError) as error:
         write(tmp_path / "d", label("new"))
     assert codes(error) == {"target-exists"}

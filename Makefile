@@ -1,0 +1,94 @@
+# `make` lists the targets. Everything goes into .venv; nothing is installed elsewhere but by `make dreal`, and by
+# `make setup` where a Debian system lacks Python's venv.
+
+PYTHON ?= python3
+WORKERS ?= 2
+BIN := .venv/bin
+READY := .venv/.ready
+PYTEST := $(BIN)/python -m pytest -q -p no:cacheprovider
+LINTED := scenicq cli tests sample_data
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo check test test-all golden bench conformance dreal clean
+
+help: ## List the targets
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
+		printf '  make %-9s %s\n' "$$name" "$$text"; done
+
+setup: $(READY) ## Make .venv with scenicq and all that its development needs
+
+$(READY): pyproject.toml
+	@$(call ensure_venv)
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --upgrade pip
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+demo: $(READY) ## Ingest the sample data into demo/ and find two crossing cars in it
+	@mkdir -p demo
+	$(BIN)/scenicq ingest sample_data/crossroads demo/crossroads --force
+	$(BIN)/scenicq match sample_data/scenarios/02_crossing_cars.scenic demo/crossroads --format table --summary
+
+check: $(READY) ## Format, lint, types, layers and the fast tests of the library: under two minutes
+	$(BIN)/ruff format --check $(LINTED)
+	$(BIN)/ruff check $(LINTED)
+	$(BIN)/pyright --warnings
+	$(BIN)/lint-imports --no-cache
+	$(PYTEST) -n $(WORKERS) -m 'not slow' --ignore tests/cli --ignore tests/test_readme.py
+
+test: $(READY) ## All tests but the slow ones
+	$(PYTEST) -n $(WORKERS) -m 'not slow'
+
+test-all: $(READY) ## All tests
+	$(PYTEST) -n $(WORKERS)
+
+golden: $(READY) ## Rewrite the golden files that tests compare with
+	$(PYTEST) --update-golden -m 'not slow'
+
+bench: $(READY) ## Measure queries, start-up and ingest; numbers go to bench-results/
+	$(BIN)/python tests/bench/queries.py
+
+MAP ?= Town01.xodr
+conformance: $(READY) ## Compare with Scenic 3.1.1: scenes that it draws must match (MAP=an OpenDRIVE file)
+	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP)
+
+dreal: $(READY) ## Install what dReal needs besides its package, where the system has it
+	@$(call install_dreal)
+	$(BIN)/scenicq doctor
+
+clean: ## Remove what the targets made, except .venv
+	rm -rf demo bench-results build dist *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find scenicq cli tests sample_data -name __pycache__ -type d -exec rm -rf {} +
+
+# Debian keeps `venv` in a package of its own; `python3 -m venv` then leaves half an environment behind.
+define ensure_venv
+	if $(BIN)/python -m pip --version >/dev/null 2>&1; then exit 0; fi; \
+	if ! $(PYTHON) -m venv .venv >/dev/null 2>&1; then \
+		rm -rf .venv; \
+		if [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then \
+			echo "$(PYTHON) cannot make a virtual environment: install Python 3.11 to 3.13 with venv" >&2; \
+			echo "(on Debian and Ubuntu: apt-get install python3 python3-venv)" >&2; exit 1; \
+		fi; \
+		apt-get update -q && apt-get install -y -q --no-install-recommends python3 python3-venv && \
+		$(PYTHON) -m venv .venv || exit 1; \
+	fi; \
+	$(BIN)/python -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || { \
+		rm -rf .venv; echo "scenicq needs Python 3.11 to 3.13: make PYTHON=python3.11 setup" >&2; exit 1; }
+endef
+
+# dReal's own fork of IBEX is in no registry but its package archive for Ubuntu.
+define install_dreal
+	id=none; [ -r /etc/os-release ] && id=$$(. /etc/os-release && echo "$$ID"); \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		apt-get update -q && \
+		apt-get install -y -q --no-install-recommends libnlopt0 coinor-libclp1 liblapack3 libblas3 || exit 1; \
+		if [ "$$id" = ubuntu ]; then \
+			apt-get install -y -q software-properties-common && add-apt-repository -y ppa:dreal/dreal && \
+			apt-get install -y -q libibex-dev || exit 1; \
+		fi; \
+	else \
+		echo "not root, or not Debian: dReal needs the packages libnlopt0 coinor-libclp1 liblapack3 libblas3"; \
+	fi; \
+	if ! [ -e /opt/libibex/2.7.4/lib/libibex.so ]; then \
+		echo "missing: libibex.so 2.7.4 of dReal's own IBEX in /opt/libibex/2.7.4/lib; without it the portable solver is used"; \
+	fi
+endef

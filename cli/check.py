@@ -1,0 +1,132 @@
+"""`scenicq check`: whether a scenario is sound, and how it is read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from scenicq.compiler.program import compile_scenario
+from scenicq.compiler.standin import street
+from scenicq.errors import DataError, Diagnostic, ScenarioError, ScenicqError, Source
+from scenicq.forest.scenario import Scenario
+from scenicq.geometry.network import Network
+from scenicq.importers.base import read_maps
+from scenicq.importers.report import Report
+from scenicq.query.run import beside, read_program
+from scenicq.store.dataset import open_dataset
+
+from .main import ERROR
+from .report import as_json, count, show
+
+__all__ = ["check", "read_version"]
+
+_VERSIONS: dict[str, Literal[1, 2, 3]] = {"1": 1, "2": 2, "3": 3}
+
+
+def read_version(text: str | None) -> Literal[1, 2, 3] | None:
+    """The version of Scenic that `--scenic` names; None where it is to be inferred."""
+    return None if text is None else _VERSIONS[text]
+
+
+def _networks(dataset: Path | None, map_file: Path | None) -> Iterator[Network]:
+    """The maps to compile against: of the dataset, the one given, or the built-in street."""
+    if dataset is not None and map_file is not None:
+        hint = "give one of them"
+        raise DataError(
+            Diagnostic("option-invalid", "a dataset brings its own maps: `--map` is too much", hints=(hint,))
+        )
+    if dataset is not None:
+        opened = open_dataset(dataset)
+        yield from (opened.network(name) for name in opened.maps)
+    elif map_file is not None:
+        features = read_maps({map_file.stem: map_file}, Report())
+        yield Network(map_file.stem, features[map_file.stem])
+    else:
+        yield street()
+
+
+def _told(scenario: Scenario) -> str:
+    roles = ", ".join(f"{thing.name}: {thing.category}" for thing in scenario.objects)
+    written = sum(requirement.built_in is None for requirement in scenario.requirements)
+    soft = f" and {len(scenario.soft)} soft" if scenario.soft else ""
+    return (
+        f"ok on map {scenario.map}: {count(len(scenario.objects), 'object')} ({roles}), "
+        f"{count(written, 'requirement')}{soft}, read as Scenic {scenario.version}"
+    )
+
+
+def _found(
+    source: Source, networks: Iterator[Network], version: int | None, initial: bool
+) -> tuple[list[str], list[Diagnostic]]:
+    """A line for each map that the scenario fits, and every diagnostic once.
+
+    A map that lacks what the scenario needs is no error where another map has it.
+    """
+    lines: list[str] = []
+    errors: list[Diagnostic] = []
+    lacking: list[Diagnostic] = []
+    rest: list[Diagnostic] = []
+    for network in networks:
+        try:
+            loader = beside(Path(source.name))
+            scenario = compile_scenario(source, network, version=version, initial=initial, loader=loader)
+        except ScenarioError as error:
+            codes = {diagnostic.code for diagnostic in error.diagnostics}
+            (lacking if codes == {"map-lacks"} else errors).extend(error.diagnostics)
+            continue
+        lines.append(_told(scenario))
+        rest += [*scenario.warnings, *scenario.ignored]
+    if lines:
+        rest += [
+            Diagnostic(each.code, each.message, each.span, each.label, each.notes, each.hints, "warning")
+            for each in lacking
+        ]
+    else:
+        errors += lacking
+    return lines, list(dict.fromkeys([*errors, *rest]))
+
+
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  scenicq check crossing.scenic\n"
+    "  scenicq check crossing.scenic dataset\n"
+    "  scenicq check crossing.scenic --map town.geojson --format json"
+)
+@click.argument("scenario", type=click.Path(path_type=Path))
+@click.argument("dataset", type=click.Path(path_type=Path), required=False)
+@click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON map.")
+@click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
+@click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
+@click.option(
+    "--format",
+    "format_",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    help="json gives the diagnostics as a list.",
+)
+@click.pass_context
+def check(ctx: click.Context, scenario: Path, dataset: Path | None, *, map_file: Path | None,
+          scenic: str | None, initial: bool, format_: str) -> None:  # fmt: skip
+    """Say whether a scenario is sound, and how it is read.
+
+    It is compiled against each map of the dataset, the map that is given, or else a small built-in street.
+    """
+    lines: list[str] = []
+    try:
+        lines, diagnostics = _found(read_program(scenario), _networks(dataset, map_file), read_version(scenic), initial)
+    except ScenicqError as error:
+        if format_ == "text":
+            raise
+        diagnostics = list(error.diagnostics)
+    if format_ == "json":
+        click.echo(json.dumps([as_json(diagnostic) for diagnostic in diagnostics], indent=1))
+    else:
+        show(diagnostics)
+        for line in lines:
+            click.echo(line)
+    if any(diagnostic.severity == "error" for diagnostic in diagnostics):
+        ctx.exit(ERROR)

@@ -1,0 +1,37 @@
+"""`scenicq report`: two result files of one dataset side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from scenicq.report.changes import changes, changes_page, changes_text, read_results
+
+from .output import destination, writing
+
+__all__ = ["report"]
+
+
+@click.command(
+    name="report",
+    epilog="\b\nExamples:\n"
+    "  scenicq report before.jsonl after.jsonl\n"
+    "  scenicq report before.jsonl after.jsonl --all -o changes.html",
+)
+@click.argument("before", metavar="A", type=click.Path(path_type=Path))
+@click.argument("after", metavar="B", type=click.Path(path_type=Path))
+@click.option("--all", "every", is_flag=True, help="List the frames that stayed, too.")
+@click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write a page of HTML to a file.")
+def report(before: Path, after: Path, *, every: bool, output: Path | None) -> None:
+    """Say which matches came, went and stayed between two result files.
+
+    A and B are files of JSON lines that `scenicq match` wrote for one dataset. With `match --all` they also say why a
+    frame does not match.
+    """
+    found = changes(read_results(before), read_results(after))
+    if output is None or str(output) == "-":
+        click.echo(changes_text(found, every=every))
+        return
+    with destination(output) as sink, writing(output):
+        sink.write(changes_page(found, (str(before), str(after))).encode())

@@ -1,0 +1,82 @@
+"""`scenicq explain`: why one frame matches a scenario, or what keeps it from matching."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.match.matcher import Matcher
+from scenicq.match.verdict import Match
+from scenicq.query.explain import explain as explain_label
+from scenicq.query.explain import show_explanation
+from scenicq.query.run import Query, read_program
+from scenicq.query.solving import LazySolver
+from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.labels import Label
+
+from .main import NOTHING
+from .match import match, query_options
+
+__all__ = ["ONE_FRAME", "SHARED", "explain", "find_label"]
+
+SHARED = frozenset({
+    "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
+    "initial", "ignore_params",
+})  # fmt: skip
+"""Options of `match` that say what a match is; the others say which frames and what to show of them."""
+ONE_FRAME = {"prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False}
+"""The rest of the options of a query about one frame."""
+
+
+def find_label(dataset: Dataset, frame: str) -> Label:
+    """The label of a frame.
+
+    Raises:
+        DataError: option-invalid: there is no such frame.
+    """
+    for label in dataset.labels([frame]):
+        return label
+    hint = "`scenicq match SCENARIO DATASET --all --format ids` lists the frames"
+    raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{frame}`", hints=(hint,)))
+
+
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  scenicq explain crossing.scenic dataset 1a2b3c\n"
+    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.25,heading=5deg --smt2 formulas"
+)
+@click.argument("scenario", type=click.Path(path_type=Path))
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.argument("frame")
+@click.option("--smt2", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+              help="Write the formula of each group as SMT-LIB 2 into a folder.")  # fmt: skip
+@click.option("--exit-zero", is_flag=True, help="Exit with 0 also where the frame does not match.")
+@click.pass_context
+def explain(
+    ctx: click.Context, scenario: Path, dataset: Path, frame: str, *, smt2: Path | None, exit_zero: bool, **given: Any
+) -> None:
+    """Say why one frame matches, or what keeps it from matching and under which tolerance it would.
+
+    The options of `match` that say what a match is apply. Exit code 0: it matches; 1: it does not; 2: an error.
+    """
+    query = Query(open_dataset(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
+    label = find_label(query.dataset, frame)
+    with LazySolver(query.options.solver) as solver:
+        matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
+        explanation = explain_label(matcher, label, formulas=smt2 is not None)
+    click.echo(show_explanation(explanation))
+    if smt2 is not None:
+        try:
+            smt2.mkdir(parents=True, exist_ok=True)
+            for formula in explanation.formulas:
+                (smt2 / f"{formula.name}.smt2").write_text(formula.text, encoding="utf-8")
+        except OSError as error:
+            raise DataError(Diagnostic("target-unwritable", f"{smt2} cannot be written: {error.strerror}")) from None
+    if not isinstance(explanation.verdict, Match) and not exit_zero:
+        ctx.exit(NOTHING)
+
+
+explain.params += [option for option in match.params if option.name in SHARED]

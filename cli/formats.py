@@ -1,0 +1,130 @@
+"""The formats of results: each writer takes results one by one and writes what it can at once."""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, BinaryIO, Protocol
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from .table import Table, Text
+
+__all__ = ["FORMATS", "Writer", "make_writer"]
+
+FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
+"""Names of the formats."""
+
+_COLUMNS: tuple[str, ...] = (
+    "frame",
+    "recording",
+    "timestamp_us",
+    "verdict",
+    "correspondence",
+    "witness",
+    "cause",
+    "sensors",
+)
+
+
+class Writer(Protocol):
+    """Writes results one by one."""
+
+    def write(self, record: Mapping[str, Any]) -> None:
+        """Write one result as `scenicq.query.results.record` gives it."""
+        ...
+
+    def finish(self) -> None:
+        """Write what is held back."""
+        ...
+
+
+class _Lines:
+    """One line a result: JSON, or the name of a frame that matches."""
+
+    def __init__(self, text: Text, line: Callable[[Mapping[str, Any]], str | None]) -> None:
+        self._text, self._line = text, line
+
+    def write(self, record: Mapping[str, Any]) -> None:
+        line = self._line(record)
+        if line is not None:
+            self._text.write(line + "\n")
+            self._text.flush()
+
+    def finish(self) -> None:
+        self._text.flush()
+
+
+def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of plain cells; nested values become JSON text."""
+    cells = {name: record.get(name, {}) for name in _COLUMNS}
+    return {name: _json(cell) if isinstance(cell, Mapping) else cell for name, cell in cells.items()}
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _name(record: Mapping[str, Any]) -> str | None:
+    return record["frame"] if record["verdict"] == "match" else None
+
+
+class _Csv:
+    def __init__(self, text: Text) -> None:
+        self._text = text
+        self._rows = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
+        self._rows.writeheader()
+
+    def write(self, record: Mapping[str, Any]) -> None:
+        self._rows.writerow(_flat(record))
+        self._text.flush()
+
+    def finish(self) -> None:
+        self._text.flush()
+
+
+class _Parquet:
+    def __init__(self, sink: BinaryIO) -> None:
+        self._schema = pa.schema([(name, pa.int64() if name == "timestamp_us" else pa.string()) for name in _COLUMNS])
+        self._file = pq.ParquetWriter(sink, self._schema)
+        self._rows: list[dict[str, Any]] = []
+
+    def write(self, record: Mapping[str, Any]) -> None:
+        self._rows.append(_flat(record))
+        if len(self._rows) >= 10_000:
+            self._spill()
+
+    def _spill(self) -> None:
+        self._file.write_table(pa.Table.from_pylist(self._rows, schema=self._schema))
+        self._rows.clear()
+
+    def finish(self) -> None:
+        self._spill()
+        self._file.close()
+
+
+def make_writer(name: str, sink: BinaryIO) -> Writer:
+    """The writer of a format.
+
+    Args:
+        name: One of `FORMATS`.
+        sink: Where to; it stays open.
+    """
+    if name == "parquet":
+        return _Parquet(sink)
+    text = Text(sink)
+    match name:
+        case "table":
+            return Table(text)
+        case "csv":
+            return _Csv(text)
+        case "ids":
+            return _Lines(text, _name)
+        case _:
+            return _Lines(text, _json)

@@ -1,0 +1,52 @@
+"""The summary of a query: how many frames are left after each step, and what the others failed at."""
+
+from __future__ import annotations
+
+import click
+
+from scenicq.forest.scenario import BuiltIn
+from scenicq.query.results import Funnel
+from scenicq.query.run import Query
+
+from .report import columns, count, show
+
+__all__ = ["show_funnel"]
+
+
+def _steps(query: Query) -> list[tuple[str, str]]:
+    funnel, total = query.funnel, query.dataset.manifest.total.frames
+    stopped = "" if funnel.frames >= total else f" of {total:,} looked at (stopped at --limit)"
+    filtered = "after the prefilter" if query.options.prefilter else "the prefilter is off"
+    reasons = ", ".join(f"{number:,} {reason}" for reason, number in funnel.reasons.most_common())
+    return [
+        (f"{funnel.frames:,}", f"frames{stopped}"),
+        (f"{funnel.candidates:,}", filtered),
+        (f"{funnel.cast:,}", "with a label object for every role"),
+        (f"{funnel.matches:,}", "matches"),
+        (f"{funnel.unknowns:,}", f"unknown{f': {reasons}' if reasons else ''}"),
+    ]
+
+
+def _failures(funnel: Funnel) -> list[str]:
+    if not funnel.excluded:
+        return []
+    counted = sorted(funnel.excluded.items(), key=lambda item: (-item[1], item[0]))
+    rows = [(what, f"{number:,}", f"{number / funnel.frames:.0%}") for what, number in counted]
+    return columns([("first failed at", "frames", "share"), *rows], right=frozenset({1, 2}))
+
+
+def show_funnel(query: Query, elapsed_s: float) -> None:
+    """Print the summary on standard error.
+
+    Args:
+        query: After its results were taken.
+        elapsed_s: Seconds that it took.
+    """
+    show(query.funnel.warnings)
+    lines = columns(_steps(query), right=frozenset({0}))
+    lines += _failures(query.funnel)
+    waived = [requirement.value for requirement in BuiltIn if requirement not in query.options.match.enforce]
+    if waived:
+        lines.append(f"  waived: {', '.join(waived)} (see --enforce)")
+    lines.append(f"  {count(query.funnel.frames, 'frame')} in {elapsed_s:.1f} s")
+    click.echo("\n".join(lines), err=True)

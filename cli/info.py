@@ -1,0 +1,76 @@
+"""`scenicq info`: what a dataset holds, where it comes from and what was left out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+
+from scenicq.store.dataset import open_dataset
+from scenicq.store.manifest import Counts, Manifest
+
+from .ingest import defects
+from .report import columns, count, moment
+
+__all__ = ["info"]
+
+_TOP = 10
+"""Recordings and classes of the source that are listed."""
+
+
+def _counted(title: str, counts: Mapping[str, Counts]) -> list[str]:
+    ranked = sorted(counts.items(), key=lambda item: (-item[1].frames, item[0]))
+    rows = [(name, f"{each.frames:,}", f"{each.objects:,}") for name, each in ranked[:_TOP]]
+    more = [f"  and {len(ranked) - _TOP:,} more"] if len(ranked) > _TOP else []
+    return [*columns([(title, "frames", "objects"), *rows], right=frozenset({1, 2}), indent=""), *more, ""]
+
+
+def _classes(manifest: Manifest) -> list[str]:
+    rows = sorted(manifest.by_class.items(), key=lambda item: (-item[1], item[0]))
+    return [*columns([("CLASS", "objects"), *((n, f"{c:,}") for n, c in rows)], right=frozenset({1}), indent=""), ""]
+
+
+def _tables(manifest: Manifest) -> list[str]:
+    rows = [("TABLE", "rows", "files", "MB")]
+    for name, parts in manifest.tables.items():
+        size = sum(part.bytes for part in parts) / 1e6
+        rows.append((name, f"{sum(part.rows for part in parts):,}", f"{len(parts):,}", f"{size:,.2f}"))
+    return [*columns(rows, right=frozenset({1, 2, 3}), indent=""), ""]
+
+
+def _lines(manifest: Manifest) -> list[str]:
+    span = manifest.span_us
+    source, made = manifest.provenance.get("source", "unknown"), manifest.provenance.get("time", "unknown")
+    versions = ", ".join(f"{name} {number}" for name, number in manifest.provenance.get("versions", {}).items())
+    without_map = sorted(set(manifest.by_map) - set(manifest.maps))
+    return [
+        f"{manifest.name}: {count(manifest.total.frames, 'frame')}, {count(manifest.total.objects, 'object')}, "
+        f"{count(manifest.tracks, 'track')} in {count(len(manifest.by_recording), 'recording')}",
+        *([f"from {moment(span[0])} to {moment(span[1])} (UTC)"] if span else []),
+        f"read as {manifest.importer} from {source} on {made}",
+        f"with {versions}",
+        "",
+        *_classes(manifest),
+        *_counted("MAP", manifest.by_map),
+        *([f"no map for: {', '.join(without_map)}", ""] if without_map else []),
+        *_counted("RECORDING", manifest.by_recording),
+        *_tables(manifest),
+        *(defects(manifest.left_out) or ["nothing was left out"]),
+    ]
+
+
+@click.command(epilog="\b\nExample:\n  scenicq info dataset --verify")
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.option("--verify", is_flag=True, help="Compare every file with its checksum.")
+@click.option("--format", "format_", type=click.Choice(["text", "json"]), default="text",
+              help="json gives the whole manifest.")  # fmt: skip
+def info(dataset: Path, *, verify: bool, format_: str) -> None:
+    """Say what a dataset holds and what was left out of it."""
+    opened = open_dataset(dataset)
+    if verify:
+        opened.verify()
+    if format_ == "json":
+        click.echo(opened.manifest.to_json(), nl=False)
+    else:
+        click.echo("\n".join([*_lines(opened.manifest), *(["every checksum is right"] if verify else [])]))

@@ -1,0 +1,137 @@
+"""The command `scenicq`: finds the subcommand, and turns every error into a message and an exit code.
+
+Subcommands are imported when they are called, so that `--help` and `--version` start at once.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import signal
+import sys
+import tempfile
+import traceback
+from importlib import import_module
+from importlib.metadata import version
+from typing import Any
+
+import click
+
+from scenicq.errors import ScenicqError
+
+from .report import show
+
+__all__ = ["COMMANDS", "NOTHING", "cli", "main"]
+
+COMMANDS = {
+    "ingest": "Make a dataset from a source, such as a nuScenes folder.",
+    "match": "Find the frames of a dataset that match a scenario.",
+    "gather": "Put the shards of a query together, in the order of the dataset.",
+    "check": "Say whether a scenario is sound, and how it is read.",
+    "explain": "Say why one frame matches or does not, and how far it is from it.",
+    "show": "Draw one frame from above: map, boxes, and what a scenario says of it.",
+    "report": "Say which matches came, went and stayed between two result files.",
+    "info": "Say what a dataset holds and what was left out of it.",
+    "doctor": "Say which solvers load here and what is missing.",
+    "completion": "Print what makes a shell complete commands and options.",
+}
+"""Every subcommand, each in the module of its name, with the first line of its help."""
+
+_MODULES = {"report": "compare"}
+"""Modules whose command has another name."""
+
+NOTHING, ERROR, INTERRUPTED = 1, 2, 130
+"""Exit codes besides 0, in the manner of grep."""
+
+
+class Commands(click.Group):
+    """A group whose subcommands are imported when they are needed."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The names, in the order in which one meets them."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a subcommand."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
+        command: click.Command = getattr(module, cmd_name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the subcommands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find a subcommand, or say which one may be meant."""
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            near = difflib.get_close_matches(name, COMMANDS, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else ""
+            raise click.UsageError(f"No such command '{name}'.{hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a subcommand; whatever it raises becomes a message and an exit code."""
+        if os.environ.get("NO_COLOR"):
+            ctx.color = False
+        try:
+            result = super().invoke(ctx)
+            sys.stdout.flush()
+        except (click.ClickException, click.exceptions.Exit, click.Abort):
+            raise
+        except ScenicqError as error:
+            show(error.diagnostics)
+            ctx.exit(ERROR)
+        except KeyboardInterrupt:
+            click.echo("interrupted", err=True)
+            ctx.exit(INTERRUPTED)
+        except BrokenPipeError:
+            # The reader has what it wanted. What is left in the buffer must not fail again when the interpreter ends.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            ctx.exit(0)
+        except Exception:  # noqa: BLE001 - our own mistake, whatever it is
+            click.echo(f"internal error: this is a mistake in scenicq; please report it with {_written()}", err=True)
+            ctx.exit(ERROR)
+        return result
+
+
+def _written() -> str:
+    """Write what is needed to find a mistake into a file, and give its name."""
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="scenicq-error-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
+    ) as file:
+        file.write(f"scenicq {version('scenicq')}, Python {sys.version}, {sys.platform}\n{sys.argv}\n\n")
+        file.write(traceback.format_exc())
+    return file.name
+
+
+@click.command(
+    cls=Commands,
+    context_settings={
+        "auto_envvar_prefix": "SCENICQ",
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 100,
+        "show_default": True,
+    },
+    epilog="\b\nExample:\n  scenicq ingest sample_data/crossroads demo/crossroads\n"
+    "  scenicq match sample_data/scenarios/02_crossing_cars.scenic demo/crossroads",
+)
+@click.version_option(package_name="scenicq", message="%(prog)s %(version)s")
+def cli() -> None:
+    """Find the recorded frames that match a Scenic scenario.
+
+    Exit codes: 0 something matched, or the command did its work; 1 `match` found nothing; 2 an error.
+    Every option can also be given as an environment variable, such as SCENICQ_MATCH_JOBS=4.
+    """
+
+
+def main() -> None:
+    """Run the command line of this process."""
+    # so that a terminated run leaves nothing half-written, like an interrupted one
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    cli(prog_name="scenicq")

@@ -1,0 +1,130 @@
+"""Where results go: standard output, or a file that appears when it is complete; and the progress bar."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Generator
+from pathlib import Path
+from typing import BinaryIO, NoReturn, Self
+
+from tqdm import tqdm
+
+from scenicq.errors import DataError, Diagnostic
+
+__all__ = ["ProgressBar", "choose_format", "destination", "writing"]
+
+_EXTENSIONS = {".jsonl": "jsonl", ".csv": "csv", ".parquet": "parquet", ".txt": "ids"}
+
+
+def choose_format(name: str | None, file: Path | None) -> str:
+    """The format that is asked for, else that of the file's extension, else what suits a terminal or a pipe.
+
+    Raises:
+        DataError: option-invalid: the extension names no format, or the format is not for terminals.
+    """
+    terminal = file is None and sys.stdout.isatty()
+    if name == "parquet" and terminal:
+        hint = "`-o FILE` writes it to a file"
+        raise DataError(Diagnostic("option-invalid", "Parquet cannot be shown on a terminal", hints=(hint,)))
+    if name is not None:
+        return name
+    if file is None:
+        return "table" if terminal else "jsonl"
+    if file.suffix not in _EXTENSIONS:
+        hint = f"known are {', '.join(_EXTENSIONS)}; `--format` chooses whatever the name is"
+        raise DataError(Diagnostic("option-invalid", f"the name {file} does not say which format", hints=(hint,)))
+    return _EXTENSIONS[file.suffix]
+
+
+@contextlib.contextmanager
+def writing(file: Path | None) -> Generator[None]:
+    """Makes what the operating system says while results are written a message about their target.
+
+    Raises:
+        DataError: target-unwritable.
+    """
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        message = f"{file or 'standard output'} cannot be written: {error.strerror or error}"
+        raise DataError(Diagnostic("target-unwritable", message)) from error
+
+
+@contextlib.contextmanager
+def destination(file: Path | None) -> Generator[BinaryIO]:
+    """Standard output, or a file that is written beside its place and renamed at the end.
+
+    Raises:
+        DataError: target-unwritable.
+    """
+    if file is None:
+        yield sys.stdout.buffer
+    elif file.exists() and not file.is_file() and not file.is_dir():
+        with writing(file):
+            device = file.open("wb")
+        with device:
+            yield device
+    else:
+        yield from _complete(file, Path(os.path.realpath(file)))
+
+
+def _complete(name: Path, file: Path) -> Generator[BinaryIO]:
+    beside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
+    with writing(name):
+        if file.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        sink = beside.open("wb")
+    try:
+        with sink:
+            yield sink
+            with writing(name):
+                sink.flush()
+                os.fsync(sink.fileno())
+        with writing(name):
+            beside.replace(file)
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink()
+
+
+class ProgressBar:
+    """Counts frames on standard error; silent where that is no terminal."""
+
+    def __init__(self, total: int | None = None, *, quiet: bool) -> None:
+        """Show nothing yet.
+
+        Args:
+            total: Frames in all, if known.
+            quiet: Whether to be silent anyway.
+        """
+        # tqdm takes None for: only on a terminal
+        disable = True if quiet else None
+        self._bar: tqdm[NoReturn] = tqdm(
+            total=total, unit=" frames", unit_scale=True, leave=False, file=sys.stderr, disable=disable
+        )
+
+    def advance(self, frames: int) -> None:
+        """So many frames more are done."""
+        self._bar.update(frames)
+
+    def reach(self, frames: int, total: int) -> None:
+        """So many frames are done of a total."""
+        self._bar.total = total
+        self._bar.update(frames - self._bar.n)
+
+    def aside(self) -> contextlib.AbstractContextManager[None]:
+        """Takes the bar away while results are written to the same terminal."""
+        return tqdm.external_write_mode(file=sys.stdout)
+
+    def __enter__(self) -> Self:
+        """Return the bar itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Take the bar away."""
+        self._bar.close()

@@ -1,0 +1,104 @@
+"""`scenicq show`: a frame as a picture."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.match.matcher import Matcher
+from scenicq.match.verdict import NoMatch
+from scenicq.query.explain import explain
+from scenicq.query.run import Query, read_program
+from scenicq.query.solving import LazySolver
+from scenicq.report.backdrop import Backdrop
+from scenicq.report.frames import frame_page
+from scenicq.report.picture import Shot, Style, draw
+from scenicq.report.png import can_make_png, png
+from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.labels import Label
+
+from .explain import ONE_FRAME, SHARED, find_label
+from .match import match, query_options
+from .output import destination, writing
+
+__all__ = ["show"]
+
+_STYLES: dict[str, Style] = {".svg": "adaptive", ".png": "light", ".html": "none"}
+"""The formats, with the style that a picture needs for each."""
+
+
+def _kind(output: Path | None) -> str:
+    """What to write, by the name of the file: SVG on standard output."""
+    kind = ".svg" if output is None else output.suffix.lower()
+    if kind not in _STYLES:
+        hint = f"known are {', '.join(_STYLES)}"
+        raise DataError(Diagnostic("option-invalid", f"the name {output} does not say which format", hints=(hint,)))
+    if kind == ".png" and not can_make_png():
+        png("")
+    return kind
+
+
+def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str, Any]) -> tuple[Shot, Backdrop]:
+    if scenario is None:
+        return Shot(label), Backdrop(dataset.network(label.map))
+    query = Query(dataset, read_program(scenario), query_options({**given, **ONE_FRAME}))
+    compiled, network = query.compile(label.map)
+    with LazySolver(query.options.solver) as solver:
+        matcher = Matcher(compiled, query.options.match, solver)
+        verdict = matcher.match(label)
+        why = explain(matcher, label) if isinstance(verdict, NoMatch) else None
+    return Shot(label, compiled, verdict, why), Backdrop(network)
+
+
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  scenicq show dataset 1a2b3c -o frame.svg\n"
+    "  scenicq show dataset 1a2b3c --scenario crossing.scenic -o frame.html\n"
+    "  scenicq show dataset 1a2b3c --scenario crossing.scenic --half 30 -o frame.png"
+)
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.argument("frame")
+@click.option(
+    "--scenario",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Show what this scenario says of the frame: roles, where each may be and which way it may face, hidden "
+    "points, and in red what excludes it.",
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Where to: .svg, .png (needs scenicq[png]) or .html.  [default: SVG to standard output]",
+)
+@click.option(
+    "--half",
+    metavar="M",
+    type=click.FloatRange(1, 1000),
+    help="Metres from the ego to the edges of the picture.  [default: so that every role is seen]",
+)
+@click.option("--width", metavar="PX", type=click.IntRange(50, 10_000), default=900, help="Width in pixels.")
+def show(dataset: Path, frame: str, *, scenario: Path | None, output: Path | None, half: float | None,
+         width: int, **given: Any) -> None:  # fmt: skip
+    """Draw one frame from above: map, boxes, and what a scenario says of it.
+
+    The options of `match` that say what a match is apply with `--scenario`.
+    """
+    file = None if output is None or str(output) == "-" else output
+    kind = _kind(file)
+    opened = open_dataset(dataset)
+    shot, backdrop = _shot(opened, find_label(opened, frame), scenario, given)
+    picture = draw(shot, backdrop, half=half, pixels=width, style=_STYLES[kind])
+    data = png(picture) if kind == ".png" else (frame_page(shot, picture) if kind == ".html" else picture).encode()
+    with destination(file) as sink, writing(file):
+        sink.write(data)
+    if file is None and sys.stdout.isatty():
+        click.echo()
+
+
+show.params += [option for option in match.params if option.name in SHARED]

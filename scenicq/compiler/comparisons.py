@@ -1,0 +1,106 @@
+"""Arithmetic and comparisons of any two values, known, random or chosen at random; and going through lists."""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from typing import cast
+
+from scenicq.compiler import operators
+from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random, plain_binary
+from scenicq.compiler.choices import distribute, is_choice
+from scenicq.compiler.coerce import kind_of_model
+from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail, is_node
+from scenicq.errors import Span
+
+__all__ = ["binary", "compare", "iterate", "symbolic"]
+
+
+def symbolic(value: ModelValue) -> bool:
+    """Whether an operator on a value makes an expression."""
+    return is_node(value) or isinstance(value, Choice | Instance)
+
+
+def binary(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    """Arithmetic on any two values.
+
+    Raises:
+        ScenarioError: wrong-type and its like.
+    """
+
+    def known(a: ModelValue, b: ModelValue) -> ModelValue:
+        if symbolic(a) or symbolic(b):
+            return operators.binary(op, a, b, span)
+        return plain_binary(op, a, b, span)
+
+    return distribute(known, (left, right), span, spread=is_choice)
+
+
+def compare(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    """A comparison of any two values.
+
+    Raises:
+        ScenarioError: wrong-type and its like.
+    """
+    if op in ("in", "not in"):
+        return _membership(op, left, right, span)
+    return distribute(lambda a, b: _compare_known(op, a, b, span), (left, right), span, spread=is_choice)
+
+
+def _compare_known(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    if op in ("is", "is not"):
+        if is_random(left) != is_random(right) and not isinstance(left, bool | type(None)) and right is not None:
+            raise fail("random-branch", f"`{op}` asks for one and the same value, which a random one is not", span,
+                       "random here", ("compare with `==`",))  # fmt: skip
+        same = left is right or (
+            isinstance(left, str | bool | type(None)) and type(left) is type(right) and left == right
+        )
+        return same == (op == "is")
+    if op in ("==", "!="):
+        if left is None or right is None:
+            return (left is right) == (op == "==")
+        if isinstance(left, Instance) and isinstance(right, Instance):
+            return (left is right) == (op == "==")
+    if is_node(left) or is_node(right):
+        return operators.compare(op, left, right, span)
+    return plain_binary(op, left, right, span)
+
+
+def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    def negated(value: ModelValue) -> ModelValue:
+        if op == "in":
+            return value
+        return not value if isinstance(value, bool) else operators.combine("not", [value], span)
+
+    if kind_of_model(right) == "region":
+        return negated(distribute(lambda item, region: operators.within(item, region, span), (left, right), span))
+    if isinstance(right, str) and isinstance(left, str):
+        return (left in right) == (op == "in")
+    if isinstance(right, list | tuple | dict | set | range):
+        items = list(cast("list[ModelValue]", right))
+        if is_random(left) or (not is_flat(items) and any(map(is_random, items))):
+            return negated(operators.combine("or", [compare("==", left, item, span) for item in items], span))
+        check_weight(span, left, right, compared=True)
+        return (hashed(left, span) in right if isinstance(right, dict | set) else left in items) == (op == "in")
+    raise fail("wrong-type", f"`{op}` needs a region or a list", span, f"this is {describe(right)}")
+
+
+def iterate(value: ModelValue, span: Span) -> list[ModelValue]:
+    """The items of a known sequence.
+
+    Raises:
+        ScenarioError: wrong-type or random-branch.
+    """
+    if isinstance(value, list | tuple | range | dict | str):
+        return list(cast("list[ModelValue]", value))
+    if isinstance(value, set):
+        # the order of a set of strings differs from run to run in Python; here it never does
+        items = list(cast("set[ModelValue]", value))
+        plain = all(isinstance(item, str | int | float) for item in items)
+        return sorted(items, key=lambda item: (isinstance(item, str), item)) if plain else items
+    if is_random(value):
+        raise fail("random-branch", "a random list cannot be gone through", span, "random here",
+                   ("use `Uniform(*list)` to pick one of its items",))  # fmt: skip
+    raise fail("wrong-type", f"{describe(value)} cannot be gone through", span, "not a list")

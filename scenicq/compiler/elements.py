@@ -1,0 +1,134 @@
+"""What a program may read of the map: the network, its elements and the ways through intersections.
+
+The names are those of Scenic's driving domain.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, cast
+
+import shapely
+
+from scenicq.compiler.coerce import to_vector
+from scenicq.compiler.values import Builtin, ModelValue, Module, fail
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.nodes import Constant
+from scenicq.geometry.angles import heading_of, normalize
+from scenicq.geometry.elements import Lane, Maneuver, MissingElementError, NetworkElement
+from scenicq.geometry.fields import VectorField
+from scenicq.geometry.network import Network
+from scenicq.geometry.regions import Region
+
+__all__ = ["MANEUVER_TYPES", "MISSING", "names_of", "of_element", "of_network"]
+
+MISSING = object()
+"""What stands for an attribute that does not exist."""
+
+MANEUVER_TYPES = Module("ManeuverType", {name: name for name in ("STRAIGHT", "LEFT_TURN", "RIGHT_TURN", "U_TURN")})
+"""The kinds of maneuvers, each a name."""
+
+_TURN = math.radians(20)
+"""Change of direction from which on a way through an intersection is a turn."""
+_HIDDEN = frozenset({"polygon", "properties", "region"})
+_NETWORK = frozenset(
+    "lanes laneSections laneGroups roads connectingRoads allRoads intersections crossings sidewalks shoulders "
+    "laneRegion roadRegion intersectionRegion crossingRegion sidewalkRegion shoulderRegion drivableRegion "
+    "walkableRegion curbRegion roadDirection".split()
+)
+_LOOKUPS = frozenset("laneAt laneSectionAt laneGroupAt roadAt intersectionAt crossingAt sidewalkAt elementAt".split())
+_MANEUVER = frozenset({"type", "conflictingManeuvers", "reverseManeuvers"})
+
+
+def names_of(value: Network | NetworkElement | Maneuver) -> set[str]:
+    """The attributes that a value may have."""
+    if isinstance(value, Network):
+        return set(_NETWORK | _LOOKUPS | {"nominalDirectionsAt"})
+    own = {name for name in dir(value) if not name.startswith("__")} - _HIDDEN
+    return own | _MANEUVER if isinstance(value, Maneuver) else own
+
+
+def of_network(network: Network, name: str, span: Span) -> ModelValue:
+    """An attribute of the network, or `MISSING`."""
+    if name in _LOOKUPS or name == "nominalDirectionsAt":
+
+        def look_up(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
+            where = to_vector(point, span)
+            if not isinstance(where, Constant):
+                raise fail("unsupported-construct", f"`network.{name}` of a random point is not supported", span,
+                           "a random point", ("state the relation with `in` and a region",))  # fmt: skip
+            found = getattr(network, name)(*cast("tuple[float, float]", where.value))
+            if found is None and reject:
+                raise fail("impossible-requirement", f"there is nothing for `network.{name}` at this point", span,
+                           "no scene is left", ("without `reject`, the result is None",))  # fmt: skip
+            return found
+
+        return Builtin(name, look_up)
+    if name not in _NETWORK:
+        return MISSING
+    found = getattr(network, name)
+    return build.constant(found, span) if name.endswith("Region") or name == "roadDirection" else found
+
+
+def of_element(value: NetworkElement | Maneuver, name: str, span: Span) -> ModelValue:
+    """An attribute of an element or maneuver, or `MISSING`.
+
+    Raises:
+        ScenarioError: map-lacks, where Scenic would reject the scene.
+    """
+    if isinstance(value, Maneuver) and name in _MANEUVER:
+        return _of_maneuver(value, name)
+    if name in _HIDDEN or not (hasattr(type(value), name) or name in getattr(value, "__dict__", ())):
+        return MISSING
+    try:
+        found: Any = getattr(value, name)
+    except MissingElementError as error:
+        hints = (f"`_{name}` is None there: leave such elements out with a condition",)
+        raise fail("map-lacks", f"the map says that {error}", span, "not in this map", hints) from None
+    if callable(found):
+        return MISSING
+    if found is None and name == "centerline":
+        raise fail("map-lacks", f"the map gives no centreline for {value.name}", span, "not in this map")  # type: ignore[union-attr]
+    return build.constant(found, span) if isinstance(found, Region | VectorField) else found
+
+
+def _of_maneuver(maneuver: Maneuver, name: str) -> ModelValue:
+    if name == "type":
+        return _type_of(maneuver)
+    if maneuver.intersection is None:
+        return ()
+    others = maneuver.intersection.maneuvers
+    if name == "reverseManeuvers":
+        start, end = maneuver.startLane.road, maneuver.endLane.road
+        return tuple(each for each in others if each.startLane.road is end and each.endLane.road is start)
+    own = _way(maneuver.connectingLane)
+    return tuple(
+        each
+        for each in others
+        if each.startLane is not maneuver.startLane and own is not None
+        if (way := _way(each.connectingLane)) is not None and shapely.intersects(own, way)
+    )
+
+
+def _way(lane: Lane | None) -> Any:
+    """The centreline of a lane as one geometry; its area where there is none."""
+    if lane is None:
+        return None
+    return shapely.union_all(lane.centerline.lines) if lane.centerline else lane.polygon
+
+
+def _type_of(maneuver: Maneuver) -> str:
+    """The kind of a way through an intersection, by its change of direction, as Scenic guesses it."""
+    lane = maneuver.connectingLane
+    if lane is None:
+        return "STRAIGHT"
+    if maneuver.startLane.road is not None and maneuver.startLane.road is maneuver.endLane.road:
+        return "U_TURN"
+    if lane.centerline is None:
+        return "STRAIGHT"
+    first, last = lane.centerline.lines[0].coords, lane.centerline.lines[-1].coords
+    enter = heading_of(first[1][0] - first[0][0], first[1][1] - first[0][1])
+    leave = heading_of(last[-1][0] - last[-2][0], last[-1][1] - last[-2][1])
+    turn = normalize(leave - enter)
+    return "LEFT_TURN" if turn >= _TURN else "RIGHT_TURN" if turn <= -_TURN else "STRAIGHT"

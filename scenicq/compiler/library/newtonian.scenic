@@ -1,0 +1,5 @@
+# Classes of Scenic's model for the Newtonian simulator.
+
+class Debris:
+    position: new Point on road
+    heading: Range(0, 360) deg

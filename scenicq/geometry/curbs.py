@@ -1,0 +1,90 @@
+"""Curbs of a map that names none: the outer edges of its roads, as Scenic takes them from its lane groups.
+
+A lane without a neighbour to its right ends at the curb: its right edge, in the direction of travel.
+"""
+
+# shapely carries no type annotations
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportUnknownParameterType=false, reportMissingTypeArgument=false
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+
+from scenicq.geometry import shapes
+from scenicq.geometry.elements import Lane
+from scenicq.geometry.shapes import Shape
+
+__all__ = ["right_edges"]
+
+_CORNER = np.cos(np.radians(60))
+"""A boundary that turns away from the direction of travel by more than this is a lane's end, not its side."""
+
+
+def right_edges(lanes: Sequence[Lane], intersections: Sequence[Shape]) -> tuple[LineString, ...]:
+    """The right edges of the lanes that have no lane to their right, outside of intersections.
+
+    Args:
+        lanes: Lanes with centrelines; others are passed over.
+        intersections: Polygons of the intersections.
+
+    Returns:
+        Polylines in metres, in the direction of travel.
+    """
+    crossing = shapes.union_all(list(intersections)) if intersections else None
+    found: list[LineString] = []
+    for lane in lanes:
+        for section in lane.sections:
+            if section._laneToRight is None and section.centerline is not None:  # pyright: ignore[reportPrivateUsage]
+                edges = _edges(cast(Shape, section.polygon), section.centerline.lines)
+                found += edges if crossing is None else [part for edge in edges for part in _outside(edge, crossing)]
+    return tuple(found)
+
+
+def _outside(edge: LineString, area: Shape) -> list[LineString]:
+    rest = shapes.difference(edge, area)
+    return [cast(LineString, part) for part in shapes.simple_parts([rest]) if part.length > 0]
+
+
+def _edges(area: Shape, centerlines: Sequence[Shape]) -> list[LineString]:
+    """The parts of a lane's boundary that lie to the right of its centreline and run along with it."""
+    line = centerlines[0] if len(centerlines) == 1 else shapely.line_merge(shapely.union_all(list(centerlines)))
+    if not isinstance(line, LineString):
+        return []
+    points = shapely.get_coordinates(shapely.get_exterior_ring(shapely.get_parts(area)[0]))
+    if not shapely.is_ccw(shapely.linearrings(points)):
+        points = points[::-1]
+    # counter-clockwise, the right side of the lane is passed in the direction of travel
+    starts, ends = points[:-1], points[1:]
+    middles = shapely.points((starts + ends) / 2)
+    along = shapely.line_locate_point(line, middles)
+    ahead = shapely.get_coordinates(shapely.line_interpolate_point(line, np.minimum(along + 0.5, line.length)))
+    behind = shapely.get_coordinates(shapely.line_interpolate_point(line, np.maximum(along - 0.5, 0.0)))
+    travel, side = ahead - behind, ends - starts
+    lengths = np.hypot(*travel.T) * np.hypot(*side.T)
+    follows = (travel * side).sum(axis=1) > _CORNER * lengths
+    away = (starts + ends) / 2 - (ahead + behind) / 2
+    right = travel[:, 0] * away[:, 1] - travel[:, 1] * away[:, 0] < 0
+    return _runs(points, follows & right)
+
+
+def _runs(points: np.ndarray, kept: np.ndarray) -> list[LineString]:
+    """The maximal runs of kept segments of a ring."""
+    count = len(kept)
+    if not kept.any():
+        return []
+    first = 0 if kept.all() else next(n for n in range(count) if kept[n] and not kept[n - 1])
+    runs: list[list[tuple[float, float]]] = []
+    for step in range(count):
+        number = (first + step) % count
+        if not kept[number]:
+            continue
+        if not runs or not kept[number - 1] or step == 0:
+            runs.append([tuple(points[number])])
+        runs[-1].append(tuple(points[number + 1]))
+    return [LineString(run) for run in runs]

@@ -1,0 +1,249 @@
+"""Argoverse 2 sensor logs in their official layout: `LOG/annotations.feather`, `LOG/map/log_map_archive_*.json`.
+
+Conventions of the source: boxes lie in the frame of the ego at their timestamp (x ahead, y left, origin in the middle
+of the rear axle), quaternions are w, x, y, z of either sign, times are nanoseconds. The ego has no box and nothing has
+a velocity: see `facts`.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from scenicq.importers.argoverse2_map import read_archive
+from scenicq.importers.base import ClassNames, Options, Source, read_maps
+from scenicq.importers.by_file import Place, by_file_source, missing, take_map
+from scenicq.importers.columnar import read_feather
+from scenicq.importers.fields import InvalidError
+from scenicq.importers.motion import Rigid, quaternion, velocities
+from scenicq.importers.report import Report
+from scenicq.store.classes import taxonomy
+from scenicq.store.labels import Label, LabelObject
+
+__all__ = ["Argoverse2", "archive_of"]
+
+_EGO_SIZE_M = (2.0, 4.877, 1.473)
+"""Width, length and height of the recording car, a Ford Fusion."""
+
+_AXLE_TO_CENTRE_M = 1.42
+"""How far the centre of the ego's box lies ahead of its rear axle."""
+
+_REACH_US, _LONGEST_STEP_US = 250_000, 550_000
+_FARTHEST_M = 1e7
+_BOXES, _POSES, _FRAMES = "annotations", "city_SE3_egovehicle", 156
+_EGO_CLASS = "EGO_VEHICLE"
+_POSE = {"qw": "real", "qx": "real", "qy": "real", "qz": "real", "tx_m": "real", "ty_m": "real", "tz_m": "real"}
+_SIZE = ("width_m", "length_m", "height_m")
+_BOX = {"timestamp_ns": "integer", "track_uuid": "text", "category": "text", **dict.fromkeys(_SIZE, "real"), **_POSE}
+
+
+class Argoverse2:
+    """Importer of Argoverse 2 sensor logs."""
+
+    name = "argoverse2"
+    layout = "a folder of logs, each with `annotations.feather` and `city_SE3_egovehicle.feather`"
+
+    def recognises(self, path: Path) -> bool:
+        """Whether the path is a log, or a folder of them, or one of the official folders above."""
+        return bool(_log_folders(path))
+
+    def read(self, path: Path, options: Options, report: Report) -> Source:
+        """Open logs; each is read when it is its turn, so memory is that of the largest and of the maps.
+
+        Raises:
+            DataError: `file-missing`; with a strict report whatever is unsound.
+        """
+        logs = _log_folders(path)
+        if not logs:
+            raise missing(path, "no log with `annotations.feather`")
+        maps = read_maps(options.maps, report)
+        for log in logs:
+            if (file := archive_of(log / "map")) is not None:
+                take_map(log.name, file, read_archive, maps, report)
+        return by_file_source(
+            f"argoverse2-{path.resolve().name}",
+            maps,
+            [
+                Place(log.name, tuple(log / f"{name}.feather" for name in (_BOXES, _POSES)), path, log.name)
+                for log in logs
+            ],
+            {**taxonomy("argoverse2"), **options.class_map},
+            _read_log,
+            frames=_FRAMES * len(logs),
+            object_bytes=50,
+            facts={
+                "ego_size_m": dict(zip(("width", "length", "height"), _EGO_SIZE_M, strict=True)),
+                "ego_centre_ahead_of_rear_axle_m": _AXLE_TO_CENTRE_M,
+                "velocity": f"differences over up to {2 * _REACH_US / 1e6} s, none across {_LONGEST_STEP_US / 1e6} s",
+                "intersections": "unions of lanes with `is_intersection` that touch",
+                "groups_and_roads": "lanes beside each other",
+            },
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Box:
+    track: str
+    category: str
+    x: float
+    y: float
+    heading: float
+    size: tuple[float, float, float]
+    attributes: Mapping[str, str | float | bool]
+
+
+def archive_of(folder: Path) -> Path | None:
+    """The vector map of a folder: the first by name, None if there is none."""
+    return next(iter(sorted(folder.glob("log_map_archive_*.json"))), None)
+
+
+def _read_log(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+    labels = _Log(place, classes, report).labels()
+    return [(label, f"{place.name}/{_BOXES}.feather") for label in labels]
+
+
+class _Log:
+    """One log; what is unsound is reported and left out."""
+
+    def __init__(self, place: Place, classes: ClassNames, report: Report) -> None:
+        log = place.files[0].parent
+        self._log = log
+        self._folder = log.relative_to(place.root).as_posix()
+        self._classes = classes
+        self._report = report
+        self._boxes: defaultdict[int, list[_Box]] = defaultdict(list)
+        self._tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
+        rows = read_feather(log / f"{_BOXES}.feather", _BOX, {"num_interior_pts": "integer"})
+        self._poses = self._read_poses({time for time in rows["timestamp_ns"] if time is not None})
+        for number in range(len(rows["timestamp_ns"])):
+            try:
+                self._add({key: values[number] for key, values in rows.items()})
+            except InvalidError as error:
+                report.left_out("object", "record-invalid", f"{log.name}/{_BOXES}.feather:{number + 1}: {error}")
+
+    def labels(self) -> list[Label]:
+        times = sorted(self._poses)
+        archive = archive_of(self._log / "map")
+        parts = [] if archive is None else archive.stem.split("____")[1:]
+        params: dict[str, str | float | bool] = {"location": parts[0].partition("_")[0]} if parts else {}
+        cameras = self._cameras()
+        centres = [(time // 1000, *self._poses[time].place((_AXLE_TO_CENTRE_M, 0.0, 0.0))[:2]) for time in times]
+        ego_moves = _moves(centres)
+        moves = {
+            (track, place[0]): move
+            for track, places in self._tracks.items()
+            for place, move in zip(places, _moves(places), strict=True)
+        }
+        return [
+            Label(
+                frame=f"{self._log.name}/{time}",
+                recording=self._log.name,
+                timestamp_us=time // 1000,
+                map=self._log.name,
+                ego=_ego(centre, self._poses[time].heading, move),
+                objects=tuple(self._object(box, moves[box.track, time // 1000]) for box in self._boxes[time]),
+                params=params,
+                sensors=self._sensors(time, cameras),
+            )
+            for time, centre, move in zip(times, centres, ego_moves, strict=True)
+        ]
+
+    def _object(self, box: _Box, velocity: tuple[float, float] | None) -> LabelObject:
+        return LabelObject(
+            id=box.track,
+            category=self._classes.category(box.category),
+            source_class=box.category,
+            x=box.x,
+            y=box.y,
+            heading=box.heading,
+            width=box.size[0],
+            length=box.size[1],
+            height=box.size[2],
+            velocity=velocity,
+            track=box.track,
+            attributes=box.attributes,
+        )
+
+    def _read_poses(self, wanted: set[int]) -> dict[int, Rigid]:
+        rows = read_feather(self._log / f"{_POSES}.feather", {"timestamp_ns": "integer", **_POSE})
+        poses: dict[int, Rigid] = {}
+        for number, time in enumerate(rows["timestamp_ns"]):
+            if time in wanted and time not in poses:
+                try:
+                    poses[time] = _pose({key: values[number] for key, values in rows.items()})
+                except InvalidError as error:
+                    place = f"{self._log.name}/{_POSES}.feather:{number + 1}"
+                    self._report.left_out("ego pose", "record-invalid", f"{place}: {error}")
+        for time in sorted(wanted - set(poses)):
+            message = f"{self._log.name}: annotations at {time} have no sound pose of the ego"
+            self._report.left_out("label", "record-invalid", message)
+        return poses
+
+    def _add(self, row: Mapping[str, Any]) -> None:
+        time, track, category = row["timestamp_ns"], row["track_uuid"], row["category"]
+        if category == _EGO_CLASS or (time is not None and time not in self._poses):
+            return
+        if time is None or not track or not category:
+            raise InvalidError("`timestamp_ns`, `track_uuid` or `category` is missing")
+        size = row["width_m"], row["length_m"], row["height_m"]
+        if not all(value is not None and 0 < value < math.inf for value in size):
+            raise InvalidError("its size is not positive")
+        box = self._poses[time].then(_pose(row))
+        x, y, _ = box.origin
+        points = row.get("num_interior_pts")
+        attributes: dict[str, str | float | bool] = {} if points is None else {"num_interior_pts": points}
+        self._boxes[time].append(_Box(track, category, x, y, box.heading, size, attributes))
+        self._tracks[track].append((time // 1000, x, y))
+
+    def _cameras(self) -> dict[str, list[tuple[int, str]]]:
+        """Times and names of the images of each camera, where they are there."""
+        found: dict[str, list[tuple[int, str]]] = {}
+        for camera in sorted((self._log / "sensors" / "cameras").glob("*")):
+            stems = [(file.stem, file.name) for file in camera.glob("*.jpg")]
+            found[camera.name] = sorted((int(stem), name) for stem, name in stems if stem.isascii() and stem.isdigit())
+        return found
+
+    def _sensors(self, time: int, cameras: Mapping[str, list[tuple[int, str]]]) -> dict[str, str]:
+        # A folder that is the log itself has no name of its own here.
+        start = "" if self._folder == "." else f"{self._folder}/"
+        sensors = {"lidar": f"{start}sensors/lidar/{time}.feather"}
+        for camera, images in cameras.items():
+            if images:
+                after = bisect_left(images, (time, ""))
+                near = min(images[max(0, after - 1) : after + 1], key=lambda image: abs(image[0] - time))
+                sensors[camera] = f"{start}sensors/cameras/{camera}/{near[1]}"
+        return dict(sorted(sensors.items()))
+
+
+def _moves(places: Sequence[tuple[int, float, float]]) -> list[tuple[float, float] | None]:
+    return velocities(places, reach_us=_REACH_US, longest_us=_LONGEST_STEP_US)
+
+
+def _ego(centre: tuple[int, float, float], heading: float, velocity: tuple[float, float] | None) -> LabelObject:
+    width, length, height = _EGO_SIZE_M
+    return LabelObject("ego", "Car", _EGO_CLASS, centre[1], centre[2], heading, width, length, height, velocity)
+
+
+def _pose(row: Mapping[str, Any]) -> Rigid:
+    if any(row[name] is None or not abs(row[name]) < _FARTHEST_M for name in _POSE):
+        raise InvalidError("its pose is not finite")
+    return quaternion(row["qw"], row["qx"], row["qy"], row["qz"], (row["tx_m"], row["ty_m"], row["tz_m"]))
+
+
+def _log_folders(path: Path) -> list[Path]:
+    """Folders of logs at or up to three levels below a path, such as `sensor/val/LOG`, by name."""
+    if _is_log(path):
+        return [path]
+    for pattern in ("*/annotations.feather", "*/*/annotations.feather", "sensor/*/*/annotations.feather"):
+        if found := [file.parent for file in path.glob(pattern) if _is_log(file.parent)]:
+            return sorted(found, key=lambda folder: (folder.name, folder))
+    return []
+
+
+def _is_log(path: Path) -> bool:
+    return all((path / f"{name}.feather").is_file() for name in (_BOXES, _POSES))

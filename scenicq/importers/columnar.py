@@ -1,0 +1,111 @@
+"""Feather and Parquet files that nobody has checked: columns of known types, or `DataError`."""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from scenicq.errors import DataError, Diagnostic
+
+__all__ = ["read_feather", "read_parquet"]
+
+_MOST_ROWS = 20_000_000
+_TYPES: dict[str, Any] = {"integer": pa.int64(), "real": pa.float64(), "text": pa.string()}
+
+
+def read_feather(path: Path, columns: Mapping[str, str], optional: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Columns of a feather file as lists.
+
+    Args:
+        path: The file.
+        columns: "integer", "real" or "text" for each column that it must have.
+        optional: The same for columns that it may have.
+
+    Raises:
+        DataError: `file-missing`, or `file-invalid` where it is none, is cut off or has other columns.
+    """
+    with _told(path, "a feather file"), pa.ipc.open_file(pa.BufferReader(path.read_bytes())) as file:
+        rows, table = 0, []
+        for number in range(file.num_record_batches):
+            batch = file.get_batch(number)
+            rows += batch.num_rows
+            _check_rows(path, rows)
+            table.append(batch)
+        return _columns(path, pa.Table.from_batches(table, file.schema), columns, optional or {})
+
+
+def read_parquet(path: Path, columns: Mapping[str, str], optional: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Columns of a Parquet file as lists; see `read_feather`.
+
+    Raises:
+        DataError: `file-missing` or `file-invalid`.
+    """
+    with _told(path, "a Parquet file"), pq.ParquetFile(path) as file:
+        _check_rows(path, file.metadata.num_rows)
+        there = [name for name in {**columns, **(optional or {})} if name in file.schema_arrow.names]
+        return _columns(path, file.read(columns=there), columns, optional or {})
+
+
+class _told:  # noqa: N801 - reads as a statement
+    """Turns what pyarrow raises into a diagnostic."""
+
+    def __init__(self, path: Path, what: str) -> None:
+        self._path = path
+        self._what = what
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, pa.ArrowException | MemoryError | ValueError | OverflowError):
+            message = f"{self._path} is not {self._what}: {_first_line(error)}"
+            raise DataError(Diagnostic("file-invalid", message)) from error
+        if isinstance(error, OSError):
+            # pyarrow's own error for files that are cut off is an OSError without a number.
+            missing = error.errno is not None
+            message = f"{self._path} cannot be read: {error.strerror or _first_line(error)}"
+            raise DataError(Diagnostic("file-missing" if missing else "file-invalid", message)) from error
+
+
+def _first_line(error: object) -> str:
+    return (str(error).splitlines() or ["unreadable"])[0][:200]
+
+
+def _check_rows(path: Path, rows: int) -> None:
+    if rows > _MOST_ROWS:
+        raise DataError(Diagnostic("file-invalid", f"{path} claims {rows} rows, more than a recording has"))
+
+
+def _columns(path: Path, table: Any, wanted: Mapping[str, str], optional: Mapping[str, str]) -> dict[str, Any]:
+    missing = [name for name in wanted if name not in table.schema.names]
+    if missing:
+        listed = ", ".join(f"`{name}`" for name in missing)
+        raise DataError(Diagnostic("file-invalid", f"{path} lacks the columns {listed}"))
+    table.validate(full=True)
+    found: dict[str, Any] = {}
+    for name, kind in {**wanted, **optional}.items():
+        if name in table.schema.names:
+            column = table[name]
+            if pa.types.is_dictionary(column.type):
+                column = column.cast(column.type.value_type)
+            if _kind(column.type) not in ({"integer"} if kind == "integer" else {kind, "integer"}):
+                message = f"{path}: column `{name}` is of type {column.type}, not {kind}"
+                raise DataError(Diagnostic("file-invalid", message))
+            found[name] = column.cast(_TYPES[kind]).to_pylist()
+    return found
+
+
+def _kind(type_: Any) -> str:
+    if pa.types.is_integer(type_):
+        return "integer"
+    if pa.types.is_floating(type_):
+        return "real"
+    return "text" if pa.types.is_string(type_) or pa.types.is_large_string(type_) else str(type_)

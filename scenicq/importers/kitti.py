@@ -1,0 +1,235 @@
+"""KITTI tracking in its official layout: `label_02/*.txt`, with `oxts/*.txt` and `calib/*.txt` where they are there.
+
+Conventions of the source: boxes lie in the frame of the rectified camera (x right, y down, z ahead; `rotation_y` turns
+about y), at 10 Hz. The map frame is east and north of the first pose of the inertial unit; there is no map. The ego is
+where that unit is; it has no size. Without `oxts` the ego stays at the origin, and nothing has a velocity.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from pathlib import Path
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.base import ClassNames, Options, Source, read_maps
+from scenicq.importers.by_file import Place, by_file_source, missing
+from scenicq.importers.fields import InvalidError
+from scenicq.importers.motion import Rigid, euler, matrix, velocities
+from scenicq.importers.report import Report
+from scenicq.store.classes import taxonomy
+from scenicq.store.labels import Label, LabelObject
+
+__all__ = ["Kitti"]
+
+_MAP = "none"
+_STEP_US = 100_000
+_REACH_US, _LONGEST_STEP_US = 250_000, 550_000
+_EARTH_M = 6378137.0
+_LARGEST_BYTES = 256 << 20
+_FORWARD_CAMERA = Rigid((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+"""A camera that looks ahead from the inertial unit, whose x is ahead, y left and z up."""
+
+
+class Kitti:
+    """Importer of KITTI tracking sequences."""
+
+    name = "kitti"
+    layout = "a folder `label_02` with `*.txt`, perhaps in `training`"
+
+    def recognises(self, path: Path) -> bool:
+        """Whether the path has the labels."""
+        return bool(_label_files(path))
+
+    def read(self, path: Path, options: Options, report: Report) -> Source:
+        """Open sequences; each is a recording.
+
+        Raises:
+            DataError: `file-missing`; with a strict report whatever is unsound.
+        """
+        files = _label_files(path)
+        if not files:
+            raise missing(path, "no `label_02/*.txt`")
+        maps = read_maps(options.maps, report)
+        return by_file_source(
+            f"kitti-{path.resolve().name}",
+            maps,
+            [_place(file, path, next(iter(maps), _MAP)) for file in files],
+            {**taxonomy("kitti"), **options.class_map},
+            _read_sequence,
+            frames=0,
+            object_bytes=120,
+            facts={
+                "ego": "at the inertial unit, without a size; at the origin where `oxts` is missing",
+                "velocity": f"differences over up to {2 * _REACH_US / 1e6} s, none without `oxts`",
+                "time": "steps of 0.1 s from 0",
+            },
+        )
+
+
+def _label_files(path: Path) -> list[Path]:
+    for folder in (path, path / "training"):
+        if found := sorted(file for file in folder.glob("label_02/*.txt") if file.is_file()):
+            return found
+    return []
+
+
+def _place(file: Path, root: Path, map_name: str) -> Place:
+    base = file.parent.parent
+    others = (base / "oxts" / file.name, base / "calib" / file.name)
+    return Place(file.stem, (file, *(other for other in others if other.is_file())), root, map_name)
+
+
+def _read_sequence(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+    file = place.files[0]
+    extra = {path.parent.name: path for path in place.files[1:]}
+    camera = _FORWARD_CAMERA
+    if "calib" in extra:
+        camera = _camera(extra["calib"])
+    else:
+        report.kept("recording", "file-missing", f"{file.name}: no `calib`; the camera looks ahead from the ego")
+    poses = _poses(extra["oxts"]) if "oxts" in extra else None
+    if poses is None:
+        report.kept("recording", "file-missing", f"{file.name}: no `oxts`; the ego stays at the origin")
+    by_frame: defaultdict[int, list[LabelObject]] = defaultdict(list)
+    for number, row in enumerate(_rows(file), start=1):
+        where = f"{file.name}:{number}"
+        try:
+            frame = int(row[0]) if row and row[0].isdigit() else -1
+            if frame < 0 or frame > 1_000_000:
+                raise InvalidError("the frame is not a number")
+            if len(row) > 2 and row[2] == "DontCare":
+                continue
+            if poses is not None and frame >= len(poses):
+                raise InvalidError(f"frame {frame} has no pose")
+            ego = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+            by_frame[frame].append(_object(row, (poses[frame] if poses else ego).then(camera), classes))
+        except InvalidError as error:
+            report.left_out("object", "record-invalid", f"{where}: {error}")
+    return _labels(place, by_frame, poses)
+
+
+def _labels(place: Place, by_frame: dict[int, list[LabelObject]], poses: list[Rigid] | None) -> list[tuple[Label, str]]:
+    tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
+    for frame in sorted(by_frame) if poses else ():
+        for member in by_frame[frame]:
+            tracks[member.id].append((frame * _STEP_US, member.x, member.y))
+    if poses:
+        tracks["ego"] = [(frame * _STEP_US, *pose.origin[:2]) for frame, pose in enumerate(poses)]
+    moves = {
+        (name, at[0]): move
+        for name, track in tracks.items()
+        for at, move in zip(track, velocities(track, reach_us=_REACH_US, longest_us=_LONGEST_STEP_US), strict=True)
+    }
+    made: list[tuple[Label, str]] = []
+    for frame in range(len(poses)) if poses else sorted(by_frame):
+        time = frame * _STEP_US
+        x, y, heading = (*poses[frame].origin[:2], poses[frame].heading) if poses else (0.0, 0.0, -math.pi / 2)
+        ego = LabelObject("ego", "Car", "", x, y, heading, velocity=moves.get(("ego", time)))
+        objects = tuple(_moving(member, moves.get((member.id, time))) for member in by_frame.get(frame, ()))
+        sensors = {"image_02": f"{_prefix(place)}image_02/{place.name}/{frame:06d}.png"}
+        made.append(
+            (Label(f"{place.name}/{frame:06d}", place.name, time, place.map, ego, objects, {}, sensors), place.name)
+        )
+    return made
+
+
+def _prefix(place: Place) -> str:
+    relative = place.files[0].parent.parent.relative_to(place.root).as_posix()
+    return "" if relative == "." else f"{relative}/"
+
+
+def _moving(member: LabelObject, velocity: tuple[float, float] | None) -> LabelObject:
+    return LabelObject(
+        member.id,
+        member.category,
+        member.source_class,
+        member.x,
+        member.y,
+        member.heading,
+        member.width,
+        member.length,
+        member.height,
+        velocity,
+        member.track,
+        member.attributes,
+    )
+
+
+def _object(row: list[str], camera: Rigid, classes: ClassNames) -> LabelObject:
+    if len(row) < 17:
+        raise InvalidError(f"the row has {len(row)} columns, not 17")
+    height, width, length, x, y, z, turn = _numbers(row[10:17])
+    if min(height, width, length) <= 0:
+        raise InvalidError("its size is not positive")
+    at = camera.place((x, y - height / 2, z))
+    ahead = camera.turn((math.cos(turn), 0.0, -math.sin(turn)))
+    attributes: dict[str, str | float | bool] = {"truncated": float(_numbers(row[3:4])[0]), "occluded": row[4]}
+    heading = Rigid(ahead, ahead, ahead, at).heading
+    name = row[1]
+    return LabelObject(
+        name, classes.category(row[2]), row[2], at[0], at[1], heading, width, length, height, None, name, attributes
+    )
+
+
+def _camera(file: Path) -> Rigid:
+    """The rectified camera, seen from the inertial unit."""
+    found: dict[str, list[float]] = {}
+    try:
+        for row in _rows(file):
+            if row and len(row) in (10, 13):
+                found[row[0].rstrip(":")] = _numbers(row[1:])
+        steps = [_rows_of(found[name]) for name in ("R_rect", "Tr_velo_cam", "Tr_imu_velo")]
+        rectified, velodyne, unit = (matrix(step) for step in steps)
+        return rectified.then(velodyne).then(unit).inverse()
+    except (InvalidError, KeyError) as error:
+        raise DataError(Diagnostic("file-invalid", f"{file}: no sound calibration: {error}")) from error
+
+
+def _rows_of(values: list[float]) -> list[list[float]]:
+    width = len(values) // 3
+    return [
+        [*values[start : start + 3], values[start + 3] if width == 4 else 0.0] for start in range(0, len(values), width)
+    ]
+
+
+def _poses(file: Path) -> list[Rigid]:
+    """Poses of the inertial unit by frame, metres east and north of the first."""
+    found: list[Rigid] = []
+    first: tuple[float, float] | None = None
+    scale = 1.0
+    for number, row in enumerate(_rows(file), start=1):
+        try:
+            latitude, longitude, altitude, roll, pitch, yaw = _numbers(row[:6])
+            if abs(latitude) > 89:
+                raise InvalidError("the latitude is out of range")
+        except (InvalidError, ValueError) as error:
+            raise DataError(Diagnostic("file-invalid", f"{file}:{number}: no sound pose: {error}")) from error
+        if first is None:
+            scale = math.cos(math.radians(latitude))
+        east = scale * _EARTH_M * math.radians(longitude)
+        north = scale * _EARTH_M * math.log(math.tan(math.radians(90 + latitude) / 2))
+        first = first or (east, north)
+        found.append(euler(roll, pitch, yaw, (east - first[0], north - first[1], altitude)))
+    return found
+
+
+def _rows(file: Path) -> list[list[str]]:
+    try:
+        if file.stat().st_size > _LARGEST_BYTES:
+            raise DataError(Diagnostic("file-invalid", f"{file} is too large"))
+        return [line.split() for line in file.read_text(encoding="utf-8").splitlines()]
+    except UnicodeDecodeError as error:
+        raise DataError(Diagnostic("file-invalid", f"{file} is not text")) from error
+    except OSError as error:
+        raise DataError(Diagnostic("file-missing", f"{file} cannot be read: {error.strerror}")) from error
+
+
+def _numbers(texts: list[str]) -> list[float]:
+    try:
+        numbers = [float(text) for text in texts]
+    except ValueError as error:
+        raise InvalidError("a column is not a number") from error
+    if any(not abs(value) < 1e9 for value in numbers):
+        raise InvalidError("a column is not finite")
+    return numbers

@@ -1,0 +1,107 @@
+"""OpenDRIVE maps (`.xodr`) through Scenic's own parser, which the extra `scenicq[opendrive]` installs.
+
+The parser runs in a child process on a copy of the map, so that neither its caches nor its faults reach the user: it
+reads no crossings, and fails on some maps. What it gives is kept by the map's content in a folder of the caller's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.report import Report
+
+__all__ = ["SUFFIX", "convert_maps", "convert_xodr"]
+
+SUFFIX = ".xodr"
+_WORKER = Path(__file__).with_name("opendrive_worker.py")
+_TIMEOUT_S = 600.0
+_LARGEST_BYTES = 256 << 20
+_MISSING, _FAILED = 3, 4
+_INSTALL = "`pip install 'scenicq[opendrive]'` installs Scenic, whose parser reads OpenDRIVE"
+
+
+def convert_maps(files: Mapping[str, Path], cache: Path, report: Report) -> dict[str, Path]:
+    """The files with GeoJSON in place of each OpenDRIVE map.
+
+    Args:
+        files: File of each map.
+        cache: Folder for what the parser gives.
+        report: Takes what the parser is known not to read.
+
+    Raises:
+        DataError: See `convert_xodr`.
+    """
+    found: dict[str, Path] = {}
+    for name, file in files.items():
+        found[name] = file
+        if file.suffix.lower() == SUFFIX:
+            found[name] = convert_xodr(file, cache)
+            if b'type="crosswalk"' in file.read_bytes():
+                message = f"{file.name}: Scenic's parser reads no crossings; the map has some"
+                report.left_out("map element", "map-lacks", message)
+    return found
+
+
+def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeout_s: float = _TIMEOUT_S) -> Path:
+    """The map as interchange GeoJSON.
+
+    Args:
+        path: The `.xodr` file; nothing is written beside it.
+        cache: Folder that keeps results; made where it is not there.
+        python: The Python that has Scenic.
+        timeout_s: Seconds for Scenic's parser.
+
+    Raises:
+        DataError: `file-missing`; `file-invalid` where Scenic's parser gives up; `option-invalid` where Scenic is not
+            installed; `target-unwritable` for the cache.
+    """
+    try:
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise DataError(Diagnostic("file-invalid", f"map {path} is too large"))
+        content = path.read_bytes()
+    except OSError as error:
+        raise DataError(Diagnostic("file-missing", f"map {path} cannot be read: {error.strerror}")) from error
+    worker = hashlib.sha256(_WORKER.read_bytes()).digest()
+    key = hashlib.sha256(worker + content).hexdigest()
+    kept = cache / f"{key}.geojson"
+    if kept.is_file():
+        return kept
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix="scenicq-") as folder:
+            copy, made = Path(folder) / "map.xodr", Path(folder) / "map.geojson"
+            copy.write_bytes(content)
+            _run(path, [python, "-I", str(_WORKER), str(copy), str(made)], Path(folder), timeout_s)
+            beside = cache / f".{key}.{os.getpid()}.tmp"
+            shutil.copyfile(made, beside)
+            beside.replace(kept)
+    except OSError as error:
+        message = f"the map cache {cache} cannot be written: {error.strerror or error}"
+        raise DataError(Diagnostic("target-unwritable", message)) from error
+    return kept
+
+
+def _run(path: Path, command: list[str], folder: Path, timeout_s: float) -> None:
+    try:
+        done = subprocess.run(  # noqa: S603 - our own script on our own copy
+            command, cwd=folder, capture_output=True, timeout=timeout_s, check=False, stdin=subprocess.DEVNULL
+        )
+    except subprocess.TimeoutExpired as error:
+        message = f"map {path}: Scenic's parser takes longer than {timeout_s:g} s"
+        raise DataError(Diagnostic("file-invalid", message)) from error
+    if done.returncode == _MISSING:
+        message = f"map {path} is OpenDRIVE, and Scenic is not installed"
+        raise DataError(Diagnostic("option-invalid", message, hints=(_INSTALL,)))
+    if done.returncode:
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        why = lines[-1][:300] if done.returncode == _FAILED and lines else f"it ended with code {done.returncode}"
+        hint = "Scenic 3.1.1 fails on some maps; a GeoJSON map can be given in its place"
+        raise DataError(Diagnostic("file-invalid", f"map {path}: Scenic's parser cannot read it: {why}", hints=(hint,)))

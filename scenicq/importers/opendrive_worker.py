@@ -1,0 +1,122 @@
+"""Runs in a process of its own, started by `opendrive`: an OpenDRIVE file in, interchange GeoJSON out.
+
+Usage: `python opendrive_worker.py MAP.xodr MAP.geojson`. It imports nothing of this package, so the Python that runs it
+only needs Scenic. Exit codes: 0 done, 3 Scenic is missing, 4 Scenic cannot read the map (the last line on stderr says
+why).
+"""
+
+# Scenic has no type stubs.
+# pyright: reportMissingImports=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportMissingTypeStubs=false
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+import shapely
+from shapely.geometry import mapping
+
+try:
+    from scenic.domains.driving.roads import Network
+except ImportError:
+    Network = None
+
+__all__: list[str] = []
+
+
+def _main(source: str, target: str) -> int:
+    if Network is None:
+        return 3
+    try:
+        # Neither reads nor writes Scenic's own cache, which would lie beside the map.
+        network: Any = Network.fromFile(source, useCache=False, writeCache=False)
+    except Exception as error:  # noqa: BLE001 - whatever Scenic's parser stumbles over is the map's fault here
+        sys.stderr.write(f"\n{type(error).__name__}: {error}".replace("\n", " ") + "\n")
+        return 4
+    with open(target, "w", encoding="utf-8") as file:
+        json.dump({"type": "FeatureCollection", "features": _features(network)}, file)
+    return 0
+
+
+def _features(network: Any) -> list[dict[str, Any]]:
+    crossing_of: dict[str, str] = {}
+    after: dict[str, list[str]] = {}
+    for lane in network.lanes:
+        for maneuver in lane.maneuvers:
+            through = maneuver.connectingLane
+            after.setdefault(lane.uid, []).append((through or maneuver.endLane).uid)
+            if through is not None:
+                after.setdefault(through.uid, []).append(maneuver.endLane.uid)
+    for crossing in network.intersections:
+        for maneuver in crossing.maneuvers:
+            if maneuver.connectingLane is not None:
+                crossing_of[maneuver.connectingLane.road.uid] = crossing.uid
+    found = [_lane(lane, after) for lane in network.lanes]
+    found += [_section(section) for section in network.laneSections]
+    for group in network.laneGroups:
+        links = {"road": group.road.uid, "opposite": _uid(group._opposite)}
+        found.append(_feature(group.uid, "lane_group", group.polygon, links))
+        if group.curb is not None:
+            found.append(_feature(f"{group.uid}_curb", "curb", _line(group.curb), {}))
+    for road in (*network.roads, *network.connectingRoads):
+        links = {"forward": _uid(road.forwardLanes), "backward": _uid(road.backwardLanes)}
+        links["intersection"] = crossing_of.get(road.uid)
+        found.append(_feature(road.uid, "road", road.polygon, links))
+    for crossing in network.intersections:
+        links = {"roads": [road.uid for road in crossing.roads]}
+        found.append(_feature(crossing.uid, "intersection", crossing.polygon, links))
+    for kind, elements in (
+        ("crossing", network.crossings),
+        ("sidewalk", network.sidewalks),
+        ("shoulder", network.shoulders),
+    ):
+        found += [_feature(element.uid, kind, element.polygon, {}) for element in elements]
+    return found
+
+
+def _lane(lane: Any, after: dict[str, list[str]]) -> dict[str, Any]:
+    links = {
+        "group": _uid(lane.group),
+        "road": _uid(lane.road),
+        "successors": list(dict.fromkeys(after.get(lane.uid, []))),
+        "centerline": _points(lane.centerline),
+    }
+    return _feature(lane.uid, "lane", lane.polygon, links)
+
+
+def _section(section: Any) -> dict[str, Any]:
+    links = {
+        "lane": section.lane.uid,
+        "left": _uid(section._laneToLeft),
+        "right": _uid(section._laneToRight),
+        "centerline": _points(section.centerline),
+    }
+    return _feature(section.uid, "lane_section", section.polygon, links)
+
+
+def _uid(element: Any) -> str | None:
+    return None if element is None else element.uid
+
+
+def _line(region: Any) -> Any:
+    return region.lineString
+
+
+def _points(region: Any) -> list[list[list[float]]]:
+    lines = shapely.get_parts(region.lineString)
+    return [shapely.get_coordinates(line).tolist() for line in lines]
+
+
+def _feature(uid: str, kind: str, shape: Any, properties: dict[str, Any]) -> dict[str, Any]:
+    flat = shapely.force_2d(shape)
+    if not flat.is_valid:
+        parts = [part for part in shapely.get_parts(shapely.make_valid(flat)) if part.area > 0 or kind == "curb"]
+        flat = shapely.union_all(parts)
+    given = {key: value for key, value in properties.items() if value is not None}
+    return {"type": "Feature", "properties": {**given, "id": uid, "kind": kind}, "geometry": mapping(flat)}
+
+
+if __name__ == "__main__":
+    sys.exit(_main(sys.argv[1], sys.argv[2]))

@@ -1,0 +1,116 @@
+"""Map features of a Waymo Open Motion scenario.
+
+Its lanes are centrelines without width and without polygons: each becomes a band of a nominal width, which its
+properties say. Lanes that only join others (`interpolating`) lie in intersections.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from scenicq.geometry.features import MapFeature, ProblemSink
+from scenicq.importers.fields import InvalidError
+from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, sound_area
+from scenicq.importers.protobuf import Message, Value, integers, parse, signed
+
+__all__ = ["LANE_WIDTH_M", "scenario_features"]
+
+LANE_WIDTH_M = 3.5
+_BIKE_LANE_WIDTH_M = 1.8
+_BIKE_LANE = 3
+_LANE_KINDS = {1: "freeway", 2: "surface_street", 3: "bike_lane"}
+_AREAS = {8: "crossing", 9: "speed_bump", 10: "driveway"}
+_TOLERANCE_M = 0.02
+
+
+def scenario_features(messages: Sequence[Value], on_problem: ProblemSink) -> tuple[MapFeature, ...]:
+    """The features of the field `map_features`.
+
+    Args:
+        messages: Its values.
+        on_problem: Called with the id of a feature and what is wrong with it.
+    """
+    lanes: dict[str, BoundedLane] = {}
+    others: dict[str, MapFeature] = {}
+    for value in messages:
+        name = ""
+        try:
+            feature = _message(value)
+            name = str(signed(feature.get(1, [0])[0]))
+            if name in lanes or name in others:
+                raise InvalidError("the id is used twice")
+            if 3 in feature:
+                lanes[name] = _lane(name, _message(feature[3][0]))
+                continue
+            for number, kind in _AREAS.items():
+                if number in feature:
+                    points = _points(_message(feature[number][0]).get(1, []), 3)
+                    others[name] = MapFeature(name, kind, sound_area(Polygon(points)))
+        except (InvalidError, ValueError) as error:
+            on_problem(name, str(error))
+    return (*lane_features(list(lanes.values()), on_problem), *others.values())
+
+
+def _lane(name: str, lane: Message) -> BoundedLane:
+    kind = signed(lane.get(2, [0])[0])
+    width = _BIKE_LANE_WIDTH_M if kind == _BIKE_LANE else LANE_WIDTH_M
+    line = _simplified(_points(lane.get(8, []), 2))
+    left, right = _offset(line, width / 2), _offset(line, -width / 2)
+    return BoundedLane(
+        id=name,
+        left=left,
+        right=right,
+        beside_left=next(_neighbours(lane.get(11, [])), None),
+        beside_right=next(_neighbours(lane.get(12, [])), None),
+        predecessors=tuple(str(other) for other in integers(lane.get(9, []))),
+        successors=tuple(str(other) for other in integers(lane.get(10, []))),
+        in_intersection=signed(lane.get(3, [0])[0]) == 1,
+        properties={"lane_type": _LANE_KINDS.get(kind, "undefined"), "nominal_width": width},
+    )
+
+
+def _neighbours(values: Sequence[Value]) -> Iterator[str]:
+    for value in values:
+        if 1 in (neighbour := _message(value)):
+            yield str(signed(neighbour[1][0]))
+
+
+def _message(value: Value) -> Message:
+    if not isinstance(value, memoryview):
+        raise InvalidError("a field is not a message")
+    return parse(value)
+
+
+def _points(values: Sequence[Value], least: int) -> Points:
+    points: list[tuple[float, float]] = []
+    for value in values:
+        point = _message(value)
+        x, y = point.get(1, [0.0])[0], point.get(2, [0.0])[0]
+        if not isinstance(x, float) or not isinstance(y, float) or not (abs(x) < 1e7 and abs(y) < 1e7):
+            raise InvalidError("a point is not finite")
+        points.append((x, y))
+    if len(points) < least:
+        raise InvalidError(f"it has fewer than {least} points")
+    return np.array(points)
+
+
+def _simplified(line: Points) -> Points:
+    return shapely.get_coordinates(shapely.simplify(LineString(line), _TOLERANCE_M))
+
+
+def _offset(line: Points, distance: float) -> Points:
+    """The line moved to its left."""
+    steps = np.diff(line, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    if not (lengths > 0).any():
+        raise InvalidError("it has no length")
+    units = steps[lengths > 0] / lengths[lengths > 0, None]
+    kept = line[np.concatenate([[True], lengths > 0])]
+    ways = np.concatenate([units[:1], units[:-1] + units[1:], units[-1:]])
+    norms = np.maximum(np.hypot(ways[:, 0], ways[:, 1]), 1e-9)[:, None]
+    ways = ways / norms
+    return kept + distance * np.stack([-ways[:, 1], ways[:, 0]], axis=1)

@@ -1,0 +1,74 @@
+"""Groups put to a solver, and its answer checked: the last step of the decision ladder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from scenicq.forest.groups import Comparison, Constraint
+from scenicq.match.ground import replay
+from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
+from scenicq.match.options import MatchOptions
+from scenicq.smt.answer import Sat, Solver, Unknown, Unsat
+from scenicq.smt.encode import Encoding, Target, UnsupportedError, encode
+
+__all__ = ["ask", "encoded", "target_of"]
+
+_ATTEMPTS = 3
+_REFINED = 100.0
+
+
+def encoded(items: Sequence[Sequence[Item]], options: MatchOptions) -> Encoding:
+    """Groups as one problem for a solver.
+
+    Raises:
+        UnsupportedError: A construct has no formula.
+    """
+    return encode([[(target_of(c, options), node, value) for c, node, value in group] for group in items])
+
+
+def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None) -> Outcome:
+    """Decide groups together by a solver; a witness that does not replay is refined, then given up.
+
+    Args:
+        items: The groups after conditioning.
+        options: The options.
+        solver: The solver, if there is one.
+    """
+    flat = [item for group in items for item in group]
+    blame = flat[0][0]
+    try:
+        encoding = encoded(items, options)
+    except UnsupportedError as error:
+        return Maybe(blame, f"unsupported: {error}")
+    if solver is None:
+        return Maybe(blame, "no solver")
+    precision = options.precision
+    for _ in range(_ATTEMPTS):
+        answer = solver.check(encoding.problem, precision=precision, timeout_s=options.timeout_s)
+        match answer:
+            case Unsat():
+                return No(blame)
+            case Unknown():
+                return Maybe(blame, answer.reason)
+            case Sat():
+                values = encoding.values(answer.witness)
+                if replay(flat, values, options.tolerance, options.precision):
+                    return Yes(values)
+        precision /= _REFINED
+    return Maybe(blame, "precision")
+
+
+def target_of(constraint: Constraint, options: MatchOptions) -> Target:
+    """How a constraint's expression is compared with the label."""
+    if not isinstance(constraint, Comparison):
+        return Target(None, 0.0, 0.0)
+    tolerance = options.tolerance
+    match constraint.property:
+        case "position" if tolerance.x is not None and tolerance.y is not None:
+            return Target("box", tolerance.x, tolerance.y)
+        case "position":
+            return Target("disc", tolerance.position, 0.0)
+        case "heading":
+            return Target("angle", tolerance.heading, 0.0)
+        case _:
+            return Target("disc", tolerance.other, 0.0)

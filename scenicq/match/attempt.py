@@ -1,0 +1,303 @@
+"""One label with one of its things as the ego: the body of algorithm 1.
+
+Conditions about one object and the ego leave each object its candidates; necessary conditions of pairs thin them out;
+the search then finds correspondences that satisfy the groups about several objects. Each question is decided once: the
+answers are kept by the shape of the group and the label objects in its roles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.groups import PARAMS, Constraint, Group
+from scenicq.forest.nodes import Value
+from scenicq.forest.scenario import Scenario
+from scenicq.match.casting import Cast
+from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes, condition_group, decide
+from scenicq.match.options import MatchOptions
+from scenicq.match.planning import GroupPlan, MatchPlan
+from scenicq.match.search import Answer, Reporter, Slot, find_assignments
+from scenicq.match.surroundings import within_radius
+from scenicq.match.thinning import thinned
+
+__all__ = ["Asker", "Attempt", "Failure", "Solution"]
+
+
+class Asker(Protocol):
+    """Puts groups to a solver."""
+
+    def __call__(self, items: Sequence[Sequence[Item]]) -> Outcome:
+        """Decide groups together."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """A correspondence that satisfies all groups, and how each was satisfied."""
+
+    assignment: Mapping[int, int]
+    outcomes: tuple[tuple[GroupPlan, Yes], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """What excluded a partial correspondence, or left it open.
+
+    Attributes:
+        depth: How far the correspondence had come.
+        group: The group that was not satisfied.
+        outcome: What was found of it.
+        assignment: The partial correspondence.
+    """
+
+    depth: int
+    group: Group
+    outcome: No | Maybe
+    assignment: Mapping[int, int]
+
+    @property
+    def constraint(self) -> Constraint:
+        """The constraint to blame."""
+        return self.outcome.constraint
+
+
+@dataclass(eq=False)
+class Attempt:
+    """The search for correspondences of one label.
+
+    Attributes:
+        scenario: The scenario.
+        options: The options.
+        cast: The label and who may play whom.
+        ask: The solver.
+        reporter: Watches the search.
+        failure: What excluded the correspondence that came furthest.
+        undecided: What kept a correspondence that was not excluded from being a match.
+    """
+
+    scenario: Scenario
+    options: MatchOptions
+    cast: Cast
+    ask: Asker
+    reporter: Reporter | None = None
+    failure: Failure | None = None
+    undecided: Failure | None = None
+    _cache: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
+        default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
+    )
+
+    def solutions(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
+        """Every correspondence that matches, interchangeable objects in one order; what is left open is noted.
+
+        Args:
+            plan: The scenario's groups for what is observed of the candidates.
+            candidates: For each object, the things that it may be.
+
+        Raises:
+            Exhausted: The search takes more steps than it may.
+        """
+        if self.options.method == "monolithic":
+            yield from self._monolithic(plan, candidates)
+        else:
+            yield from self._modular(plan, candidates)
+
+    # --- deciding groups
+
+    def items(self, group: Group, assignment: Mapping[int, int]) -> list[Item]:
+        """The constraints of a group given the label (algorithm 1, line 11).
+
+        Raises:
+            CannotEvaluate: Geometry cannot tell the value of an expression.
+        """
+        observed: dict[tuple[int, str], Value] = {
+            (index, name): value for index in group.objects for name, value in self.cast.seen[assignment[index]].items()
+        }
+        observed.update({(PARAMS, name): value for name, value in self.cast.params.items()})
+        items = condition_group(group, observed)
+        return items if self.cast.disc is None else within_radius(items, *self.cast.disc)
+
+    def decide(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome:
+        """Decide a group for the things in its roles, or remember what was decided for them."""
+        key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
+        known = self._cache.get(key)
+        if known is None:
+            known = self._cache[key] = (plan.group, self._decide_now(plan.group, assignment))
+        group, outcome = known
+        return outcome if group is plan.group else _translated(outcome, group, plan.group)
+
+    def _decide_now(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
+        try:
+            items = self.items(group, assignment)
+            if self.options.method == "smt":
+                return self.ask([items])
+            outcome = decide(items, self.options.tolerance)
+            return self.ask([items]) if isinstance(outcome, Maybe) else outcome
+        except CannotEvaluate as error:
+            return Maybe(group.constraints[0], f"unsupported: {error}")
+
+    def _judge(self, plan: GroupPlan, assignment: Mapping[int, int], depth: int) -> Answer:
+        """Decide a group, and remember what failed furthest."""
+        outcome = self.decide(plan, assignment)
+        if isinstance(outcome, Yes):
+            return Answer.YES
+        if isinstance(outcome, Maybe):
+            return Answer.UNKNOWN
+        self._fail(Failure(depth, plan.group, outcome, dict(assignment)))
+        return Answer.NO
+
+    def _fail(self, failure: Failure) -> None:
+        if self.failure is None or failure.depth > self.failure.depth:
+            self.failure = failure
+
+    # --- the query paper's algorithm 1
+
+    def _modular(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
+        ego = {self.scenario.ego: self.cast.ego}
+        answers = [self._judge(group, ego, 1) for group in plan.ego_only]
+        if Answer.NO in answers:
+            return
+        judged = self._filter(plan, candidates, ego)
+        if judged is None:
+            return
+        slots, doubtful = judged
+        found = False
+        if Answer.UNKNOWN not in answers:
+            firm = [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in doubtful)) for s in slots]
+            for assignment in self._search(plan, firm, ego, accept_unknown=False):
+                found = True
+                yield self._solution(plan, assignment)
+        if not found and self.undecided is None:
+            # nothing matches; if some correspondence fails nowhere either, it may match
+            open_one = next(self._search(plan, slots, ego, accept_unknown=True), None)
+            if open_one is not None:
+                self.undecided = self._first_open(plan, open_one)
+
+    def _filter(
+        self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+    ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
+        """Candidates that pass the groups about them and the ego alone, and which of them are doubtful."""
+        wanted = {index: numbers for index, numbers in candidates.items() if index != self.scenario.ego}
+        if self.options.method == "auto":
+            wanted, failed = thinned(plan, wanted, self.cast, self.scenario.ego, self.options.tolerance)
+            if failed is not None:
+                self._blame_thinning(*failed, candidates, ego)
+                return None
+        slots: list[Slot] = []
+        doubtful: set[tuple[int, int]] = set()
+        for index, numbers in wanted.items():
+            kept: list[int] = []
+            for number in numbers:
+                answer = self._passes(plan.unary.get(index, ()), {**ego, index: number})
+                if answer is Answer.NO:
+                    continue
+                kept.append(number)
+                if answer is Answer.UNKNOWN:
+                    doubtful.add((index, number))
+            if not kept:
+                return None
+            slots.append(Slot(index, tuple(kept)))
+        return slots, doubtful
+
+    def _blame_thinning(
+        self, index: int, blamed: GroupPlan, candidates: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+    ) -> None:
+        """Note why an object has no candidate left; for the wording the first one is looked at without a solver."""
+        if len(blamed.roles) > 1:
+            outcome = No(blamed.group.constraints[0], "no pair of label objects comes close")
+            self._fail(Failure(9, blamed.group, outcome, ego))
+            return
+        assignment = {**ego, index: candidates[index][0]}
+        try:
+            found = decide(self.items(blamed.group, assignment), self.options.tolerance)
+        except CannotEvaluate:
+            found = None
+        outcome = found if isinstance(found, No) else No(blamed.group.constraints[0])
+        self._fail(Failure(2, blamed.group, outcome, assignment))
+
+    def _passes(self, groups: Sequence[GroupPlan], assignment: Mapping[int, int]) -> Answer:
+        answer = Answer.YES
+        for depth, group in enumerate(groups):
+            one = self._judge(group, assignment, 2 + depth)
+            if one is Answer.NO:
+                return one
+            answer = one if one is Answer.UNKNOWN else answer
+        return answer
+
+    def _search(
+        self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int], *, accept_unknown: bool
+    ) -> Iterator[dict[int, int]]:
+        due: dict[int, list[tuple[GroupPlan, frozenset[int]]]] = {}
+        for group in plan.joint:
+            for index in group.roles:
+                due.setdefault(index, []).append((group, frozenset(group.roles)))
+        options = {slot.name: slot.candidates for slot in slots}
+
+        def check(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+            for group, roles in due.get(slot, ()):
+                if roles <= assignment.keys():
+                    answer = self._judge(group, assignment, 10 + len(assignment))
+                    if answer is Answer.NO or (answer is Answer.UNKNOWN and not accept_unknown):
+                        return Answer.NO, roles
+            return Answer.YES, frozenset()
+
+        return find_assignments(
+            slots,
+            check,
+            fixed=ego,
+            twins={one: other for one, other in plan.twins.items() if options[one] == options[other]},
+            links=plan.links,
+            budget=self.options.budget,
+            reporter=self.reporter,
+        )
+
+    def _solution(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Solution:
+        outcomes = [(group, self.decide(group, assignment)) for group in plan.groups]
+        return Solution(assignment, tuple((group, found) for group, found in outcomes if isinstance(found, Yes)))
+
+    def _first_open(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Failure | None:
+        for group in plan.groups:
+            outcome = self.decide(group, assignment)
+            if isinstance(outcome, Maybe):
+                return Failure(0, group.group, outcome, assignment)
+        return None
+
+    # --- the query paper's baseline (section 5.1): one formula for all features of each correspondence
+
+    def _monolithic(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
+        ego = {self.scenario.ego: self.cast.ego}
+        slots = [Slot(index, options) for index, options in candidates.items() if index != self.scenario.ego]
+        for assignment in find_assignments(slots, _accept, fixed=ego, budget=self.options.budget):
+            outcome = self._together(plan, assignment)
+            if isinstance(outcome, Yes):
+                yield Solution(assignment, tuple((group, outcome) for group in plan.groups))
+                continue
+            group = next(each.group for each in plan.groups if outcome.constraint in each.group.constraints)
+            failure = Failure(1, group, outcome, assignment)
+            if isinstance(outcome, No):
+                self._fail(failure)
+            elif self.undecided is None:
+                self.undecided = failure
+
+    def _together(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Outcome:
+        if not plan.groups:
+            return Yes({})
+        try:
+            return self.ask([self.items(each.group, assignment) for each in plan.groups])
+        except CannotEvaluate as error:
+            return Maybe(plan.groups[0].group.constraints[0], f"unsupported: {error}")
+
+
+def _accept(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+    return Answer.YES, frozenset()
+
+
+def _translated(outcome: Outcome, source: Group, target: Group) -> Outcome:
+    """What was decided for a group, said of another one of the same shape."""
+    if isinstance(outcome, Yes):
+        pairs = zip(source.variables, target.variables, strict=True)
+        return Yes({new.identity: outcome.values[old.identity] for old, new in pairs if old.identity in outcome.values})
+    constraint = target.constraints[source.constraints.index(outcome.constraint)]
+    return No(constraint, outcome.detail) if isinstance(outcome, No) else Maybe(constraint, outcome.reason)

@@ -1,0 +1,126 @@
+"""Which label objects may play which role, before anything about positions is looked at: class, radius, number."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from scenicq.forest.nodes import Value
+from scenicq.forest.scenario import Scenario
+from scenicq.match.constraints import Signature
+from scenicq.match.observe import observe, observe_params
+from scenicq.match.options import MatchOptions
+from scenicq.match.search import Exhausted, Slot, matchable
+from scenicq.match.verdict import Cause
+from scenicq.store.classes import class_matches
+from scenicq.store.labels import Label
+
+__all__ = ["Cast", "cast_roles", "egos"]
+
+_MOST_SIGNATURES = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Cast:
+    """A label made ready: its things by number (0 is the label's ego) and who may play whom.
+
+    Attributes:
+        things: The ego and the objects of the label.
+        ego: Number of the thing that plays the scenario's ego.
+        seen: What is observed of each thing.
+        params: What is observed of the frame.
+        candidates: For each object of the scenario but the ego, the numbers of the things of its class.
+        disc: The area that is looked at, if it is limited: centre and radius.
+    """
+
+    label: Label
+    ego: int
+    seen: tuple[Mapping[str, Value], ...]
+    params: Mapping[str, Value]
+    candidates: Mapping[int, tuple[int, ...]]
+    disc: tuple[tuple[float, float], float] | None
+
+    def signatures(
+        self, relevant: tuple[frozenset[str], ...]
+    ) -> Iterator[tuple[Signature, dict[int, tuple[int, ...]]]]:
+        """Candidates split by what is observed of them, as far as it matters; one signature in most datasets.
+
+        Raises:
+            Exhausted: There are too many combinations.
+        """
+        choices: list[list[tuple[frozenset[str], tuple[int, ...]]]] = []
+        for index, names in enumerate(relevant):
+            by_set: dict[frozenset[str], list[int]] = {}
+            for number in self.candidates.get(index, (self.ego,)):
+                by_set.setdefault(names.intersection(self.seen[number]), []).append(number)
+            choices.append([(names_, tuple(numbers)) for names_, numbers in by_set.items()])
+        params = frozenset(self.params)
+        for count, chosen in enumerate(itertools.product(*choices)):
+            if count >= _MOST_SIGNATURES:
+                raise Exhausted
+            yield (*(names for names, _ in chosen), params), {i: numbers for i, (_, numbers) in enumerate(chosen)}
+
+
+def egos(scenario: Scenario, label: Label, options: MatchOptions) -> list[int]:
+    """Numbers of the things that may play the ego: the label's own, or any of its class."""
+    if options.ego == "label":
+        return [0]
+    wanted = scenario.objects[scenario.ego].category
+    return [0] + [
+        number for number, each in enumerate(label.objects, 1) if class_matches(wanted, each.category, options.classes)
+    ]
+
+
+def cast_roles(
+    scenario: Scenario, label: Label, ego: int, options: MatchOptions, given: Mapping[str, str]
+) -> Cast | Cause:
+    """The cast for one choice of ego, or what is lacking.
+
+    Args:
+        scenario: The scenario.
+        label: The label.
+        ego: Number of the thing that plays the ego.
+        options: The options.
+        given: Ids of label objects that are known to play objects, by the objects' names.
+    """
+    things = (label.ego, *label.objects)
+    center = (things[ego].x, things[ego].y)
+    reach = options.radius
+    near = [
+        reach is None or (thing.x - center[0]) ** 2 + (thing.y - center[1]) ** 2 <= reach * reach for thing in things
+    ]
+    first = 1 if options.ego == "label" else 0
+    free = [number for number in range(first, len(things)) if number != ego and near[number]]
+    of_class: dict[str, tuple[int, ...]] = {}
+    candidates: dict[int, tuple[int, ...]] = {}
+    for thing in scenario.objects:
+        if thing.index == scenario.ego:
+            continue
+        if thing.category not in of_class:
+            of_class[thing.category] = tuple(
+                number for number in free if class_matches(thing.category, things[number].category, options.classes)
+            )
+        found = of_class[thing.category]
+        if thing.name in given:
+            found = tuple(number for number in found if things[number].id == given[thing.name])
+        candidates[thing.index] = found
+    short = _short(candidates)
+    if short is not None:
+        thing, count = scenario.objects[short], len(candidates[short])
+        detail = f"{count} of this class, too few" if count else f"no {thing.category}"
+        return Cause(f"{thing.name}.class", detail, thing.span, (short,))
+    spare = len(free) - len(candidates)
+    if options.exact and spare:
+        return Cause("--exact", f"{spare} label objects are left over")
+    seen = tuple(observe(thing) for thing in things)
+    return Cast(label, ego, seen, observe_params(label), candidates, None if reach is None else (center, reach))
+
+
+def _short(candidates: Mapping[int, tuple[int, ...]]) -> int | None:
+    """An object for which there is no label object left, if there is one."""
+    slots = [Slot(index, options) for index, options in candidates.items()]
+    empty = next((slot.name for slot in slots if not slot.candidates), None)
+    if empty is None and matchable(slots) is None:
+        return min(candidates, key=lambda index: len(candidates[index]))
+    return empty

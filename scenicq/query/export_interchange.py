@@ -1,0 +1,104 @@
+"""Frames of a dataset as an interchange folder: labels, maps, classes; reading it gives the same tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from shapely.geometry import mapping
+
+from scenicq.errors import Diagnostic
+from scenicq.geometry.features import MapFeature
+from scenicq.store.dataset import Dataset
+from scenicq.store.labels import Label, LabelObject
+
+__all__ = ["write_interchange"]
+
+
+def write_interchange(dataset: Dataset, frames: Collection[str], folder: Path) -> list[Diagnostic]:
+    """Write the labels of some frames with the maps that they refer to.
+
+    Args:
+        dataset: Where they are from.
+        frames: Their names.
+        folder: An empty folder.
+
+    Returns:
+        Warnings about what the format cannot hold.
+    """
+    maps: set[str] = set()
+    classes: dict[str, str] = {}
+    skipped = skipped_frames = 0
+    with (folder / "labels.jsonl").open("w", encoding="utf-8") as file:
+        for label in dataset.labels(frames):
+            if label.ego.heading is None:
+                skipped_frames += 1
+                continue
+            sound = [member for member in label.objects if member.heading is not None]
+            skipped += len(label.objects) - len(sound)
+            classes.update((member.source_class, member.category) for member in (label.ego, *sound))
+            maps.add(label.map)
+            file.write(json.dumps(_line(label, sound), ensure_ascii=False) + "\n")
+    classes.pop("", None)
+    known = sorted(maps.intersection(dataset.manifest.maps))
+    # The name of a map is that of its file, so it must be one: a name with a slash could lead out of the folder.
+    named = [name for name in known if Path(name).name == name]
+    for name in named:
+        _write_map(folder / "maps" / f"{name}.geojson", dataset.features(name))
+    header = {"name": dataset.manifest.name, "interchange": 1, "angle": "heading", "classes": "classes.json"}
+    (folder / "dataset.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
+    text = json.dumps(classes or {"car": "Car"}, indent=1, ensure_ascii=False, sort_keys=True)
+    (folder / "classes.json").write_text(text + "\n", encoding="utf-8")
+    return [
+        Diagnostic("record-invalid", f"{count} {what} without a heading are left out", severity="warning")
+        for count, what in ((skipped_frames, "frames with an ego"), (skipped, "objects"))
+        if count
+    ] + [
+        Diagnostic("map-missing", f"map `{name}` is left out: no file can be called so", severity="warning")
+        for name in sorted({*known} - {*named})
+    ]
+
+
+def _line(label: Label, objects: list[LabelObject]) -> dict[str, Any]:
+    line: dict[str, Any] = {
+        "id": label.frame,
+        "recording": label.recording,
+        "timestamp_us": label.timestamp_us,
+        "map": label.map,
+        "ego": _object(label.ego, named=False),
+        "objects": [_object(member, named=True) for member in objects],
+    }
+    if label.params:
+        line["params"] = dict(label.params)
+    if label.sensors:
+        line["sensors"] = dict(label.sensors)
+    return line
+
+
+def _object(member: LabelObject, *, named: bool) -> dict[str, Any]:
+    found: dict[str, Any] = {"id": member.id} if named else {}
+    if member.source_class:
+        found["class"] = member.source_class
+    found |= {"position": [member.x, member.y], "heading": member.heading}
+    for key in ("width", "length", "height", "velocity", "track"):
+        if (value := getattr(member, key)) is not None:
+            found[key] = value
+    if member.attributes:
+        found["attributes"] = dict(member.attributes)
+    return found
+
+
+def _write_map(file: Path, features: tuple[MapFeature, ...]) -> None:
+    file.parent.mkdir(exist_ok=True)
+    collection = {"type": "FeatureCollection", "features": [_feature(feature) for feature in features]}
+    file.write_text(json.dumps(collection, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _feature(feature: MapFeature) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "properties": {**feature.properties, "id": feature.id, "kind": feature.kind},
+        "geometry": mapping(feature.shape),
+    }

@@ -1,0 +1,162 @@
+"""One run of frames as a card of the report: a picture with a slider, and what is said of each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scenicq.match.verdict import Match, Unknown
+from scenicq.report.backdrop import Backdrop
+from scenicq.report.frames import frame_facts
+from scenicq.report.picture import Shot, View, draw_shot, ground, plane_of, view_of
+from scenicq.report.runs import Run
+from scenicq.report.sensors import Sensor
+from scenicq.report.svg import element, escape
+
+__all__ = ["Card", "draw_card"]
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """What a card is made of.
+
+    Attributes:
+        number: From 1, unique in the report.
+        run: The run.
+        shots: Its frames.
+        sensors: The sensor files of each.
+        backdrop: The map.
+        pictures: Addresses of the frames' pictures beside the report; None if they are drawn in it.
+    """
+
+    number: int
+    run: Run
+    shots: tuple[Shot, ...]
+    sensors: tuple[Sequence[Sensor], ...]
+    backdrop: Backdrop
+    pictures: tuple[str, ...] | None = None
+
+    @property
+    def half(self) -> float:
+        """Metres from the ego to the edges of every picture: enough for all of them."""
+        return max(view_of(shot.label, shot.roles).half for shot in self.shots)
+
+
+def _told(shot: Shot) -> str:
+    played = ", ".join(f"{role.name} is {role.thing.id}" for role in shot.roles)
+    return f"Bird's-eye view of frame {shot.label.frame}: {played or 'no roles'}"
+
+
+def _inline(card: Card) -> str:
+    """All frames of a run in one picture over one map; the first is shown."""
+    plane, half = plane_of(card.shots[0].label), card.half
+    views = [View((shot.label.ego.x, shot.label.ego.y), half) for shot in card.shots]
+    boxes = [view.drawn for view in views]
+    west, south = (min(box[axis] for box in boxes) for axis in (0, 1))
+    east, north = (max(box[axis] for box in boxes) for axis in (2, 3))
+    bounds = (west, south, east, north)
+    groups = [
+        element(
+            "g",
+            draw_shot(shot, plane, view),
+            class_="shot",
+            data_view=" ".join(map(str, view.box(plane))),
+            data_told=_told(shot),
+            hidden=number > 0,
+        )
+        for number, (shot, view) in enumerate(zip(card.shots, views, strict=True))
+    ]
+    return element(
+        "svg",
+        ground(plane, bounds),
+        card.backdrop.draw(plane, bounds),
+        *groups,
+        class_="picture",
+        role="img",
+        aria_label=_told(card.shots[0]),
+        viewBox=" ".join(map(str, views[0].box(plane))),
+    )
+
+
+def _beside(card: Card, pictures: tuple[str, ...]) -> str:
+    sources = [
+        element("span", class_="shot", data_picture=name, data_told=_told(shot), hidden=True)
+        for name, shot in zip(pictures, card.shots, strict=True)
+    ]
+    told = escape(_told(card.shots[0]))
+    image = f'<img class="picture" loading="lazy" width="900" height="1000" src="{escape(pictures[0])}" alt="{told}">'
+    return image + "".join(sources)
+
+
+def _slider(card: Card) -> str:
+    count = len(card.shots)
+    if count == 1:
+        return ""
+    return element(
+        "div",
+        element(
+            "button",
+            "\N{SINGLE LEFT-POINTING ANGLE QUOTATION MARK}",
+            type="button",
+            class_="back",
+            aria_label="Previous frame",
+        ),
+        f'<input type="range" min="1" max="{count}" value="1" aria-label="Frame of run {card.number}">',
+        element(
+            "button",
+            "\N{SINGLE RIGHT-POINTING ANGLE QUOTATION MARK}",
+            type="button",
+            class_="on",
+            aria_label="Next frame",
+        ),
+        element("output", f"1 / {count}"),
+        class_="slider",
+    )
+
+
+def draw_card(card: Card) -> str:
+    """A card as markup.
+
+    Args:
+        card: What it is made of.
+    """
+    run, verdict = card.run, card.run.results[0].verdict
+    count, title = len(card.shots), f"run-{card.number}-title"
+    match verdict:
+        case Match():
+            kind, shown = "match", "match"
+        case Unknown(reason):
+            kind, shown = "unknown", f"unknown: {reason}"
+        case _:
+            kind, shown = "near", "near miss"
+    frames = f"frame {run.first}" if count == 1 else f"frames {run.first}\N{EN DASH}{run.first + count - 1}"
+    head = element(
+        "h3",
+        element("span", escape(run.recording), class_="recording"),
+        " ",
+        element("span", f"{frames} of {run.of}", class_="frames"),
+        " ",
+        element("span", escape(shown), class_=f"badge {kind}"),
+        id=title,
+    )
+    picture = _inline(card) if card.pictures is None else _beside(card, card.pictures)
+    facts = [
+        element("div", frame_facts(shot, sensors), class_="frame", hidden=number > 0)
+        for number, (shot, sensors) in enumerate(zip(card.shots, card.sensors, strict=True))
+    ]
+    body = element(
+        "div", element("div", picture, _slider(card), class_="view-pane"), element("div", *facts), class_="run-body"
+    )
+    return element(
+        "article",
+        head,
+        body,
+        class_="run",
+        id=f"run-{card.number}",
+        tabindex=0,
+        aria_labelledby=title,
+        data_recording=run.recording,
+        data_time=run.results[0].timestamp_us,
+        data_length=count,
+        data_order=card.number,
+    )

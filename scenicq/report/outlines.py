@@ -1,0 +1,273 @@
+"""What a scenario allows each of its objects in one label: where it may be and which way it may face.
+
+An outline is exact where the position is a point of a region, or an expression that is affine in each random variable;
+otherwise it is an outer bound, and says so. Features of other objects are the label's values ("condition", algorithm 1
+of the query paper).
+"""
+
+# shapely has no type annotations.
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import assert_never, cast
+
+import shapely
+
+from scenicq.forest.bounds import Interval, scalar_bounds, vector_bounds
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.condition import condition
+from scenicq.forest.evaluate import Observation, evaluate
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Constant,
+    DiscAt,
+    Identity,
+    Index,
+    Node,
+    PointIn,
+    Range,
+    Rotate,
+    Scale,
+    SectorAt,
+    Value,
+    VectorOf,
+    VectorSum,
+)
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.walk import children, features, leaves, postorder
+from scenicq.geometry import shapes
+from scenicq.geometry.angles import direction
+from scenicq.geometry.regions import (
+    DifferenceOf,
+    Disc,
+    Everywhere,
+    IntersectionOf,
+    Nowhere,
+    PointSet,
+    PolygonSet,
+    PolylineSet,
+    Rectangle,
+    Region,
+    Sector,
+    UnionOf,
+)
+from scenicq.geometry.shapes import Bounds, Shape
+from scenicq.geometry.terms import rectangle_shape
+
+__all__ = ["Place", "allowed_headings", "allowed_place", "outline", "views"]
+
+_MOST_CHOICES = 16
+_MOST_RANGES = 6
+_THIN = 0.2
+"""Metres around what has no area, so that it can be seen."""
+_STEP = math.tau / 128
+"""Radians between the corners of an arc; they lie outside of it, so that its inside is drawn whole."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where an object may be.
+
+    Attributes:
+        shapes: Outlines in metres whose union it is, cut to what is drawn.
+        exact: Whether the union is what is allowed, rather than something larger.
+        fixed: Whether it is the same in every frame.
+    """
+
+    shapes: tuple[Shape, ...]
+    exact: bool
+    fixed: bool
+
+
+def _arc(x: float, y: float, radius: float, start: float, angle: float) -> list[tuple[float, float]]:
+    count = max(2, math.ceil(angle / _STEP))
+    far = radius / math.cos(angle / count / 2)
+    turns = [start + angle * number / count for number in range(count + 1)]
+    return [(x + far * dx, y + far * dy) for dx, dy in map(direction, turns)]
+
+
+def outline(region: Region, bounds: Bounds) -> list[Shape]:
+    """Shapes whose union is the region within bounds (metres); arcs are drawn a little outside of themselves."""
+    match region:
+        case Everywhere():
+            return [shapes.box(*bounds)]
+        case Nowhere():
+            return []
+        case Disc():
+            return _cut([shapes.polygon(_arc(*region.center, region.radius, 0.0, math.tau))], bounds)
+        case Sector():
+            start = region.heading - region.angle / 2
+            if region.angle >= math.tau:
+                return outline(Disc(region.center, region.radius), bounds)
+            corners = [region.center, *_arc(*region.center, region.radius, start, region.angle)]
+            return _cut([shapes.polygon(corners)], bounds)
+        case Rectangle():
+            return _cut([rectangle_shape(region)], bounds)
+        case PolygonSet() | PolylineSet() | PointSet():
+            return _cut(region.near(bounds), bounds)
+        case UnionOf():
+            return [piece for part in region.parts for piece in outline(part, bounds)]
+        case IntersectionOf():
+            found = [shapes.box(*bounds)]
+            for part in region.parts:
+                inside = outline(part, bounds)
+                whole = inside[0] if len(inside) == 1 else shapes.union_all(inside)
+                found = [cut for piece in found if not (cut := shapes.intersection(piece, whole)).is_empty]
+            return found
+        case DifferenceOf():
+            removed = shapes.union_all(outline(region.removed, bounds))
+            base = outline(region.base, bounds)
+            return [cut for piece in base if not (cut := shapes.difference(piece, removed)).is_empty]
+        case _:
+            assert_never(region)
+
+
+def _cut(pieces: list[Shape], bounds: Bounds) -> list[Shape]:
+    cut: list[Shape] = shapely.intersection(shapes.array(pieces), shapes.box(*bounds)).tolist()
+    return [piece for piece in cut if not piece.is_empty]
+
+
+def _visible(pieces: list[Shape]) -> tuple[Shape, ...]:
+    """The pieces, with some width for those that have none."""
+    return tuple(
+        piece if piece.geom_type in ("Polygon", "MultiPolygon") else cast(Shape, shapely.buffer(piece, _THIN))
+        for piece in pieces
+    )
+
+
+def _choices(root: Node) -> Iterator[Node]:
+    """The expression for each way to choose among options; nothing if there are too many."""
+    indices = [leaf for leaf in leaves(root) if isinstance(leaf, Index)]
+    if math.prod(len(leaf.weights) for leaf in indices) > _MOST_CHOICES:
+        return
+    for picked in itertools.product(*(range(len(leaf.weights)) for leaf in indices)):
+        chosen = {leaf.identity: float(number) for leaf, number in zip(indices, picked, strict=True)}
+        yield condition(root, {}, chosen)
+
+
+def _ranges(root: Node) -> list[Range] | None:
+    """The random variables of an expression that is affine in each of them; None if it is not."""
+    below: dict[int, frozenset[Identity]] = {}
+    found: dict[Identity, Range] = {}
+    for node in postorder((root,)):
+        parts = [below[id(child)] for child in children(node)]
+        match node:
+            case Constant() | VectorOf() | VectorSum():
+                pass
+            case Range() if not any(parts):
+                parts = [frozenset((node.identity,))]
+                found[node.identity] = node
+            case Scale() if not parts[0] & parts[1]:
+                pass
+            case Rotate() if not parts[1]:
+                pass
+            case Arithmetic(op=ArithmeticOp.ADD | ArithmeticOp.SUB | ArithmeticOp.NEG):
+                pass
+            case Arithmetic(op=ArithmeticOp.MUL) if not parts[0] & parts[1]:
+                pass
+            case _:
+                return None
+        below[id(node)] = frozenset[Identity]().union(*parts)
+    return list(found.values())
+
+
+def _reach(root: Node, bounds: Bounds) -> tuple[list[Shape], bool] | None:
+    """What a vector expression can be within bounds, and whether that is exact; None if anything."""
+    if isinstance(root, PointIn) and isinstance(root.region, Constant):
+        return outline(cast(Region, root.region.value), bounds), True
+    ranges = _ranges(root)
+    if ranges is not None and len(ranges) <= _MOST_RANGES:
+        # affine in each variable: every value lies in the hull of those at the ends
+        ends = [scalar_bounds(each) for each in ranges]
+        corners: list[Value] = [
+            evaluate(root, {each.identity: value for each, value in zip(ranges, values, strict=True)})
+            for values in itertools.product(*ends)
+        ]
+        if all(isinstance(corner, tuple) for corner in corners):
+            hull = shapely.convex_hull(shapely.multipoints(cast("list[tuple[float, float]]", corners)))
+            return _cut([hull], bounds), True
+    (west, east), (south, north) = vector_bounds(root)
+    box = (max(west, bounds[0]), max(south, bounds[1]), min(east, bounds[2]), min(north, bounds[3]))
+    if box == bounds:
+        return None
+    return ([shapes.box(*box)] if box[0] <= box[2] and box[1] <= box[3] else []), False
+
+
+def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds: Bounds) -> Place | None:
+    """Where an object may be, as far as the values of the other objects' features are known.
+
+    Args:
+        scenario: The scenario.
+        index: The object.
+        observed: Values of features.
+        bounds: What is drawn, in metres.
+
+    Returns:
+        None where anything is allowed, or nothing can be said.
+    """
+    thing = scenario.objects[index]
+    given = thing.properties.get("position")
+    if given is None or thing.mutated:
+        return None
+    pieces: list[Shape] = []
+    exact = True
+    try:
+        root = condition(given.value, observed)
+        if features(root):
+            return None
+        options = list(_choices(root))
+        for option in options:
+            found = _reach(option, bounds)
+            if found is None:
+                return None
+            pieces += found[0]
+            exact = exact and found[1]
+    except CannotEvaluate:
+        return None
+    return Place(_visible(pieces), exact, not features(given.value)) if options else None
+
+
+def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> tuple[Interval, ...] | None:
+    """The headings that an object may have, in radians; arguments and None as of `allowed_place`.
+
+    Outer bounds where a heading is not affine. An interval may pass pi.
+    """
+    thing = scenario.objects[index]
+    given = thing.properties.get("heading")
+    if given is None or thing.mutated:
+        return None
+    try:
+        root = condition(given.value, observed)
+        if features(root):
+            return None
+        found = [scalar_bounds(option) for option in _choices(root)]
+    except CannotEvaluate:
+        return None
+    if not found or any(high - low >= math.tau for low, high in found):
+        return None
+    return tuple(found)
+
+
+def views(scenario: Scenario, observed: Observation) -> tuple[Disc | Sector, ...]:
+    """The view regions that the scenario's positions and requirements speak of, as far as they are known."""
+    roots = [requirement.condition for requirement in scenario.requirements]
+    roots += [thing.properties["position"].value for thing in scenario.objects if "position" in thing.properties]
+    found: dict[tuple[float, ...], Disc | Sector] = {}
+    for node in postorder(roots):
+        if isinstance(node, SectorAt | DiscAt):
+            known = condition(node, observed)
+            region = known.value if isinstance(known, Constant) else None
+            match region:
+                case Disc():
+                    found[*region.center, region.radius] = region
+                case Sector():
+                    found[*region.center, region.radius, region.heading, region.angle] = region
+                case _:
+                    pass
+    return tuple(found.values())

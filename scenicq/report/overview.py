@@ -1,0 +1,163 @@
+"""The head of a report: the program with each line's share of exclusions, the funnel, how to run it again."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, cast
+
+from scenicq.query.results import Funnel
+from scenicq.query.run import Query
+from scenicq.report.frames import table
+from scenicq.report.shares import Line
+from scenicq.report.svg import element, escape
+
+__all__ = ["funnel_section", "how_section", "program_section", "versions"]
+
+_PACKAGES = ("scenicq", "duckdb", "numpy", "pyarrow", "shapely", "highspy", "codac", "dreal")
+
+
+def _bar(share: float, told: str) -> str:
+    fill = element("rect", class_="fill", width=f"{100 * share:.2f}", height=10)
+    ground = element("rect", class_="track", width=100, height=10)
+    return element(
+        "svg", ground, fill, class_="bar", viewBox="0 0 100 10", preserveAspectRatio="none", role="img", aria_label=told
+    )
+
+
+def program_section(lines: Sequence[Line], rest: Mapping[str, int], frames: int) -> str:
+    """The program as a table.
+
+    Args:
+        lines: Its lines.
+        rest: Frames excluded by what no line says.
+        frames: Frames looked at.
+    """
+    rows: list[str] = []
+    for line in lines:
+        share = line.excluded / frames if frames else 0.0
+        told = f"{line.excluded:,} frames ({share:.1%}) failed first here"
+        cells = element("td", _bar(share, told) if line.excluded else "", class_="share")
+        count = element(
+            "td", f"{share:.1%}" if line.excluded else "", class_="count", title="; ".join(line.what) or None
+        )
+        number = element("th", str(line.number), scope="row")
+        code = element("td", element("code", escape(line.text) or "&#8203;"))
+        rows.append(element("tr", number, count, cells, code, id=f"line-{line.number}"))
+    names = (element("th", "line", scope="col"), element("th", "excluded", scope="col", colspan=2))
+    head = element("tr", *names, element("th", "program", scope="col"))
+    body = element("table", element("thead", head), element("tbody", *rows), class_="program")
+    others = [(escape(what), f"{count:,}", f"{count / frames:.1%}") for what, count in rest.items()]
+    return element(
+        "section",
+        element("h2", "Program", id="program-title"),
+        element("p", "Each frame that does not match is counted at the line that it failed first at.", class_="hint"),
+        element("div", body, class_="scroll"),
+        table("Excluded by what no single line says", ("what", "frames", "share"), others),
+        aria_labelledby="program-title",
+        class_="program-pane",
+    )
+
+
+def funnel_section(funnel: Funnel, total: int) -> str:
+    """How many frames are left after each step.
+
+    Args:
+        funnel: Of a query whose results were taken.
+        total: Frames of the dataset.
+    """
+    steps = [
+        ("frames", funnel.frames),
+        ("after the prefilter", funnel.candidates),
+        ("with an object for every role", funnel.cast),
+        ("matches", funnel.matches),
+        ("unknown", funnel.unknowns),
+    ]
+    rows = [
+        element(
+            "tr",
+            element("th", escape(name), scope="row"),
+            element("td", f"{count:,}", class_="count"),
+            element(
+                "td",
+                _bar(count / funnel.frames if funnel.frames else 0.0, f"{count:,} of {funnel.frames:,}"),
+                class_="share",
+            ),
+        )
+        for name, count in steps
+    ]
+    stopped = f"Stopped after {funnel.frames:,} of {total:,} frames (--limit)." if funnel.frames < total else ""
+    warnings = [element("li", escape(each.message)) for each in funnel.warnings]
+    failed = [
+        (escape(what), f"{count:,}", f"{count / funnel.frames:.1%}")
+        for what, count in sorted(funnel.excluded.items(), key=lambda item: (-item[1], item[0]))
+    ]
+    return element(
+        "section",
+        element("h2", "Where the frames went", id="funnel-title"),
+        element("p", escape(stopped), class_="hint") if stopped else "",
+        element("ul", *warnings, class_="cause") if warnings else "",
+        element("table", element("tbody", *rows), class_="funnel"),
+        table("First failed at", ("what", "frames", "share"), failed),
+        aria_labelledby="funnel-title",
+    )
+
+
+def versions() -> dict[str, str]:
+    """The versions of what a result depends on."""
+    found = {"python": sys.version.split()[0]}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
+    if is_dataclass(value):
+        return [
+            row
+            for each in fields(value)
+            for row in _flat(getattr(value, each.name), f"{name}.{each.name}" if name else each.name)
+        ]
+    shown = ", ".join(sorted(map(str, cast("frozenset[Any]", value)))) if type(value) is frozenset else str(value)
+    return [(name, shown)]
+
+
+def how_section(query: Query, command: str, elapsed_s: float) -> str:
+    """How to get this report again: the command line, the options, the versions, the dataset.
+
+    Args:
+        query: The query.
+        command: The command line, or nothing.
+        elapsed_s: Seconds that the query took.
+    """
+    manifest = query.dataset.manifest
+    about = [("path", str(query.dataset.path)), ("name", manifest.name), ("importer", manifest.importer)]
+    about += [(key, str(value)) for key, value in manifest.provenance.items() if isinstance(value, str)]
+    copy = element(
+        "p",
+        element("code", escape(command), id="command"),
+        " ",
+        element("button", "Copy", type="button", id="copy"),
+        element("span", role="status", id="copied"),
+        class_="command",
+    )
+    rows = ((escape(name.removeprefix("match.")), escape(value)) for name, value in _flat(query.options))
+    return element(
+        "section",
+        element("h2", "Run it again", id="how-title"),
+        copy if command else "",
+        element("p", f"The query took {elapsed_s:.1f} s.", class_="hint"),
+        element(
+            "div",
+            table("Options", ("option", "value"), list(rows)),
+            table("Versions", ("package", "version"), [(escape(n), escape(v)) for n, v in versions().items()]),
+            table("Dataset", ("what", "value"), [(escape(n), escape(v)) for n, v in about]),
+            class_="columns",
+        ),
+        aria_labelledby="how-title",
+    )

@@ -1,0 +1,109 @@
+"""A page that needs nothing but itself: style and script inside, and a policy that lets nothing else run or load."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from importlib import resources
+from importlib.metadata import version
+
+from scenicq.report.picture import stylesheet
+from scenicq.report.svg import element, escape
+
+__all__ = ["GENERATOR", "page", "runs_section"]
+
+GENERATOR = "scenicq report"
+"""What marks a page as one of ours."""
+
+
+def _asset(name: str) -> str:
+    return resources.files("scenicq.report").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def page(title: str, body: Sequence[str], *, script: bool = True) -> str:
+    """A page.
+
+    Args:
+        title: Its title, a plain text.
+        body: Markup, already escaped.
+        script: Whether it needs the report's script.
+    """
+    style = f"{stylesheet()}\n{_asset('page.css')}"
+    code = _asset("page.js") if script else ""
+    policy = "; ".join(
+        (
+            "default-src 'none'",
+            "img-src 'self' file: data:",
+            f"style-src {_hash(style)}",
+            f"script-src {_hash(code)}" if script else "script-src 'none'",
+            "base-uri 'none'",
+            "form-action 'none'",
+        )
+    )
+    head = (
+        '<meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<meta name="color-scheme" content="light dark">'
+        f'<meta name="generator" content="{GENERATOR} {escape(version("scenicq"))}">'
+        f"{element('title', escape(title))}<style>{style}</style>"
+    )
+    end = f"<script>{code}</script>" if script else ""
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{"".join(body)}{end}</body></html>\n'
+
+
+def _toolbar(recordings: Sequence[str]) -> str:
+    names = [element("option", "", value=name).removesuffix("</option>") for name in recordings]
+    orders = (("data-order", "in order of the dataset"), ("-data-length", "longest first"), ("data-time", "by time"))
+    options = [element("option", escape(text), value=value) for value, text in orders]
+    return element(
+        "div",
+        element(
+            "label",
+            "Recording ",
+            '<input type="search" id="filter" list="recordings" placeholder="all" autocomplete="off">',
+        ),
+        element("datalist", *names, id="recordings"),
+        element("label", "Sort ", element("select", *options, id="sort")),
+        element("span", "", id="shown", role="status"),
+        element(
+            "span",
+            "<kbd>j</kbd> <kbd>k</kbd> run, <kbd>\N{LEFTWARDS ARROW}</kbd> <kbd>\N{RIGHTWARDS ARROW}</kbd> frame, "
+            "<kbd>/</kbd> filter",
+            class_="keys",
+        ),
+        class_="toolbar",
+        role="search",
+    )
+
+
+def runs_section(cards: Sequence[str], recordings: Sequence[str], note: str) -> str:
+    """The runs, with what filters and sorts them.
+
+    Args:
+        cards: As `draw_card` gives them.
+        recordings: Names of all their recordings.
+        note: What the reader should know, or nothing.
+    """
+    empty = element("p", "No frame matches. The funnel says what excluded them.", class_="hint") if not cards else ""
+    legend = (
+        "<b>Solid box</b>: an object of the label, its line points to the front; <b>dark box</b>: the ego; "
+        "<b>dashed box</b>: a size that the label does not have. <b>Tinted area</b>: where a role may be; "
+        "<b>wedge</b>: which way it may face; <b>dashed yellow</b>: a view region; "
+        "<b>cross</b>: a hidden point of the witness."
+    )
+    return element(
+        "section",
+        element("h2", "Frames", id="runs-title"),
+        element("p", escape(note), class_="hint") if note else "",
+        empty,
+        _toolbar(recordings) if cards else "",
+        element("p", legend, class_="hint legend") if cards else "",
+        element("div", *cards, id="runs"),
+        aria_labelledby="runs-title",
+    )

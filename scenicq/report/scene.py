@@ -1,0 +1,151 @@
+"""Who plays whom in a label, and what is drawn of a label's objects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenicq.forest.evaluate import Observation
+from scenicq.forest.scenario import Scenario
+from scenicq.geometry.angles import direction
+from scenicq.geometry.boxes import corners
+from scenicq.geometry.shapes import Bounds
+from scenicq.match.observe import observe
+from scenicq.report.svg import Plane, element, escape, points_path
+from scenicq.store.classes import class_matches
+from scenicq.store.labels import Label, LabelObject
+
+__all__ = ["COLOURS", "Role", "box_of", "draw_object", "draw_text", "find_roles", "observed_by"]
+
+COLOURS = 8
+"""Colours that roles are told apart by, besides their names."""
+_NOMINAL = (("Vehicle", 2.0, 4.5), ("Pedestrian", 0.7, 0.7))
+"""Width and length in metres drawn where the label has none, by class."""
+_OTHER = (0.8, 0.8)
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """A label object that plays an object of the scenario.
+
+    Attributes:
+        index: Index of the scenario's object.
+        name: Its name.
+        thing: The label object.
+    """
+
+    index: int
+    name: str
+    thing: LabelObject
+
+    @property
+    def colour(self) -> str:
+        """The class by which the role's marks are coloured."""
+        return f"c{self.index % COLOURS}"
+
+
+def find_roles(scenario: Scenario, label: Label, correspondence: Mapping[str, str]) -> tuple[Role, ...]:
+    """The roles of a correspondence, in program order; the ego's is there also where the correspondence is empty."""
+    known = {thing.id: thing for thing in label.objects} | {"ego": label.ego}
+    found: list[Role] = []
+    for thing in scenario.objects:
+        played = correspondence.get(thing.name, "ego" if thing.index == scenario.ego and not correspondence else "")
+        if played in known:
+            found.append(Role(thing.index, thing.name, known[played]))
+    return tuple(found)
+
+
+def observed_by(roles: tuple[Role, ...]) -> Observation:
+    """What the label observes of the objects that are played."""
+    return {(role.index, name): value for role in roles for name, value in observe(role.thing).items()}
+
+
+def box_of(thing: LabelObject) -> tuple[float, float, bool]:
+    """Width and length in metres with which an object is drawn, and whether the label has them."""
+    if thing.width is not None and thing.length is not None:
+        return thing.width, thing.length, True
+    for category, width, length in _NOMINAL:
+        if class_matches(category, thing.category, "fine"):
+            return width, length, False
+    return (*_OTHER, False)
+
+
+def _told(thing: LabelObject, role: str) -> str:
+    heading = "no heading" if thing.heading is None else f"heading {math.degrees(thing.heading):.1f}\N{DEGREE SIGN}"
+    where = f"({thing.x:.2f}, {thing.y:.2f}) m"
+    said = [role and f"role {role}", thing.id, thing.category, where, heading]
+    if thing.velocity is not None:
+        said.append(f"{math.hypot(*thing.velocity):.1f} m/s")
+    return ", ".join(filter(None, said))
+
+
+def draw_object(thing: LabelObject, plane: Plane, *, role: Role | None = None, blamed: bool = False) -> str:
+    """An object's box with its front marked; what the label does not know is dashed, or a dot without heading.
+
+    Args:
+        thing: The object.
+        plane: Where the picture lies.
+        role: Its role, if it has one.
+        blamed: Whether it is part of what excludes the frame.
+    """
+    width, length, measured = box_of(thing)
+    classes = ["box", "ego" if thing.id == "ego" else "other", role.colour if role else "", "blamed" if blamed else ""]
+    if not measured:
+        classes.append("nominal")
+    told = element("title", escape(_told(thing, role.name if role else "")))
+    if thing.heading is None:
+        x, y = plane.at(thing.x, thing.y)
+        shape = element("circle", cx=x, cy=y, r=round(50 * min(width, length)))
+    else:
+        outline = plane.to_picture(corners(thing.x, thing.y, thing.heading, width, length))
+        dx, dy = direction(thing.heading)
+        front = (thing.x + dx * length / 2, thing.y + dy * length / 2)
+        nose = plane.to_picture(np.array([(thing.x, thing.y), front]))
+        shape = element("path", class_="outline", d=points_path(outline.tolist(), closed=True))
+        shape += element("path", class_="nose", d=points_path(nose.tolist(), closed=False))
+    return element("g", told, shape, class_=" ".join(filter(None, classes)))
+
+
+def draw_text(roles: tuple[Role, ...], plane: Plane, bounds: Bounds, size: int) -> str:
+    """The names of the roles beside their boxes, where they hide each other least.
+
+    Args:
+        roles: The roles.
+        plane: Where the picture lies.
+        bounds: What is drawn, in metres.
+        size: Height of the letters in centimetres.
+    """
+    taken = [(*plane.at(role.thing.x, role.thing.y), 100 * box_of(role.thing)[1] / 2) for role in roles]
+    west, north = plane.at(bounds[0], bounds[3])
+    east, south = plane.at(bounds[2], bounds[1])
+    placed: list[tuple[float, float, float]] = []
+    parts: list[str] = []
+    for role in roles:
+        x, y = plane.at(role.thing.x, role.thing.y)
+        wide, away = size * 0.34 * len(role.name), 55 * math.hypot(*box_of(role.thing)[:2]) + size * 0.3
+        spots = ((x + away + wide, y), (x - away - wide, y), (x, y - away - size / 2), (x, y + away + size / 2))
+
+        def crowded(spot: tuple[float, float], wide: float = wide) -> float:
+            outside = not (west + wide < spot[0] < east - wide and north + size < spot[1] < south - size)
+            near = [*taken, *placed]
+            return 9.0 * outside + sum(
+                abs(spot[0] - a) < wide + far and abs(spot[1] - b) < size * 0.7 + far * 0.7 for a, b, far in near
+            )
+
+        left, top = min(spots, key=crowded)
+        placed.append((left, top, wide))
+        parts.append(
+            element(
+                "text",
+                escape(role.name),
+                class_=f"name {role.colour}",
+                x=round(left),
+                y=round(top + size * 0.35),
+                font_size=size,
+                text_anchor="middle",
+            )
+        )
+    return "".join(parts)

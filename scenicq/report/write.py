@@ -1,0 +1,203 @@
+"""The report of a query: a page with everything inside up to a few hundred frames, else with pictures beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenicq.errors import DataError, Diagnostic, ScenarioError
+from scenicq.forest.scenario import Scenario
+from scenicq.match.matcher import Matcher
+from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.query.explain import explain
+from scenicq.query.results import Result
+from scenicq.query.run import Query
+from scenicq.query.solving import LazySolver
+from scenicq.report.backdrop import Backdrop
+from scenicq.report.cards import Card, draw_card
+from scenicq.report.overview import funnel_section, how_section, program_section
+from scenicq.report.page import GENERATOR, page, runs_section
+from scenicq.report.picture import Shot, draw
+from scenicq.report.runs import Run, find_runs, frame_numbers
+from scenicq.report.sensors import SensorFiles, can_make_thumbnails
+from scenicq.report.shares import program_lines
+from scenicq.report.svg import element, escape
+
+__all__ = ["INLINE", "MOST", "check_target", "write_report"]
+
+INLINE = 300
+"""Frames up to which everything is in the page itself."""
+MOST = 2000
+"""Frames that are shown at most."""
+_OWN = ("pictures", "thumbnails", "index.html")
+
+
+def check_target(folder: Path) -> None:
+    """Make sure that a report may be written to a folder: one that is new, empty, or has an older report of ours.
+
+    Raises:
+        DataError: target-exists, or target-unwritable.
+    """
+    try:
+        if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+            return
+        index = folder / "index.html"
+        if index.is_file() and f'content="{GENERATOR} ' in index.read_text(encoding="utf-8", errors="replace")[:4000]:
+            return
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    hint = "choose a new folder, or one that holds an earlier report"
+    raise DataError(Diagnostic("target-exists", f"{folder} is there and is no report", hints=(hint,)))
+
+
+def _unwritable(folder: Path, error: OSError) -> DataError:
+    return DataError(Diagnostic("target-unwritable", f"{folder} cannot be written: {error.strerror or error}"))
+
+
+def write_report(
+    query: Query,
+    results: Sequence[Result],
+    folder: Path,
+    *,
+    near: Sequence[Result] = (),
+    command: str = "",
+    elapsed_s: float = 0.0,
+) -> Path:
+    """Write a report into a folder; an earlier report there is replaced when the new one is complete.
+
+    Args:
+        query: The query, after its results were taken.
+        results: Results in the order of the dataset; frames that do not match are passed over.
+        folder: Where to.
+        near: Near misses.
+        command: The command line to run it again.
+        elapsed_s: Seconds that the query took.
+
+    Returns:
+        The page.
+
+    Raises:
+        DataError: target-exists, or target-unwritable.
+    """
+    check_target(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        work = Path(tempfile.mkdtemp(prefix=".report-", dir=folder))
+        try:
+            text = _Report(query, folder, work).text(results, near, command, elapsed_s)
+            (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
+            _replace(work, folder)
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    return folder / "index.html"
+
+
+def _replace(work: Path, folder: Path) -> None:
+    for name in _OWN:
+        new, old = work / name, folder / name
+        if old.is_dir() and not old.is_symlink():
+            shutil.rmtree(old)
+        if new.exists():
+            new.replace(old)
+        else:
+            with contextlib.suppress(FileNotFoundError):
+                old.unlink()
+
+
+@dataclass(eq=False)
+class _World:
+    scenario: Scenario
+    backdrop: Backdrop
+
+
+class _Report:
+    """What the parts of one report share."""
+
+    def __init__(self, query: Query, folder: Path, work: Path) -> None:
+        self.query, self.work = query, work
+        self.worlds: dict[str, _World | None] = {}
+        source = query.dataset.manifest.provenance.get("source")
+        roots = (Path(source),) if isinstance(source, str) else ()
+        self.files = SensorFiles((*roots, query.dataset.path), folder, work, can_make_thumbnails())
+        self.pictured = 0
+
+    def world(self, name: str) -> _World | None:
+        """The scenario over a map, None if it does not fit."""
+        if name not in self.worlds:
+            try:
+                scenario, network = self.query.compile(name)
+                self.worlds[name] = _World(scenario, Backdrop(network))
+            except ScenarioError:
+                self.worlds[name] = None
+        return self.worlds[name]
+
+    def text(self, results: Sequence[Result], near: Sequence[Result], command: str, elapsed_s: float) -> str:
+        """The page."""
+        funnel, dataset = self.query.funnel, self.query.dataset
+        # of a frame that matches in several ways the first is shown
+        first: dict[str, Result] = {}
+        for each in results:
+            if isinstance(each.verdict, Match | Unknown):
+                first.setdefault(each.frame, each)
+        results = list(first.values())
+        shown = results[: max(0, MOST - len(near))]
+        inline = len(shown) + len(near) <= INLINE
+        numbers = frame_numbers(dataset, {result.recording for result in (*shown, *near)})
+        runs = [*find_runs(shown, numbers), *(Run(r.recording, (r,), *numbers[r.frame]) for r in near)]
+        cards = list(self.cards(runs, inline=inline))
+        recordings = list(dict.fromkeys(run.recording for run in runs))
+        left = len(results) - len(shown)
+        note = f"{left:,} more frames are not shown: `--limit` or a narrower scenario shows others." if left else ""
+        world = next((found for name in dataset.maps if (found := self.world(name))), None)
+        lines, rest = program_lines(world.scenario, funnel.excluded) if world else ([], dict(funnel.excluded))
+        name = Path(self.query.source.name).name
+        told = (
+            f"{funnel.matches:,} {'match' if funnel.matches == 1 else 'matches'}, {funnel.unknowns:,} unknown of "
+            f"{funnel.frames:,} frames in {dataset.manifest.name or dataset.path.name}"
+        )
+        head = element("header", element("h1", escape(name)), element("p", escape(told)))
+        overview = element(
+            "div",
+            program_section(lines, rest, funnel.frames),
+            funnel_section(funnel, dataset.manifest.total.frames),
+            class_="overview",
+        )
+        main = element(
+            "main", overview, runs_section(cards, recordings, note), how_section(self.query, command, elapsed_s)
+        )
+        skip = element("a", "Skip to the frames", href="#runs-title", class_="skip")
+        return page(f"{name}: {told}", [skip, head, main])
+
+    def cards(self, runs: Sequence[Run], *, inline: bool) -> Iterator[str]:
+        """The cards of runs."""
+        frames = [result.frame for run in runs for result in run.results]
+        labels = {label.frame: label for label in self.query.dataset.labels(frames)} if frames else {}
+        with LazySolver(self.query.options.solver) as solver:
+            for number, run in enumerate(runs, 1):
+                world = self.world(labels[run.results[0].frame].map)
+                if world is None:
+                    continue
+                shots: list[Shot] = []
+                for result in run.results:
+                    label = labels[result.frame]
+                    matcher = Matcher(world.scenario, self.query.options.match, solver)
+                    why = explain(matcher, label) if isinstance(result.verdict, NoMatch) else None
+                    shots.append(Shot(label, world.scenario, result.verdict, why))
+                sensors = tuple(self.files.find(shot.label.sensors) for shot in shots)
+                pictures = None if inline else tuple(self.picture(shot, world.backdrop) for shot in shots)
+                yield draw_card(Card(number, run, tuple(shots), sensors, world.backdrop, pictures))
+
+    def picture(self, shot: Shot, backdrop: Backdrop) -> str:
+        """Write a picture beside the page; its address."""
+        self.pictured += 1
+        name = f"pictures/{self.pictured:06}.svg"
+        target = self.work / name
+        target.parent.mkdir(exist_ok=True)
+        target.write_text(draw(shot, backdrop), encoding="utf-8", newline="\n")
+        return name

@@ -1,0 +1,67 @@
+"""Where each frame is: the table `frame_index`, sorted by a hash of the frame's name.
+
+Names of frames are often random, so no order of the labels helps to find one; this table does, by its statistics.
+"""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from scenicq.store.schema import SCHEMAS, ArrowTable
+
+__all__ = ["find_rows", "frame_hashes", "index_rows", "repeated_rows"]
+
+
+def frame_hashes(frames: Iterable[str]) -> NDArray[np.uint64]:
+    """A hash of each name, the same on every machine."""
+    hashed = [hashlib.blake2b(frame.encode(), digest_size=8).digest() for frame in frames]
+    return np.frombuffer(b"".join(hashed), dtype="<u8").astype(np.uint64)
+
+
+def index_rows(hashes: NDArray[np.uint64]) -> ArrowTable:
+    """The table for frames whose hashes are given in the order of the labels."""
+    order = np.argsort(hashes, kind="stable")
+    return pa.table({"hash": hashes[order], "row": order.astype(np.int64)}, schema=SCHEMAS["frame_index"])
+
+
+def repeated_rows(hashes: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Rows whose hash occurs more than once, in order; almost always none."""
+    order = np.argsort(hashes, kind="stable")
+    same = hashes[order][1:] == hashes[order][:-1]
+    return np.unique(np.concatenate((order[1:][same], order[:-1][same])))
+
+
+def find_rows(files: Sequence[Path], frames: Collection[str]) -> NDArray[np.int64]:
+    """Rows of the labels that may be those of some frames, in order: all that are, and hardly any other.
+
+    Args:
+        files: Of the table `frame_index`.
+        frames: Names of frames; those that are not there find nothing.
+    """
+    wanted = np.sort(frame_hashes(frames))
+    found: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
+    for path in files if len(wanted) else ():
+        with pq.ParquetFile(path) as file:
+            for group in range(file.num_row_groups):
+                statistics = file.metadata.row_group(group).column(0).statistics
+                low, high = np.uint64(statistics.min), np.uint64(statistics.max)
+                if np.searchsorted(wanted, low) == np.searchsorted(wanted, high, side="right"):
+                    continue
+                table = file.read_row_group(group)
+                hashes = table["hash"].to_numpy()
+                places = np.searchsorted(hashes, wanted)
+                ends = np.searchsorted(hashes, wanted, side="right")
+                rows = table["row"].to_numpy()
+                found += [rows[place:end] for place, end in zip(places, ends, strict=True) if place < end]
+    return np.sort(np.concatenate(found))

@@ -1,0 +1,152 @@
+"""The hidden folder in which a dataset grows beside its target, and how it gets the target's name.
+
+`.NAME.partial` belongs to the process that holds its lock, which the system takes away with the process. After a hard
+kill the folder stays, with the segments that were complete, for the next ingest of that target.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.store.manifest import is_dataset
+from scenicq.store.parquet import sync_folder
+
+try:
+    import fcntl
+except ImportError:  # not POSIX: two ingests into one target are then the user's to avoid
+    fcntl = None
+
+__all__ = ["Partial", "check_target"]
+
+_LOCK = "lock"
+
+
+class Partial:
+    """The folder of a dataset that is not finished."""
+
+    def __init__(self, target: Path) -> None:
+        """Name the folders; nothing happens yet."""
+        self.target = target
+        self.folder = target.with_name(f".{target.name}.partial")
+        self._aside = target.with_name(f".{target.name}.replaced")
+        self._lock: IO[bytes] | None = None
+
+    def open(self) -> None:
+        """Make or take over the folder, and undo a replacement that was killed in the middle.
+
+        Raises:
+            OSError: The place cannot be written.
+            DataError: `target-exists` while another process writes there.
+        """
+        while self._lock is None:
+            self.folder.mkdir(exist_ok=True)
+            self._lock = self._locked()
+        if self._aside.exists():
+            if os.path.lexists(self.target):
+                shutil.rmtree(self._aside)
+            else:
+                self._aside.rename(self.target)
+
+    def _locked(self) -> IO[bytes] | None:
+        path = self.folder / _LOCK
+        file = path.open("wb")
+        try:
+            if fcntl is not None:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # Whoever held the lock before may have finished meanwhile, and the folder with it.
+                if not path.exists() or path.stat().st_ino != os.fstat(file.fileno()).st_ino:
+                    file.close()
+                    return None
+        except BlockingIOError as error:
+            file.close()
+            message = f"another ingest is writing {self.target}"
+            raise DataError(Diagnostic("target-exists", message, hints=("wait until it ends",))) from error
+        return file
+
+    def clear(self) -> None:
+        """Remove what an earlier process left in the folder."""
+        for path in self.folder.iterdir():
+            if path.is_dir():
+                shutil.rmtree(path)
+            elif path.name != _LOCK:
+                path.unlink()
+
+    def remove(self) -> None:
+        """Remove the folder, if it is ours."""
+        if self._lock is not None:
+            if fcntl is None:
+                self._unlock()
+            shutil.rmtree(self.folder, ignore_errors=True)
+            self._unlock()
+
+    def keep(self, files: set[Path]) -> None:
+        """Remove everything but some files.
+
+        Args:
+            files: Relative to the folder.
+
+        Raises:
+            OSError: The folder cannot be written.
+        """
+        for path in sorted(self.folder.rglob("*"), reverse=True):
+            relative = path.relative_to(self.folder)
+            if path.is_dir():
+                with suppress(OSError):
+                    path.rmdir()
+            elif relative not in files and relative != Path(_LOCK):
+                path.unlink()
+
+    def put_in_place(self) -> None:
+        """Give the folder the target's name.
+
+        Raises:
+            OSError: The place cannot be written.
+        """
+        if fcntl is None:
+            self._unlock()  # elsewhere a folder with an open file cannot be renamed
+        replaces = self.target.exists()
+        if replaces:
+            self.target.rename(self._aside)
+        try:
+            self.folder.rename(self.target)
+        except BaseException:
+            if replaces:
+                self._aside.rename(self.target)
+            raise
+        (self.target / _LOCK).unlink(missing_ok=True)
+        self._unlock()
+        sync_folder(self.target.parent)
+        shutil.rmtree(self._aside, ignore_errors=True)
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+
+def check_target(target: Path, *, force: bool = False, update: bool = False) -> None:
+    """Refuse a target that must not be written.
+
+    Args:
+        target: Folder of the dataset to be.
+        force: Whether a dataset that is there already may be replaced.
+        update: Whether it may be brought up to date.
+
+    Raises:
+        DataError: `target-exists`, or `target-unwritable` for a path without a name of its own.
+    """
+    if not target.name or target.name == "..":
+        raise DataError(Diagnostic("target-unwritable", f"{target} is not the name of a new folder"))
+    if not os.path.lexists(target):
+        return
+    if not is_dataset(target):
+        hint = "choose another name: only a dataset can be replaced"
+        raise DataError(Diagnostic("target-exists", f"{target} exists and is not a dataset of scenicq", hints=(hint,)))
+    if not force and not update:
+        hints = ("`--force` replaces it", "`--update` adds what is new in the source")
+        raise DataError(Diagnostic("target-exists", f"the dataset {target} exists", hints=hints))

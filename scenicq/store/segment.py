@@ -1,0 +1,266 @@
+"""Segments: runs of recordings that are written, kept and taken over as one.
+
+A segment has one Parquet file in each of the four large tables and a small JSON file that says what it holds. That file
+is written last, so a segment is there completely or not at all. Segments depend on nothing but their own recordings and
+maps; therefore processes write them side by side, and an interrupted or repeated ingest takes them over as they are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from scenicq.store.columns import RecordingColumns
+from scenicq.store.manifest import Counts, Part
+from scenicq.store.parquet import TableWriter, part_path, write_synced
+from scenicq.store.placement import MapIndex
+from scenicq.store.rows import recording_rows
+from scenicq.store.schema import SEGMENT_TABLES
+
+__all__ = ["SEGMENT_OBJECTS", "Problem", "Segment", "SegmentWriter", "read_segments", "segments_of", "take_over"]
+
+SEGMENT_OBJECTS = 1 << 20
+"""Upper bound of the label objects of a segment, unless a single recording has more."""
+
+_FOLDER = "segments"
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something of a source that could not be taken as it is, as the importer's report told it.
+
+    Attributes:
+        what, code, name, kept: As in `LeftOut`.
+        message, hints: Of the diagnostic.
+    """
+
+    what: str
+    code: str
+    name: str
+    kept: bool
+    message: str
+    hints: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """What one segment holds.
+
+    Attributes:
+        fingerprint: Changes with everything that the segment was made from; "" where nobody asks.
+        files: Size, checksum and rows of its file in each table; the paths are those of its number.
+        recordings: Frames and label objects of each recording, in order.
+        by_map: Frames and label objects of each map.
+        by_class, by_source_class: Label objects of each class.
+        tracks: Distinct tracks, counted within each recording.
+        span_us: First and last timestamp; None without frames.
+        counts: How often each problem occurred: what, code, name, kept, count.
+        told: The first problems of each kind.
+    """
+
+    fingerprint: str
+    files: Mapping[str, Part]
+    recordings: Mapping[str, Counts]
+    by_map: Mapping[str, Counts]
+    by_class: Mapping[str, int]
+    by_source_class: Mapping[str, int]
+    tracks: int
+    span_us: tuple[int, int] | None
+    counts: Sequence[tuple[str, str, str, bool, int]] = ()
+    told: Sequence[Problem] = ()
+
+    @property
+    def objects(self) -> int:
+        """Label objects."""
+        return sum(counts.objects for counts in self.recordings.values())
+
+    def part(self, table: str, number: int) -> Part:
+        """Its file of a table, where the segment has that number."""
+        file = self.files[table]
+        return Part(part_path(table, number), file.bytes, file.sha256, file.rows)
+
+
+def segments_of(weights: Sequence[tuple[str, int]], largest: int = SEGMENT_OBJECTS) -> Iterator[list[str]]:
+    """Group recordings into segments.
+
+    Where one ends is drawn by the names of the recordings once it has a quarter of the largest size. So a recording
+    that comes in between changes the segments near it and leaves the others as they are.
+
+    Args:
+        weights: Name and number of label objects (or an estimate) of each recording, in order.
+        largest: Most label objects of a segment of several recordings.
+    """
+    segment: list[str] = []
+    total = 0
+    for name, weight in weights:
+        drawn = int.from_bytes(hashlib.blake2b(name.encode(), digest_size=4).digest()) / 2**32
+        if segment and (total + weight > largest or (4 * total >= largest and drawn * largest < 4 * weight)):
+            yield segment
+            segment, total = [], 0
+        segment.append(name)
+        total += weight
+    if segment:
+        yield segment
+
+
+@dataclass(slots=True)
+class SegmentWriter:
+    """Writes one segment of a dataset.
+
+    Attributes:
+        folder: Of the dataset.
+        number: Of the segment.
+    """
+
+    folder: Path
+    number: int
+    _tables: dict[str, TableWriter] = field(default_factory=dict[str, TableWriter])
+    _recordings: dict[str, Counts] = field(default_factory=dict[str, Counts])
+    _by_map: dict[str, Counts] = field(default_factory=dict[str, Counts])
+    _by_class: Counter[str] = field(default_factory=Counter[str])
+    _by_source_class: Counter[str] = field(default_factory=Counter[str])
+    _tracks: int = 0
+    _times: list[int] = field(default_factory=list[int])
+
+    def open(self) -> None:
+        """Open the files.
+
+        Raises:
+            OSError: The folder cannot be written.
+        """
+        # What an earlier process said of this number is not true of the files from here on.
+        _description(self.folder, self.number).unlink(missing_ok=True)
+        for table in SEGMENT_TABLES:
+            self._tables[table] = TableWriter(self.folder, table, self.number)
+
+    def add(self, columns: RecordingColumns, index: MapIndex) -> None:
+        """Append a recording; they come in order of their names.
+
+        Raises:
+            OSError: The folder cannot be written.
+        """
+        tables = self._tables
+        first = {"first_object": tables["objects"].rows, "first_sensor": tables["sensors"].rows}
+        for table, rows in recording_rows(columns, index, **first).items():
+            tables[table].add(rows)
+        counts = Counts(len(columns.frames), len(columns.objects.x))
+        self._recordings[columns.name] = counts
+        before = self._by_map.get(columns.map, Counts())
+        self._by_map[columns.map] = Counts(before.frames + counts.frames, before.objects + counts.objects)
+        self._by_class.update(columns.objects.category)
+        self._by_source_class.update(columns.objects.source_class)
+        self._tracks += len({*columns.objects.track} - {None})
+        times = [*self._times, *columns.times_us]
+        self._times = [min(times), max(times)] if times else []
+
+    @property
+    def objects(self) -> int:
+        """Label objects so far."""
+        return self._tables["objects"].rows if self._tables else 0
+
+    def finish(
+        self,
+        fingerprint: str = "",
+        counts: Sequence[tuple[str, str, str, bool, int]] = (),
+        told: Sequence[Problem] = (),
+    ) -> Segment:
+        """Complete the files, then say so.
+
+        Raises:
+            OSError: The folder cannot be written.
+        """
+        segment = Segment(
+            fingerprint=fingerprint,
+            files={table: writer.finish() for table, writer in self._tables.items()},
+            recordings=self._recordings,
+            by_map=dict(sorted(self._by_map.items())),
+            by_class=dict(sorted(self._by_class.items())),
+            by_source_class=dict(sorted(self._by_source_class.items())),
+            tracks=self._tracks,
+            span_us=(self._times[0], self._times[1]) if self._times else None,
+            counts=tuple(counts),
+            told=tuple(told),
+        )
+        self._tables.clear()
+        (self.folder / _FOLDER).mkdir(exist_ok=True)
+        write_synced(_description(self.folder, self.number), _to_json(segment))
+        return segment
+
+    def abandon(self) -> None:
+        """Close and remove what is not finished."""
+        for writer in self._tables.values():
+            with suppress(OSError):
+                writer.abandon()
+        self._tables.clear()
+
+
+def read_segments(folder: Path) -> dict[int, Segment]:
+    """The complete segments of a dataset, finished or not, by number; damaged ones are passed over."""
+    found: dict[int, Segment] = {}
+    for path in sorted((folder / _FOLDER).glob("part-*.json")):
+        try:
+            number = int(path.stem.removeprefix("part-"))
+            segment = _from_json(json.loads(path.read_bytes()))
+            parts = [segment.part(table, number) for table in SEGMENT_TABLES]
+            if all((folder / part.path).stat().st_size == part.bytes for part in parts):
+                found[number] = segment
+        except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):
+            continue
+    return found
+
+
+def take_over(source: Path, number: int, target: Path, new_number: int) -> None:
+    """Put the files of a segment into another dataset, without copying where the system can.
+
+    Raises:
+        OSError: A file cannot be read or written.
+    """
+    pairs = [(source / part_path(t, number), target / part_path(t, new_number)) for t in SEGMENT_TABLES]
+    for old, new in [*pairs, (_description(source, number), _description(target, new_number))]:
+        new.parent.mkdir(exist_ok=True)
+        new.unlink(missing_ok=True)
+        try:
+            os.link(old, new)
+        except OSError:
+            shutil.copyfile(old, new)
+
+
+def _description(folder: Path, number: int) -> Path:
+    return folder / _FOLDER / f"part-{number:05}.json"
+
+
+def _to_json(segment: Segment) -> str:
+    fields = asdict(segment)
+    fields["files"] = {name: [part.bytes, part.sha256, part.rows] for name, part in segment.files.items()}
+    for key in ("recordings", "by_map"):
+        fields[key] = {name: [counts["frames"], counts["objects"]] for name, counts in fields[key].items()}
+    return json.dumps(fields, ensure_ascii=False, separators=(",", ":")) + "\n"
+
+
+def _from_json(fields: dict[str, Any]) -> Segment:
+    span = fields["span_us"]
+    return Segment(
+        fingerprint=fields["fingerprint"],
+        files={name: Part("", *fields["files"][name]) for name in SEGMENT_TABLES},
+        recordings={name: Counts(*counts) for name, counts in fields["recordings"].items()},
+        by_map={name: Counts(*counts) for name, counts in fields["by_map"].items()},
+        by_class=fields["by_class"],
+        by_source_class=fields["by_source_class"],
+        tracks=fields["tracks"],
+        span_us=None if span is None else (span[0], span[1]),
+        counts=tuple((what, code, name, kept, count) for what, code, name, kept, count in fields["counts"]),
+        told=tuple(_problem(entry) for entry in fields["told"]),
+    )
+
+
+def _problem(fields: dict[str, Any]) -> Problem:
+    what, code, name, kept, message = (fields[key] for key in ("what", "code", "name", "kept", "message"))
+    return Problem(what, code, name, kept, message, tuple(fields["hints"]))

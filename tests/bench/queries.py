@@ -1,0 +1,74 @@
+"""Wall times of the whole command: the five sample scenarios, the start of `--help`, and an ingest.
+
+Runs on the recordings beside this checkout where there are any, else on the sample data. Prints a table and writes
+the numbers to bench-results/.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+RECORDINGS = ROOT.parent / "shared" / "data" / "boston"
+RESULTS = ROOT / "bench-results"
+COMMAND = str(Path(sys.executable).with_name("scenicq"))
+SETTING = ("--tolerance", "x=0.25,y=0.25,heading=5deg", "--classes", "coarse", "--radius", "50", "--format", "ids")
+ROUNDS = 5
+
+
+def timed(*args: object) -> tuple[float, str]:
+    """Seconds that a command takes, and its output; exit code 1 means that nothing matched."""
+    started = time.perf_counter()
+    done = subprocess.run([COMMAND, *map(str, args)], capture_output=True, text=True, check=False)
+    elapsed_s = time.perf_counter() - started
+    if done.returncode not in (0, 1):
+        sys.exit(done.stderr)
+    return elapsed_s, done.stdout
+
+
+def median(*args: object) -> tuple[float, str]:
+    """The median of several runs, and the output of the last."""
+    runs = [timed(*args) for _ in range(ROUNDS)]
+    return statistics.median(seconds for seconds, _ in runs), runs[-1][1]
+
+
+def measure(source: Path, folder: Path) -> dict[str, dict[str, float]]:
+    """All measurements: name, then what is measured."""
+    dataset = folder / "dataset"
+    found: dict[str, dict[str, float]] = {"--help": {"seconds": median("--help")[0]}}
+    seconds, _ = timed("ingest", source, dataset, "-q")
+    objects = json.loads((dataset / "dataset.json").read_text())["total"]["objects"]
+    found["ingest"] = {"seconds": seconds, "objects": objects, "objects per second": objects / seconds}
+    for scenario in sorted((ROOT / "sample_data" / "scenarios").glob("*.scenic")):
+        seconds, output = median("match", scenario, dataset, *SETTING)
+        found[scenario.stem] = {"seconds": seconds, "matches": len(output.splitlines())}
+    return found
+
+
+def main() -> None:
+    """Measure, print and keep."""
+    source = RECORDINGS if RECORDINGS.is_dir() else ROOT / "sample_data" / "crossroads"
+    if source != RECORDINGS:
+        print(f"{RECORDINGS} is not there: the sample data is measured instead")
+    with tempfile.TemporaryDirectory() as folder:
+        found = measure(source, Path(folder))
+    print(f"{source.name}, median of {ROUNDS} runs")
+    for name, numbers in found.items():
+        rest = ", ".join(f"{number:,.0f} {what}" for what, number in numbers.items() if what != "seconds")
+        print(f"  {name:28} {numbers['seconds']:8.2f} s  {rest}".rstrip())
+    now = datetime.now(UTC)
+    RESULTS.mkdir(exist_ok=True)
+    content = {"time": now.isoformat(), "python": platform.python_version(), "source": source.name, "results": found}
+    (RESULTS / f"{now:%Y%m%dT%H%M%S}.json").write_text(json.dumps(content, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

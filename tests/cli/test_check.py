@@ -1,0 +1,79 @@
+"""`scenicq check`."""
+
+import json
+
+import pytest
+
+
+@pytest.fixture
+def mistake(tmp_path):
+    file = tmp_path / "mistake.scenic"
+    file.write_text("model scenic.domains.driving.model\nego = new Car facing roadDirecton\n")
+    return file
+
+
+def test_every_sample_is_sound_on_every_map(run, scenarios, crossroads):
+    town = scenarios.parent / "crossroads" / "maps" / "crossroads.geojson"
+    for file in sorted(scenarios.glob("*.scenic")):
+        for extra in ([], [crossroads], ["--map", town]):
+            result = run("check", file, *extra)
+            assert (result.exit_code, result.stderr) == (0, "")
+            assert result.stdout.startswith("ok on map ")
+
+
+def test_it_says_how_the_scenario_is_read(run, scenarios, crossroads):
+    told = run("check", scenarios / "02_crossing_cars.scenic", crossroads).stdout
+    assert told == (
+        "ok on map crossroads: 3 objects (ego: Car, leftward: Car, rightward: Car), 2 requirements, read as Scenic 3\n"
+    )
+
+
+def test_a_mistake_is_shown_once(run, mistake, crossroads):
+    result = run("check", mistake, crossroads)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith("error[unknown-name]")
+    assert result.stderr.count("error[") == 1
+
+
+def test_json_gives_place_and_hints(run, mistake):
+    result = run("check", mistake, "--format", "json")
+    (found,) = json.loads(result.stdout)
+    assert (result.exit_code, result.stderr) == (2, "")
+    assert list(found) == [
+        "code", "message", "severity", "file", "line", "column", "end_line", "end_column", "label", "notes", "hints",
+    ]  # fmt: skip
+    place = [found[key] for key in ("code", "severity", "file", "line", "column", "end_line", "end_column")]
+    assert place == ["unknown-name", "error", str(mistake), 2, 22, 2, 34]
+    assert any("roadDirection" in hint for hint in found["hints"])
+
+
+def test_json_without_problems_is_an_empty_list(run, scenarios):
+    assert json.loads(run("check", scenarios / "01_pedestrian_facing_ego.scenic", "--format", "json").stdout) == []
+
+
+def test_a_version_that_does_not_fit_is_an_error(run, scenarios):
+    file = scenarios / "01_pedestrian_facing_ego.scenic"
+    result = run("check", file, "--scenic", "2")
+    assert (result.exit_code, result.stderr.partition("\n")[0].partition(":")[0]) == (2, "error[parse-error]")
+    assert run("check", file, "--scenic", "3").exit_code == 0
+    assert run("check", file, "--scenic", "4").stderr.startswith("Usage:")
+
+
+@pytest.mark.parametrize(
+    ("args", "code"),
+    [
+        (["no.scenic"], "file-missing"),
+        (["SCENARIO", "nowhere"], "store-missing"),
+        (["SCENARIO", "--map", "no.geojson"], "file-missing"),
+        (["SCENARIO", "--map", "SCENARIO"], "file-invalid"),
+        (["SCENARIO", "DATASET", "--map", "SCENARIO"], "option-invalid"),
+    ],
+)
+def test_bad_input_gives_one_diagnostic(run, scenarios, crossroads, args, code):
+    names = {"SCENARIO": scenarios / "01_pedestrian_facing_ego.scenic", "DATASET": crossroads}
+    words = [names.get(arg, arg) for arg in args]
+    result = run("check", *words)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"error[{code}]: ")
+    (found,) = json.loads(run("check", *words, "--format", "json").stdout)
+    assert (found["code"], found["line"]) == (code, None)

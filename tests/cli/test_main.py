@@ -1,0 +1,145 @@
+"""The command as a whole: start, help, errors, interrupts and closed pipes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import click
+import pytest
+
+import scenicq_cli.info
+from scenicq_cli.main import COMMANDS, cli
+
+HEAVY = {"duckdb", "pyarrow", "numpy", "shapely", "highspy", "dreal", "tqdm"}
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_help_and_version_import_nothing_heavy(option):
+    program = (
+        "import sys; from scenicq_cli.main import cli\n"
+        f"try: cli([{option!r}], prog_name='scenicq')\n"
+        "finally: print(*sorted({name.partition('.')[0] for name in sys.modules}), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert "scenicq" in done.stdout
+    assert HEAVY.isdisjoint(done.stderr.split())
+
+
+def test_the_list_of_commands_is_what_their_own_help_says():
+    context = click.Context(cli)
+    for name, summary in COMMANDS.items():
+        command = cli.get_command(context, name)
+        assert command.name == name
+        assert command.help.splitlines()[0] == summary
+
+
+def test_an_unknown_command_names_a_near_one(run):
+    result = run("macth")
+    assert result.exit_code == 2
+    assert "Did you mean 'match'?" in result.stderr
+    assert "Did you mean" not in run("qqqq").stderr
+
+
+@pytest.mark.parametrize("args", [["match"], ["match", "--nope", "a", "b"], ["ingest", "a", "b", "--jobs", "0"], []])
+def test_usage_errors_exit_with_2_and_print_no_result(run, args):
+    result = run(*args)
+    assert result.exit_code == 2
+    assert "Usage: scenicq" in result.stderr
+    assert result.stdout == ""
+
+
+def test_our_own_mistakes_become_one_line_and_a_file(run, crossroads, monkeypatch, tmp_path):
+    def broken(_):
+        raise ZeroDivisionError("a mistake of ours")
+
+    monkeypatch.setattr(scenicq_cli.info, "open_dataset", broken)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    result = run("info", crossroads)
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    (file,) = tmp_path.iterdir()
+    assert line.startswith("internal error:")
+    assert line.endswith(str(file))
+    assert "ZeroDivisionError: a mistake of ours" in file.read_text()
+
+
+def test_options_come_from_the_environment(run, crossroads, scenarios):
+    args = ("match", scenarios / "02_crossing_cars.scenic", crossroads)
+    assert len(run(*args, env={"SCENICQ_MATCH_LIMIT": "2"}).stdout.splitlines()) == 2
+    assert run(*args, env={"SCENICQ_MATCH_LIMIT": "none"}).exit_code == 2
+
+
+def test_a_closed_pipe_is_silent(command, crossroads, scenarios, tmp_path):
+    words = [command, "match", str(scenarios / "01_pedestrian_facing_ego.scenic"), str(crossroads), "--all"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as process:
+        first = process.stdout.readline()
+        process.stdout.close()
+        noise = process.stderr.read()
+        assert process.wait(60) == 0
+    assert json.loads(first)["frame"] == "01-quiet-street/00"
+    assert noise == b""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
+def test_a_full_disk_is_told(command, crossroads, scenarios):
+    words = [command, "match", str(scenarios / "02_crossing_cars.scenic"), str(crossroads)]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error[target-unwritable]: standard output cannot be written")
+
+
+@pytest.fixture(scope="module")
+def big_source(tmp_path_factory):
+    """The sample recordings many times over, so that an ingest takes seconds."""
+    samples = Path(__file__).parents[2] / "sample_data" / "crossroads"
+    source = tmp_path_factory.mktemp("big") / "source"
+    (source / "maps").mkdir(parents=True)
+    for name in ("dataset.json", "maps/crossroads.geojson"):
+        (source / name).write_bytes((samples / name).read_bytes())
+    lines = (samples / "labels.jsonl").read_text().splitlines()
+    with (source / "labels.jsonl").open("w") as file:
+        for copy in range(150):
+            for line in lines:
+                label = json.loads(line)
+                label |= {"id": f"{copy:03}-{label['id']}", "recording": f"{copy:03}-{label['recording']}"}
+                file.write(json.dumps(label) + "\n")
+    return source
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_ingest_leaves_nothing(command, big_source, tmp_path, number):
+    words = [command, "ingest", str(big_source), str(tmp_path / "dataset"), "-q"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        # it has begun as soon as something is written beside the target
+        deadline = time.monotonic() + 60
+        while not any(tmp_path.iterdir()) and process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert process.poll() is None
+        process.send_signal(number)
+        out, told = process.communicate(timeout=60)
+    assert (process.returncode, out, told) == (130, "", "interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_match_leaves_no_file(command, crossroads, scenarios, tmp_path, number):
+    file = tmp_path / "matches.jsonl"
+    slow = ("--no-prefilter", "--method", "smt", "--solver", "portable", "--all")
+    words = [command, "match", str(scenarios / "04_two_lane_traffic.scenic"), str(crossroads), "-o", str(file), *slow]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 60
+        while not any(tmp_path.iterdir()) and process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert process.poll() is None
+        process.send_signal(number)
+        _, told = process.communicate(timeout=60)
+    assert (process.returncode, told) == (130, "interrupted\n")
+    assert list(tmp_path.iterdir()) == []

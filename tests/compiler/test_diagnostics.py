@@ -1,0 +1,89 @@
+"""Every refusal names the construct, points at the smallest text, and says what to do."""
+
+import pytest
+
+from scenicq.errors import ScenarioError
+
+from .scenes import compiled, refused
+
+CASES = {
+    "x = new Car\nego = x\n": ("unknown-name", "Car"),
+    "ego = Object\nnew Object\n": ("wrong-type", "ego"),
+    "new Object\n": ("no-ego", "n"),
+    "new Object offset by (1, 2)\n": ("no-ego", "offset by (1, 2)"),
+    "ego = 3\n": ("wrong-type", "ego"),
+    "ego = new Object at (1, 2), at (3, 4)\n": ("specifier-conflict", "at (3, 4)"),
+    "ego = new Object left of (0, 0), facing toward (1, 1)\n": ("specifier-cycle", "facing toward (1, 1)"),
+    "ego = new Object with pitch 3\n": ("unsupported-construct", "with pitch 3"),
+    "ego = new Object on (1, 2, 3)\n": ("unsupported-construct", "on (1, 2, 3)"),
+    "ego = new Object using f()\n": ("unknown-name", "f"),
+    "ego = new Object\nnew Object above ego by 1\n": ("unsupported-construct", "above ego by 1"),
+    "ego = new Object\nrequire 1 > 2\n": ("impossible-requirement", "require 1 > 2"),
+    "ego = new Object\nrequire always 1 > 2\n": ("unsupported-construct", "always 1 > 2"),
+    "ego = new Object with headingStdDev 0\nmutate\n": ("unsupported-construct", "with headingStdDev 0"),
+    "class A(Object, Point):\n    pass\nego = new A\n": ("unsupported-construct", "Point"),
+    "class A:\n    def __init__(self):\n        pass\nego = new A\n": ("unsupported-construct", "__init__"),
+    "class A:\n    pitch: 3\nego = new A\n": ("unsupported-construct", "pitch"),
+    "class A[1]:\n    pass\nego = new A\n": ("parse-error", "["),
+    "import numpy\nego = new Object\n": ("unknown-model", "numpy"),
+    "from scenic.domains.driving.roads import Lame\nego = new Object\n": ("unknown-name", "Lame"),
+    "behavior B():\n    wait\nego = new Object\n": ("unsupported-construct", "behavior B():"),
+    "x = Uniform()\nego = new Object\n": ("map-lacks", "Uniform()"),
+    "for i in range(Range(1, 2)):\n    pass\nego = new Object\n": ("random-branch", "range(Range(1, 2))"),
+}
+
+
+@pytest.mark.parametrize("text", CASES)
+def test_a_refusal_points_at_its_cause(text: str) -> None:
+    assert refused(text, 3) == CASES[text]
+
+
+@pytest.mark.parametrize("text", [text for text in CASES if CASES[text][0] == "unsupported-construct"])
+def test_what_is_not_supported_says_what_to_do(text: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        compiled(text, 3)
+    assert caught.value.diagnostics[0].hints
+
+
+def test_dynamic_parts_are_ignored_on_request() -> None:
+    text = (
+        "from scenic.domains.driving.behaviors import FollowLaneBehavior\nmodel scenic.domains.driving.model\n"
+        "behavior B():\n    wait\nego = new Car with behavior B()\nnew Car with behavior FollowLaneBehavior(3)\n"
+        "require always ego in road\nrequire eventually ego in curb\nterminate after 5 seconds\n"
+    )
+    assert refused(text)[0] == "unsupported-construct"
+    scenario = compiled(text, initial=True)
+    assert len(scenario.ignored) == 7
+    assert len([each for each in scenario.requirements if each.built_in is None]) == 1
+
+
+def test_objects_in_the_setup_of_a_scenario_are_not_lost_in_silence() -> None:
+    text = "scenario Main():\n    setup:\n        ego = new Object\n"
+    with pytest.raises(ScenarioError, match="outside of its dynamic parts"):
+        compiled(text, initial=True)
+
+
+def test_an_ego_set_in_a_function_is_the_ego() -> None:
+    text = "def make(x):\n    ego = new Object at (x, 0)\n    return ego\nfirst = make(1)\nmake(2)\n"
+    scenario = compiled(text)
+    assert scenario.ego == 1
+    assert [thing.name for thing in scenario.objects] == ["first", "ego"]
+
+
+def test_a_method_gets_its_object() -> None:
+    scenario = compiled(
+        "class A:\n    size: 3\n    def twice(self, n):\n        return self.size * n\nego = new A\nparam x = ego.twice(2)\n"
+    )
+    assert scenario.params["x"].value.value == 6.0  # type: ignore[union-attr]
+
+
+def test_files_beside_the_program_can_be_imported() -> None:
+    from scenicq.errors import Source
+
+    files = {"lib.scenic": "width = 3\ndef place(x):\n    return new Object at (x, 0), with width width\n"}
+
+    def loader(name: str) -> Source | None:
+        return Source(name, files[name]) if name in files else None
+
+    scenario = compiled("from lib import place\nego = place(1)\nplace(2)\n", 3, loader=loader)
+    assert [thing.properties["width"].value.value for thing in scenario.objects] == [3.0, 3.0]  # type: ignore[union-attr]

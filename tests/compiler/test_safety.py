@@ -1,0 +1,84 @@
+"""Hostile programs end soon, with a diagnostic, and reach nothing of Python."""
+
+import time
+
+import pytest
+
+from .scenes import compiled, refused
+
+END = "ego = new Object\n"
+HOSTILE = {
+    "endless loop": "while True:\n    pass\n",
+    "growing list": "l = []\nwhile True:\n    l.append(1)\n",
+    "growing string": "s = 'a'\nfor i in range(100):\n    s = s + s\n",
+    "growing replacement": "s = 'a' * 50000\nt = s.replace('a', s)\n",
+    "many long lists": "l = []\nfor i in range(50000):\n    l.append(list(range(50000)))\n",
+    "nested multiplication": "l = [0] * 1000\nfor i in range(10):\n    l = [l] * 1000\nx = l == [l]\n",
+    "shared lists compared": "a = [0]\nb = [0]\nfor i in range(60):\n    a = [a, a]\n    b = [b, b]\nx = a == b\n",
+    "shared lists searched": "a = [0]\nb = [0]\nfor i in range(60):\n    a = [a, a]\n    b = [b, b]\nx = [b].index(a)\n",
+    "shared tuples hashed": "t = (0,)\nfor i in range(60):\n    t = (t, t)\nd = {t: 1}\n",
+    "a list in itself": "l = []\nl.append(l)\nx = l == [l]\n",
+    "huge power": "x = 10 ** 10 ** 8\n",
+    "huge shift": "x = 1 << 10 ** 9\n",
+    "repeated squares": "x = 3\nfor i in range(100):\n    x = x * x\n",
+    "endless recursion": "def f(n):\n    return f(n + 1)\nx = f(0)\n",
+    "exploding recursion": "def f(n):\n    return [f(n - 1), f(n - 1)] if n else 0\nx = f(30)\n",
+    "exploding choice": "a = new Point\nx = Uniform(a, new Point)\nfor i in range(60):\n    x = Uniform(x, x, a)\n",
+    "exploding region": (
+        "r = CircularRegion((0, 0), 1)\nq = CircularRegion((1, 0), 1)\n"
+        "for i in range(60):\n    r = r.union(q).intersect(r.union(r.difference(q)))\n"
+    ),
+    "endless objects": "ego = new Object\nfor i in range(90000):\n    new Object at (i, 0)\n",
+    "searching": "l = list(range(50000))\nwhile True:\n    x = -1 in l\n",
+    "sorting": "l = list(range(50000))\nwhile True:\n    l = sorted(l)\n",
+    "a class of itself": "class A:\n    part: new A\nego = new A\n",
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_program_ends(name: str) -> None:
+    start = time.process_time()
+    assert refused(HOSTILE[name] + END)[0] == "budget-exceeded"
+    assert time.process_time() - start < 4
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("x = ''.__class__", "unsupported-construct"),
+        ("x = (lambda: 1).__globals__", "unsupported-construct"),
+        ("x = '{0.__class__}'.format(1)", "unknown-attribute"),
+        ("x = '%1000000000d' % 1", "unsupported-construct"),
+        ("x = f'{1:>1000000000}'", "unsupported-construct"),
+        ("x = round(5, -10 ** 9)", "runtime-error"),
+        ("x = int('9' * 50000)", "runtime-error"),
+        ("x = open('/etc/passwd')", "unknown-name"),
+        ("x = eval('1')", "unknown-name"),
+        ("x = getattr(1, 'real')", "unknown-name"),
+        ("x = (1).real", "unknown-attribute"),
+        ("x = str.mro", "unknown-attribute"),
+        ("x = Object.ancestry", "unknown-attribute"),
+        ("import os", "unknown-model"),
+        ("x = str([1])", "wrong-arity"),
+        ("x = {}.pop(Range(0, 1))", "runtime-error"),
+    ],
+)
+def test_python_is_out_of_reach(text: str, code: str) -> None:
+    assert refused(f"{text}\n{END}")[0] == code
+
+
+def test_a_long_program_compiles_fast() -> None:
+    lines = ["model scenic.domains.driving.model", "ego = new Car"]
+    for number in range(50):
+        lines += [
+            f"a{number} = Range({number}, 90)",
+            f"b{number} = a{number} + 1",
+            f"def f{number}(x):",
+            "    return x * 2",
+        ]
+        lines += [f"c{number} = new Car offset by (f{number}(b{number}), a{number})", f"require a{number} < 80"]
+    text = "\n".join(lines) + "\n"
+    compiled(text)
+    start = time.process_time()
+    assert len(compiled(text).objects) == 51
+    assert time.process_time() - start < 0.6

@@ -1,0 +1,4 @@
+# sharp: position heading
+model scenic.domains.driving.model
+ego = new Car
+new Car ahead of ego by Range(4, 10)

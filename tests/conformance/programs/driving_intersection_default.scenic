@@ -1,0 +1,2 @@
+model scenic.domains.driving.model
+ego = new Car in intersection

@@ -1,0 +1,3 @@
+# sharp: heading
+model scenic.domains.driving.model
+ego = new Car on Uniform(*network.laneGroups)

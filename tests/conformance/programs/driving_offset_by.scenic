@@ -1,0 +1,4 @@
+# sharp: heading
+model scenic.domains.driving.model
+ego = new Car
+new Car offset by (Range(-2, 2), Range(6, 10))

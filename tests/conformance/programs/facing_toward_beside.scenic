@@ -1,0 +1,3 @@
+# sharp: position heading
+ego = new Object at (3, -4), facing 40 deg, with width 2, with length 5
+new Object left of ego by 7, facing toward (40, 40)

@@ -1,0 +1,4 @@
+# scenic refuses
+ego = new Object at (3, -4), facing 40 deg, with width 2, with length 5
+other = new Object at (20, 5)
+new Object at ego relative to other

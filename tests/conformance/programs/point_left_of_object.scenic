@@ -1,0 +1,4 @@
+# sharp: position heading
+ego = new Object at (3, -4), facing 40 deg, with width 2, with length 5
+a = new Point right of ego by 8
+new Object at a

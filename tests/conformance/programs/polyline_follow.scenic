@@ -1,0 +1,5 @@
+# sharp: heading
+ego = new Object at (3, -4), facing 40 deg, with width 2, with length 5
+line = PolylineRegion([(20, 0), (30, 5), (30, 20)])
+spot = new OrientedPoint on line
+new Object right of spot by 2, facing 30 deg relative to spot.heading

@@ -1,0 +1,84 @@
+"""What all tests share: golden files, the sample data, and the command line run in this process."""
+
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from scenicq.importers.ingest import ingest
+from scenicq_cli.main import cli
+
+ROOT = Path(__file__).parents[1]
+SAMPLES = ROOT / "sample_data"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update-golden", action="store_true", help="write golden files instead of comparing with them")
+
+
+@pytest.fixture
+def golden(request: pytest.FixtureRequest) -> Callable[[str], None]:
+    """Compare a text with tests/golden/<module>/<test>.txt; `make golden` rewrites the files."""
+    here = Path(__file__).parent
+    file = here / "golden" / request.path.relative_to(here).with_suffix("") / f"{request.node.name}.txt"
+
+    def check(actual: str) -> None:
+        if request.config.getoption("--update-golden"):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(actual, encoding="utf-8")
+        expected = file.read_text(encoding="utf-8") if file.exists() else ""
+        assert actual == expected, f"differs from {file.relative_to(here)}: `make golden` rewrites it"
+
+    return check
+
+
+@pytest.fixture(scope="session")
+def scenarios() -> Path:
+    """The folder of the sample scenarios."""
+    return SAMPLES / "scenarios"
+
+
+@pytest.fixture(scope="session")
+def crossroads(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The dataset made from the sample recordings; only to be read."""
+    target = tmp_path_factory.mktemp("datasets") / "crossroads"
+    ingest(SAMPLES / "crossroads", target)
+    return target
+
+
+@pytest.fixture
+def run() -> Callable[..., Result]:
+    """Run `scenicq` with arguments in this process."""
+
+    def invoke(*args: object, env: dict[str, str] | None = None) -> Result:
+        return CliRunner().invoke(cli, [str(arg) for arg in args], prog_name="scenicq", env=env)
+
+    return invoke
+
+
+@pytest.fixture(scope="session")
+def installed() -> Callable[..., "subprocess.CompletedProcess[str]"]:
+    """Run the installed command `scenicq` as a process, in a folder."""
+    command = command_path()
+
+    def execute(*args: object, cwd: Path, **more: object) -> "subprocess.CompletedProcess[str]":
+        words: Sequence[str] = [command, *(str(arg) for arg in args)]
+        return subprocess.run(words, cwd=cwd, capture_output=True, text=True, timeout=120, check=False, **more)
+
+    return execute
+
+
+def command_path() -> str:
+    """The installed command beside this interpreter."""
+    found = Path(sys.executable).with_name("scenicq")
+    assert found.exists(), "scenicq is not installed: `make setup`"
+    return str(found)
+
+
+@pytest.fixture(scope="session")
+def command() -> str:
+    """Path of the installed command."""
+    return command_path()

@@ -1,0 +1,79 @@
+"""Two result files compared."""
+
+import json
+
+import pytest
+
+from scenicq.errors import DataError
+from scenicq.report.changes import changes, changes_page, changes_text, read_results
+
+
+def _line(frame, verdict="match", recording="r", time=0, **more):
+    roles = {"ego": "ego", "car": more.pop("car", "a")} if verdict == "match" else {}
+    return {
+        "frame": frame,
+        "recording": recording,
+        "timestamp_us": time,
+        "verdict": verdict,
+        "correspondence": roles,
+        **more,
+    }
+
+
+@pytest.fixture
+def files(tmp_path):
+    before = [_line("stay", time=3), _line("go", time=1), _line("swap", time=2), _line("no", "no_match")]
+    cause = {"what": "car.position", "detail": "2 m off"}
+    after = [
+        _line("stay", time=3),
+        _line("swap", time=2, car="b"),
+        _line("new", recording="q"),
+        _line("go", "no_match", time=1, cause=cause),
+        _line("stay", time=3, car="z"),
+    ]
+    paths = (tmp_path / "a.jsonl", tmp_path / "b.jsonl")
+    for path, records in zip(paths, (before, after), strict=True):
+        path.write_text("\n".join(map(json.dumps, records)) + "\n")
+    return paths
+
+
+def test_what_came_went_and_stayed(files):
+    found = changes(*map(read_results, files))
+    assert [(each.kind, each.frame) for each in found] == [
+        ("came", "new"),
+        ("went", "go"),
+        ("recast", "swap"),
+        ("stayed", "stay"),
+    ]
+    assert found[1].why == "no match: car.position, 2 m off"
+    same = changes(read_results(files[0]), read_results(files[0]))
+    assert {each.kind for each in same} == {"stayed"}
+
+
+def test_text_and_page(files):
+    found = changes(*map(read_results, files))
+    text = changes_text(found)
+    assert "  - go  car=a; no match: car.position, 2 m off" in text
+    assert "  ~ swap  car=a -> car=b" in text
+    assert "stay  " not in text
+    assert "  = stay  car=a" in changes_text(found, every=True)
+    page = changes_page(found, ("<a>", "b"))
+    assert "&lt;a&gt;" in page
+    assert "script-src &#39;none&#39;" in page
+    assert "<script" not in page
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", '{"frame": 1}', '{"frame": "a", "recording": "b"}'])
+def test_other_files_are_refused(tmp_path, text):
+    file = tmp_path / "x.jsonl"
+    file.write_text(text)
+    with pytest.raises(DataError, match=r"line 1 is"):
+        read_results(file)
+
+
+def test_missing_files_are_told(tmp_path):
+    with pytest.raises(DataError, match=r"file-missing"):
+        read_results(tmp_path / "none.jsonl")
+    (tmp_path / "b.jsonl").write_bytes(b"\xff\xfe")
+    with pytest.raises(DataError, match=r"UTF-8"):
+        read_results(tmp_path / "b.jsonl")

@@ -1,0 +1,207 @@
+"""The report in a browser: it works by mouse and by keyboard, and the console stays silent."""
+
+import time
+
+import pytest
+
+from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.report import write
+from scenicq.report.write import write_report
+from scenicq.store.dataset import open_dataset
+
+from .browser import CHROMIUM, DRIVER, browser
+
+pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no Chromium with its driver")
+
+RIGHT, LEFT, ESCAPE = "\ue014", "\ue012", "\ue00c"
+STATE = """
+const run = document.querySelector(arguments[0]);
+return {
+  at: run.querySelector('output').textContent,
+  facts: [...run.querySelectorAll('.frame')].map(each => each.checkVisibility()),
+  shots: [...run.querySelectorAll('g.shot')].map(each => getComputedStyle(each).display !== 'none'),
+  box: run.querySelector('.picture').getAttribute('viewBox'),
+  name: run.querySelector('.picture').getAttribute('aria-label'),
+};
+"""
+SHOWN = "return [...document.querySelectorAll('.run')].filter(each => each.checkVisibility()).map(each => each.id)"
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory, crossroads, scenarios):
+    """A report of a scenario with matches in several recordings, everything inside; and one with pictures beside."""
+    folder = tmp_path_factory.mktemp("reports")
+    program = folder / "near.scenic"
+    program.write_text(
+        "model scenic.domains.driving.model\nego = new Car\nother = new Car offset by (Range(-9, 9), Range(3, 20))\n"
+    )
+    options = QueryOptions(
+        match=MatchOptions(tolerance=parse_tolerance("position=0.25,heading=5deg"), classes="coarse")
+    )
+    query = Query(open_dataset(crossroads), read_program(program), options)
+    results = list(query.results())
+    inside = write_report(query, results, folder / "inside", command="scenicq match 'a b.scenic' town")
+    old, write.INLINE = write.INLINE, 1
+    try:
+        beside = write_report(query, results, folder / "beside")
+    finally:
+        write.INLINE = old
+    return inside, beside
+
+
+@pytest.fixture
+def opened(chromium, report):
+    chromium.console()
+    chromium.resize(1280, 900)
+    chromium.open(report[0])
+    yield chromium
+    assert chromium.console() == []
+
+
+def _state(page, run="#run-1"):
+    return page.run(STATE, run)
+
+
+def _long_run(page):
+    """A run of at least three frames."""
+    return page.run("return '#' + [...document.querySelectorAll('.run')].find(e => Number(e.dataset.length) > 2).id")
+
+
+def test_the_slider_shows_one_frame_after_the_other(opened):
+    run = _long_run(opened)
+    first = _state(opened, run)
+    count = len(first["shots"])
+    assert first["at"] == f"1 / {count}"
+    assert first["facts"] == first["shots"] == [True] + [False] * (count - 1)
+    opened.click(f"{run} .on")
+    second = _state(opened, run)
+    assert second["facts"] == second["shots"] == [False, True] + [False] * (count - 2)
+    assert second["name"] != first["name"]
+    opened.run(
+        "const s = document.querySelector(arguments[0]); s.value = s.max; s.dispatchEvent(new Event('input'))",
+        f"{run} input",
+    )
+    assert _state(opened, run)["at"] == f"{count} / {count}"
+    opened.click(f"{run} .on")
+    assert _state(opened, run)["at"] == f"{count} / {count}"
+    for _ in range(count):
+        opened.click(f"{run} .back")
+    assert _state(opened, run) == first
+
+
+def test_keys_walk_through_runs_and_frames(opened):
+    focus = "return document.activeElement.id"
+    opened.run("document.activeElement.blur()")
+    opened.press("j")
+    assert opened.run(focus) == "run-1"
+    opened.press("j")
+    assert opened.run(focus) == "run-2"
+    opened.press("k")
+    assert opened.run(focus) == "run-1"
+    run = _long_run(opened)
+    opened.run("document.querySelector(arguments[0]).focus()", run)
+    opened.press(RIGHT)
+    opened.press(RIGHT)
+    opened.press(LEFT)
+    assert _state(opened, run)["at"].startswith("2 /")
+    opened.press("/")
+    assert opened.run(focus) == "filter"
+    opened.press("j")
+    assert opened.run("return document.getElementById('filter').value") == "j"
+    opened.press(ESCAPE)
+    assert opened.run("return document.getElementById('filter').value") == ""
+
+
+def test_filter_and_sort(opened):
+    every = opened.run(SHOWN)
+    recordings = opened.run("return [...document.querySelectorAll('.run')].map(each => each.dataset.recording)")
+    assert len(set(recordings)) > 1
+    opened.type("#filter", recordings[-1].upper())
+    left = opened.run(SHOWN)
+    assert left == [run for run, name in zip(every, recordings, strict=True) if name == recordings[-1]]
+    assert opened.run("return document.getElementById('shown').textContent").endswith(
+        f"in {len(left)} run{'s' * (len(left) > 1)}"
+    )
+    opened.press(ESCAPE)
+    assert opened.run(SHOWN) == every
+    opened.run(
+        "const s = document.getElementById('sort'); s.value = '-data-length'; s.dispatchEvent(new Event('change'))"
+    )
+    lengths = opened.run("return [...document.querySelectorAll('.run')].map(each => Number(each.dataset.length))")
+    assert lengths == sorted(lengths, reverse=True)
+
+
+def test_the_command_is_copied(opened):
+    address = opened.run("return location.href")
+    opened.command("Browser.grantPermissions", permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])
+    opened.click("#copy")
+    deadline = time.monotonic() + 5
+    while not (told := opened.run("return document.getElementById('copied').textContent")):
+        assert time.monotonic() < deadline
+    assert told == "Copied"
+    assert opened.run("return navigator.clipboard.readText()") == "scenicq match 'a b.scenic' town"
+    assert opened.run("return location.href") == address
+
+
+@pytest.mark.parametrize(("width", "phone"), [(1280, False), (390, True), (320, True)])
+def test_nothing_is_wider_than_the_screen(opened, width, phone):
+    opened.resize(width, 800, phone=phone)
+    assert opened.run("return document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_text_has_contrast(opened, dark):
+    opened.resize(1280, 900, dark=dark)
+    ratio = """
+    const level = color => {
+      const [r, g, b] = color.match(/[\\d.]+/g).slice(0, 3).map(v => v / 255)
+        .map(v => v <= .04045 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
+      return .2126 * r + .7152 * g + .0722 * b;
+    };
+    const behind = e => {
+      for (; e; e = e.parentElement) {
+        const found = getComputedStyle(e).backgroundColor;
+        if (!found.endsWith(', 0)')) return found;
+      }
+    };
+    return [...document.querySelectorAll('p, th, td, h1, h2, h3, span, button, .chip, .badge, label')]
+      .filter(e => e.textContent && e.checkVisibility() && !e.closest('svg'))
+      .map(e => [e.className || e.tagName, level(getComputedStyle(e).color), level(behind(e))])
+      .map(([name, a, b]) => [name, (Math.max(a, b) + .05) / (Math.min(a, b) + .05)])
+      .filter(([, contrast]) => contrast < 4.5);
+    """
+    assert opened.run(ratio) == []
+
+
+def test_every_control_has_a_name(opened):
+    nameless = """
+    return [...document.querySelectorAll('button, input, select, svg[role=img], img')].filter(e =>
+      !(e.getAttribute('aria-label') || e.getAttribute('alt') || e.textContent.trim() || (e.labels && e.labels.length)))
+      .map(e => e.outerHTML.slice(0, 80));
+    """
+    assert opened.run(nameless) == []
+
+
+def test_pictures_beside_the_page_are_loaded_as_they_are_seen(chromium, report):
+    chromium.console()
+    chromium.resize(1280, 900)
+    started = time.monotonic()
+    chromium.open(report[1])
+    loaded = "const i = document.querySelector(arguments[0]); return i.complete && i.naturalWidth > 0"
+    while not chromium.run(loaded, "#run-1 img.picture"):
+        assert time.monotonic() - started < 5
+    run = _long_run(chromium)
+    source = "return document.querySelector(arguments[0]).getAttribute('src')"
+    before = chromium.run(source, f"{run} img.picture")
+    chromium.click(f"{run} .on")
+    assert chromium.run(source, f"{run} img.picture") != before
+    while not chromium.run(loaded, f"{run} img.picture"):
+        assert time.monotonic() - started < 10
+    assert chromium.console() == []

@@ -1,0 +1,246 @@
+"""The report of a query as a file: complete, self-contained, escaped, replaced only where it is ours."""
+
+import json
+import re
+import shutil
+from collections import Counter
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from scenicq.errors import DataError, ScenicqError
+from scenicq.importers.ingest import ingest
+from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
+from scenicq.query.near import near_results
+from scenicq.query.results import Result
+from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.report import write
+from scenicq.report.runs import find_runs, frame_numbers
+from scenicq.report.sensors import SensorFiles
+from scenicq.report.shares import program_lines
+from scenicq.report.write import check_target, write_report
+from scenicq.store.dataset import open_dataset
+
+OPTIONS = QueryOptions(match=MatchOptions(tolerance=parse_tolerance("position=0.25,heading=5deg")))
+EVIL = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'"
+
+
+class Page(HTMLParser):
+    """What a page is made of."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.attributes, self.texts = [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value) for name, value in attrs]
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+    def values(self, name):
+        return [value for _, key, value in self.attributes if key == name]
+
+
+@pytest.fixture
+def query(crossroads, scenarios):
+    found = Query(open_dataset(crossroads), read_program(scenarios / "02_crossing_cars.scenic"), OPTIONS)
+    return found, list(found.results())
+
+
+def _loads(page):
+    """Addresses that a page loads by itself."""
+    links = {("a", "href")}
+    names = {"src", "href", "srcset", "data", "poster", "action", "xlink:href"}
+    return [v for tag, name, v in page.attributes if name in names and (tag, name) not in links]
+
+
+def test_a_report_needs_nothing_but_itself(query, tmp_path):
+    found, results = query
+    page = write_report(found, results, tmp_path / "r", command="scenicq match 'a b' c")
+    text = page.read_text(encoding="utf-8")
+    parsed = Page(text)
+    assert sorted(path.name for path in (tmp_path / "r").iterdir()) == ["index.html"]
+    assert _loads(parsed) == []
+    assert not re.search(r"url\(|@import|https?://", text)
+    assert parsed.tags.count("script") == parsed.tags.count("style") == 1
+    assert not [name for _, name, _ in parsed.attributes if name.startswith("on") or name == "style"]
+    policy = parsed.values("content")[0]
+    assert policy.startswith("default-src 'none'")
+    assert "unsafe" not in policy
+    shown = " ".join(parsed.texts)
+    assert all(result.frame in shown for result in results)
+    assert "scenicq match 'a b' c" in shown
+    ids = parsed.values("id")
+    assert len(ids) == len(set(ids))
+    assert set(parsed.values("aria-labelledby")) <= set(ids)
+
+
+def test_runs_are_consecutive_frames(query):
+    found, results = query
+    numbers = frame_numbers(found.dataset, {result.recording for result in results})
+    runs = find_runs(results, numbers)
+    assert [result for run in runs for result in run.results] == results
+    for run in runs:
+        assert [numbers[r.frame][0] for r in run.results] == list(range(run.first, run.first + len(run.results)))
+        assert {r.recording for r in run.results} == {run.recording}
+    gap = [r for r in results if r.frame != runs[0].results[1].frame]
+    assert len(find_runs(gap, numbers)) == len(runs) + 1
+    other = Result(results[0].frame, results[0].recording, 0, Unknown("timeout", Cause("x")))
+    assert len(find_runs([other, *results[1:]], numbers)) == len(runs) + 1
+
+
+def test_each_line_has_its_share(query):
+    found, _ = query
+    scenario, _ = found.compile("crossroads")
+    lines, rest = program_lines(scenario, found.funnel.excluded + Counter({"something else": 3}))
+    assert rest == {"something else": 3}
+    assert sum(line.excluded for line in lines) == sum(found.funnel.excluded.values())
+    assert sum(found.funnel.excluded.values()) + found.funnel.matches + found.funnel.unknowns == found.funnel.frames
+    by_number = {line.number: line for line in lines}
+    assert by_number[10].excluded == found.funnel.excluded["leftward.heading"] > 0
+    assert by_number[9].text.startswith("leftward = new Car")
+
+
+def test_hostile_names_are_shown_as_text(crossroads, scenarios, tmp_path):
+    source = tmp_path / "source"
+    shutil.copytree(Path(__file__).parents[2] / "sample_data" / "crossroads", source)
+    lines = (source / "labels.jsonl").read_text().splitlines()
+    evil = json.dumps(EVIL)[1:-1]
+    wanted = [line.replace("car-left-1", evil).replace("03-busy-intersection", evil) for line in lines]
+    wanted = [line.replace("samples/CAM_FRONT/", "javascript:alert(3)//") for line in wanted]
+    (source / "labels.jsonl").write_text("\n".join(wanted) + "\n")
+    ingest(source, tmp_path / "evil")
+    program = tmp_path / "a'\"<b>.scenic"
+    program.write_text((scenarios / "02_crossing_cars.scenic").read_text() + "# </script><b>\n")
+    found = Query(open_dataset(tmp_path / "evil"), read_program(program), OPTIONS)
+    results = list(found.results())
+    assert any(EVIL in result.verdict.correspondence.values() for result in results)
+    text = write_report(found, results, tmp_path / "r", command=EVIL).read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.tags.count("script") == 1
+    assert page.tags.count("img") == 0
+    assert page.tags.count("b") == text.count("<b>")
+    assert any(EVIL in shown for shown in page.texts)
+    assert not [value for value in page.values("href") if "javascript" in value]
+    assert not [name for _, name, _ in page.attributes if name.startswith("on")]
+
+
+def test_more_frames_than_fit_have_pictures_beside(query, tmp_path, monkeypatch):
+    found, results = query
+    monkeypatch.setattr(write, "INLINE", 3)
+    page = Page(write_report(found, results, tmp_path / "r").read_text(encoding="utf-8"))
+    pictures = sorted(path.name for path in (tmp_path / "r" / "pictures").iterdir())
+    assert len(pictures) == len(results)
+    assert sorted(page.values("data-picture")) == [f"pictures/{name}" for name in pictures]
+    assert set(page.values("loading")) == {"lazy"}
+    monkeypatch.setattr(write, "INLINE", 300)
+    write_report(found, results, tmp_path / "r")
+    assert sorted(path.name for path in (tmp_path / "r").iterdir()) == ["index.html"]
+
+
+def test_what_is_left_out_is_told(query, tmp_path, monkeypatch):
+    found, results = query
+    monkeypatch.setattr(write, "MOST", 2)
+    text = write_report(found, results, tmp_path / "r").read_text(encoding="utf-8")
+    assert f"{len(results) - 2} more frames are not shown" in text
+    assert results[2].frame not in text
+
+
+def test_near_misses_say_what_they_lack(query, tmp_path):
+    found, results = query
+    near = near_results(found, 1)
+    text = write_report(found, results, tmp_path / "r", near=near).read_text(encoding="utf-8")
+    assert "near miss" in text
+    assert "would match with" in text
+    assert "blamed" in text.split("</style>")[1]
+
+
+def test_no_match_unknowns_and_several_matches_of_a_frame(query, tmp_path):
+    found, results = query
+    first, second, third, *_ = results
+    assert isinstance(first.verdict, Match)
+    given = [
+        first,
+        replace(first, timestamp_us=1),
+        replace(second, verdict=Unknown("timeout", Cause("leftward.position"), first.verdict.correspondence)),
+        replace(third, verdict=NoMatch(Cause("leftward.class"))),
+    ]
+    page = Page(write_report(found, given, tmp_path / "r").read_text(encoding="utf-8"))
+    shown = " ".join(page.texts)
+    assert page.values("data-length") == ["1", "1"]
+    assert "unknown: timeout" in shown
+    assert third.frame not in shown
+    empty = write_report(found, [], tmp_path / "e").read_text(encoding="utf-8")
+    assert "No frame matches" in empty
+
+
+def test_other_folders_are_left_alone(query, tmp_path):
+    found, results = query
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "index.html").write_text("<title>mine</title>")
+    for target in (tmp_path / "mine", tmp_path / "mine" / "index.html"):
+        with pytest.raises(DataError, match=r"target-exists"):
+            check_target(target)
+        with pytest.raises(DataError, match=r"target-exists"):
+            write_report(found, results, target)
+    write_report(found, results, tmp_path / "r")
+    (tmp_path / "r" / "notes.txt").write_text("keep")
+    check_target(tmp_path / "r")
+    write_report(found, results, tmp_path / "r")
+    assert (tmp_path / "r" / "notes.txt").read_text() == "keep"
+
+
+def test_a_failed_report_leaves_the_old_one(query, tmp_path, monkeypatch):
+    found, results = query
+    old = write_report(found, results, tmp_path / "r").read_text(encoding="utf-8")
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(write, "draw_card", full)
+    with pytest.raises(ScenicqError, match=r"target-unwritable"):
+        write_report(found, results, tmp_path / "r")
+    assert [path.name for path in (tmp_path / "r").iterdir()] == ["index.html"]
+    assert (tmp_path / "r" / "index.html").read_text(encoding="utf-8") == old
+
+
+def test_sensor_files_are_linked_where_they_are(tmp_path):
+    root, report = tmp_path / "data", tmp_path / "out" / "r"
+    (root / "cam").mkdir(parents=True)
+    (tmp_path / "secret.jpg").touch()
+    for name in ("a b.jpg", "javascript:x.jpg", "c#?%.jpg"):
+        (root / "cam" / name).touch()
+    report.mkdir(parents=True)
+    files = SensorFiles((root,), report, report)
+    paths = {"CAM": "cam/a b.jpg", "CAM_J": "cam/javascript:x.jpg", "CAM_C": "cam/c#?%.jpg"}
+    paths |= {"X": "../secret.jpg", "Y": str(tmp_path / "secret.jpg"), "Z": "\x00", "W": "nope.jpg", "V": ""}
+    found = {sensor.channel: sensor.link for sensor in files.find(paths)}
+    assert found == {
+        "CAM": "./../../data/cam/a%20b.jpg",
+        "CAM_J": "./../../data/cam/javascript%3Ax.jpg",
+        "CAM_C": "./../../data/cam/c%23%3F%25.jpg",
+        **dict.fromkeys("XYZWV"),
+    }
+
+
+def test_thumbnails_are_made_once_where_pillow_is(tmp_path):
+    image = pytest.importorskip("PIL.Image", reason="the extra scenicq[thumbnails] is not installed")
+    root, report = tmp_path / "data", tmp_path / "r"
+    root.mkdir()
+    report.mkdir()
+    image.new("RGB", (1600, 900)).save(root / "a.jpg")
+    (root / "broken.jpg").write_bytes(b"no image")
+    files = SensorFiles((root,), report, report, thumbnails=True)
+    first, broken = files.find({"CAM": "a.jpg", "CAM_B": "broken.jpg"})
+    assert broken.thumbnail is None
+    small = report / first.thumbnail
+    assert image.open(small).size == (320, 180)
+    written = small.stat().st_mtime_ns
+    assert files.find({"CAM": "a.jpg"})[0].thumbnail == first.thumbnail
+    assert small.stat().st_mtime_ns == written

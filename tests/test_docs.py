@@ -1,0 +1,58 @@
+"""What is written about the commands and folders is complete."""
+
+import re
+from pathlib import Path
+
+import click
+import pytest
+
+from scenicq_cli.main import COMMANDS, cli
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def _command(name):
+    return cli.get_command(click.Context(cli), name)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_an_example_and_a_place_in_the_readme(name):
+    command = _command(name)
+    assert command.help
+    assert re.search(rf"Examples?:\n  scenicq {name} ", command.epilog)
+    assert f"scenicq {name}" in README
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_has_help_and_is_in_the_readme(name):
+    for parameter in _command(name).params:
+        if isinstance(parameter, click.Option):
+            assert parameter.help, parameter.name
+            assert any(f"`{option}" in README or f" {option}" in README for option in parameter.opts), parameter.opts
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_examples_use_only_options_that_there_are(name):
+    known = {option for parameter in _command(name).params for option in (*parameter.opts, *parameter.secondary_opts)}
+    assert set(re.findall(r"(?<!\S)--?[a-z][a-z-]*", _command(name).epilog)) <= known | {"--help"}
+
+
+def test_the_readme_names_only_options_that_there_are():
+    known = {"--help", "--version"}
+    for name in COMMANDS:
+        known |= {o for parameter in _command(name).params for o in (*parameter.opts, *parameter.secondary_opts)}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", README)) <= known
+
+
+def test_every_make_target_is_explained():
+    text = (ROOT / "Makefile").read_text()
+    targets = set(re.search(r"\.PHONY: (.*)", text).group(1).split())
+    assert targets == set(re.findall(r"^([a-z-]+):.*## ", text, re.MULTILINE))
+
+
+def test_every_folder_of_the_library_is_described():
+    text = (ROOT / "scenicq" / "README.md").read_text(encoding="utf-8")
+    folders = [path.name for path in (ROOT / "scenicq").iterdir() if (path / "__init__.py").exists()]
+    assert folders
+    assert [name for name in folders if f"`{name}" not in text] == []

@@ -1,0 +1,120 @@
+"""The pages of `tests/language`: every `scenic` block compiles, or fails with exactly the errors that it marks.
+
+In a block `# error: [code]` marks the line that is wrong, and `# value: name.property == value` states a property of
+an object of which nothing is random. The fence may go on with `scenic=2` (read as that version) and `initial`
+(dynamic parts are left out).
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import random
+import re
+from dataclasses import dataclass
+from itertools import takewhile
+from pathlib import Path
+
+import pytest
+
+from scenicq.compiler.program import compile_scenario
+from scenicq.compiler.standin import street
+from scenicq.errors import CODES, ScenarioError, Source
+from scenicq.forest.improvise import draw_scene
+from scenicq.forest.scenario import Scenario
+
+PAGES = Path(__file__).parent / "language"
+NOT_ERRORS_OF_PROGRAMS = {"option-invalid", "soft-requirement"}
+"""An error of the command line, and a warning of a run."""
+
+_BLOCK = re.compile(r"^```scenic(?P<options>[^\n]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
+_ERROR = re.compile(r"#\s*error:\s*\[([a-z-]+)\]")
+_VALUE = re.compile(r"^#\s*value:\s*([\w#]+)\.(\w+)\s*==\s*(.+)$", re.MULTILINE)
+_LINK = re.compile(r"\]\(([\w-]+\.md)\)")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A program on a page."""
+
+    page: str
+    line: int
+    options: tuple[str, ...]
+    text: str
+
+    @property
+    def marks(self) -> set[tuple[int, str]]:
+        """Lines of the block with the codes of their errors."""
+        lines = self.text.splitlines()
+        return {(number, code) for number, line in enumerate(lines, 1) for code in _ERROR.findall(line)}
+
+    def compiled(self) -> Scenario:
+        """The scenario over the made-up street."""
+        version = next((int(word.removeprefix("scenic=")) for word in self.options if word.startswith("scenic=")), None)
+        source = Source(f"{self.page}:{self.line}", self.text)
+        return compile_scenario(source, street(), version=version, initial="initial" in self.options)
+
+
+def blocks() -> list[Block]:
+    """All programs of all pages."""
+    found: list[Block] = []
+    for page in sorted(PAGES.glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        for match in _BLOCK.finditer(text):
+            line = text.count("\n", 0, match.start()) + 1
+            found.append(Block(page.name, line, tuple(match["options"].split()), match["text"]))
+    return found
+
+
+BLOCKS = blocks()
+
+
+def number(text: str) -> object:
+    """A Python literal; a number may be given in degrees."""
+    text = text.strip()
+    return math.radians(float(text.removesuffix("deg"))) if text.endswith("deg") else ast.literal_eval(text)
+
+
+def places(error: ScenarioError) -> set[tuple[int, str]]:
+    """Lines and codes of an error's diagnostics."""
+    return {(d.span.source.position(d.span.start)[0], d.code) for d in error.diagnostics if d.span is not None}
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: f"{block.page}:{block.line}")
+def test_block(block: Block) -> None:
+    """The block compiles, or fails where it says."""
+    if block.marks:
+        with pytest.raises(ScenarioError) as caught:
+            block.compiled()
+        assert places(caught.value) == block.marks, str(caught.value)
+        return
+    scenario = block.compiled()
+    values = _VALUE.findall(block.text)
+    if not values:
+        return
+    scene = draw_scene(scenario, random.Random(0), 1000)
+    assert scene is not None
+    names = {each.name: each.index for each in scenario.objects}
+    for name, key, expected in values:
+        value, wanted = scene.values[names[name], key], number(expected)
+        if key == "heading":
+            assert isinstance(value, float)
+            assert isinstance(wanted, int | float)
+            assert math.remainder(value - wanted, math.tau) == pytest.approx(0, abs=1e-6), (name, value)
+        else:
+            assert value == pytest.approx(wanted, abs=1e-6), (name, key)
+
+
+def test_every_code_that_a_program_can_cause_is_shown() -> None:
+    """The codes of the program's part of the table, up to the first one of the data."""
+    expected = set(takewhile(lambda code: code != "unknown-class", CODES)) - NOT_ERRORS_OF_PROGRAMS
+    assert expected == {code for block in BLOCKS for _, code in block.marks}
+
+
+def test_the_table_lists_every_page_and_real_codes_only() -> None:
+    """`README.md` is the way in."""
+    text = (PAGES / "README.md").read_text(encoding="utf-8")
+    assert {page.name for page in PAGES.glob("*.md")} - {"README.md"} == set(_LINK.findall(text))
+    refused = {code for row in text.splitlines() if "refused" in row for code in re.findall(r"`\[([a-z-]+)\]`", row)}
+    assert refused
+    assert refused <= set(CODES)
