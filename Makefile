@@ -7,6 +7,7 @@ BIN := .venv/bin
 READY := .venv/.ready
 PYTEST := $(BIN)/python -m pytest -q -p no:cacheprovider
 LINTED := scenicq cli tests sample_data
+FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/test_search.py
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo check test test-all golden bench conformance dreal clean
@@ -28,12 +29,12 @@ demo: $(READY) ## Ingest the sample data into demo/ and find two crossing cars i
 	$(BIN)/scenicq ingest sample_data/crossroads demo/crossroads --force
 	$(BIN)/scenicq match sample_data/scenarios/02_crossing_cars.scenic demo/crossroads --format table --summary
 
-check: $(READY) ## Format, lint, types, layers and the fast tests of the library: under two minutes
+check: $(READY) ## Format, lint, types, layers and the fastest tests: under two minutes
 	$(BIN)/ruff format --check $(LINTED)
 	$(BIN)/ruff check $(LINTED)
 	$(BIN)/pyright --warnings
 	$(BIN)/lint-imports --no-cache
-	$(PYTEST) -n $(WORKERS) -m 'not slow' --ignore tests/cli --ignore tests/test_readme.py
+	$(PYTEST) -n $(WORKERS) -m 'not slow' $(FASTEST)
 
 test: $(READY) ## All tests but the slow ones
 	$(PYTEST) -n $(WORKERS) -m 'not slow'
@@ -46,6 +47,7 @@ golden: $(READY) ## Rewrite the golden files that tests compare with
 
 bench: $(READY) ## Measure queries, start-up and ingest; numbers go to bench-results/
 	$(BIN)/python tests/bench/queries.py
+	$(BIN)/python tests/bench/scalability.py
 
 MAP ?= Town01.xodr
 conformance: $(READY) ## Compare with Scenic 3.1.1: scenes that it draws must match (MAP=an OpenDRIVE file)

@@ -18,17 +18,10 @@ from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label
 
 from .main import NOTHING
-from .match import match, query_options
+from .match import match
+from .options import ONE_FRAME, SHARED, query_options
 
-__all__ = ["ONE_FRAME", "SHARED", "explain", "find_label"]
-
-SHARED = frozenset({
-    "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "ignore_params",
-})  # fmt: skip
-"""Options of `match` that say what a match is; the others say which frames and what to show of them."""
-ONE_FRAME = {"prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False}
-"""The rest of the options of a query about one frame."""
+__all__ = ["explain", "find_label"]
 
 
 def find_label(dataset: Dataset, frame: str) -> Label:
@@ -58,7 +51,7 @@ def find_label(dataset: Dataset, frame: str) -> Label:
 def explain(
     ctx: click.Context, scenario: Path, dataset: Path, frame: str, *, smt2: Path | None, exit_zero: bool, **given: Any
 ) -> None:
-    """Say why one frame matches, or what keeps it from matching and under which tolerance it would.
+    """Say why one frame matches, or what keeps it from it and which tolerance would do.
 
     The options of `match` that say what a match is apply. Exit code 0: it matches; 1: it does not; 2: an error.
     """

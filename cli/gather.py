@@ -16,7 +16,6 @@ __all__ = ["gather"]
 
 @click.command(
     epilog="\b\nExample:\n"
-    "  seq 16 | xargs -P 4 -I{} scenicq match crossing.scenic dataset --shard {}/16 -o pieces --exit-zero\n"
     "  scenicq gather pieces -o matches.parquet"
 )
 @click.argument("folder", type=click.Path(path_type=Path))

@@ -7,68 +7,29 @@ import itertools
 import shlex
 import sys
 import time
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import click
 
-from scenicq.errors import DataError, Diagnostic
-from scenicq.forest.scenario import BuiltIn
-from scenicq.match.options import MatchOptions, parse_tolerance
 from scenicq.query.export import EXPORTS, Exporter
 from scenicq.query.near import near_results
 from scenicq.query.results import Result, record
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.run import Query, read_program
 from scenicq.report.write import check_target, write_report
 from scenicq.store.dataset import open_dataset
 
-from .check import read_version
 from .formats import FORMATS, make_writer
 from .funnel import show_funnel
 from .main import NOTHING
+from .options import DEFAULTS, query_options
 from .output import ProgressBar, choose_format, destination, writing
 from .pieces import Shard, parse_shard, run_resumable, run_shard
 from .report import show_few
 
-__all__ = ["match", "query_options"]
-
-_DEFAULTS = MatchOptions()
-
-
-def _names(text: str | None) -> list[str]:
-    return [name.strip() for name in (text or "").split(",") if name.strip()]
-
-
-def _enforced(names: list[str]) -> frozenset[BuiltIn]:
-    """The built-in requirements in force: visibility always, unless the list has `none`."""
-    known = [*BuiltIn, "none"]
-    for name in names:
-        if name not in known:
-            hint = f"known are {', '.join(known)}, separated by commas"
-            raise DataError(Diagnostic("option-invalid", f"`{name}` is no built-in requirement", hints=(hint,)))
-    always = frozenset[BuiltIn]() if "none" in names else _DEFAULTS.enforce
-    return always | {BuiltIn(name) for name in names if name != "none"}
-
-
-def query_options(given: dict[str, Any]) -> QueryOptions:
-    """The options of a query from those of the command line."""
-    tolerance = given["tolerance"]
-    options = MatchOptions(
-        tolerance=_DEFAULTS.tolerance if tolerance is None else parse_tolerance(tolerance),
-        classes=given["classes"],
-        ego=given["ego"],
-        radius=given["radius"],
-        enforce=_enforced(_names(given["enforce"])),
-        exact=given["exact"],
-        method=given["method"],
-        timeout_s=given["timeout"],
-        budget=given["budget"],
-        ignore_params=_DEFAULTS.ignore_params.union(_names(given["ignore_params"])),
-    )
-    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches")
-    return QueryOptions(match=options, version=read_version(given["scenic"]), **{name: given[name] for name in same})
+__all__ = ["match"]
 
 
 def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Result]:
@@ -90,7 +51,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
     epilog="\b\nExamples:\n"
     "  scenicq match crossing.scenic dataset --tolerance position=0.25,heading=5deg\n"
     "  scenicq match crossing.scenic dataset --format ids | head\n"
-    "  scenicq match crossing.scenic dataset -o matches.parquet --summary"
+    "  scenicq match crossing.scenic dataset -o matches.parquet --summary\n"
+    "  seq 16 | xargs -P 4 -I{} scenicq match crossing.scenic dataset --shard {}/16 -o pieces --exit-zero"
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.argument("dataset", type=click.Path(path_type=Path))
@@ -113,9 +75,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--prefilter/--no-prefilter", default=True,
               help="Whether SQL narrows the frames first. The matches are the same.")
 @click.option("--jobs", metavar="N", type=click.IntRange(1), default=1, help="Processes that match.")
-@click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=_DEFAULTS.timeout_s,
+@click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULTS.timeout_s,
               help="Seconds for one question to the solver; then the frame is unknown.")
-@click.option("--budget", metavar="N", type=click.IntRange(1), default=_DEFAULTS.budget,
+@click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
               help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
 @click.option("--limit", metavar="N", type=click.IntRange(1), help="Stop after so many matches.")
 @click.option("--all", "every", is_flag=True, help="Show frames that do not match, too, each with its cause.")
@@ -128,12 +90,12 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               "and jsonl in a pipe]")
 @click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path),
               help="Write to a file, which appears when it is complete; `-` is standard output.")
-@click.option("--shard", metavar="I/N", callback=parse_shard, help="Match only piece I of N; -o names the folder for the "
-              "pieces, which `scenicq gather` puts together.")
+@click.option("--shard", metavar="I/N", callback=parse_shard, help="Match only piece I of N; -o names the folder for "
+              "the pieces, which `scenicq gather` puts together.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run with the same -o FILE stopped.")
 @click.option("--export", metavar="FORM DIR", type=(click.Choice(list(EXPORTS)), click.Path(path_type=Path)),
-              help="Hand the matching frames on, too, in a new folder DIR: nuscenes-tokens, argoverse2, paths (of sensor "
-              "files), interchange (to ingest elsewhere) or openlabel.")
+              help="Hand the matching frames on, too, in a new folder DIR: nuscenes-tokens, argoverse2, paths (of "
+              "sensor files), interchange (to ingest elsewhere) or openlabel.")
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures of the matches, too: DIR/index.html.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
@@ -144,8 +106,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
 def match(ctx: click.Context, scenario: Path, dataset: Path, *, format_: str | None, output: Path | None,
-          export: tuple[str, Path] | None,
-          near: int | None, report: Path | None, shard: Shard | None, resume: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
+          export: tuple[str, Path] | None, near: int | None, report: Path | None, shard: Shard | None, resume: bool,
+          exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
 
@@ -165,7 +127,7 @@ def match(ctx: click.Context, scenario: Path, dataset: Path, *, format_: str | N
     shown: list[Result] | None = None if report is None else []
     close: list[Result] | None = None if report is None else []
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
-    results = cast("Generator[Result]", query.results(bar.advance))
+    results = query.results(bar.advance)
     with destination(file) as sink, bar, contextlib.closing(results):
         with writing(file):
             writer = make_writer(chosen, sink)
@@ -186,13 +148,18 @@ def match(ctx: click.Context, scenario: Path, dataset: Path, *, format_: str | N
     _conclude(ctx, query, elapsed_s, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 
-def _in_pieces(ctx: click.Context, query: Query, shard: Shard | None, file: Path | None, chosen: str, *, quiet: bool) -> None:
+def _in_pieces(
+    ctx: click.Context, query: Query, shard: Shard | None, file: Path | None, chosen: str, *, quiet: bool
+) -> None:
     """Run one shard, or all pieces with a place to go on from."""
     single = [name for name in ("near", "report", "export", "limit") if ctx.params.get(name) is not None]
     if single or file is None:
         what = "need -o" if file is None else f"cannot be had with --{single[0]}"
         raise click.UsageError(f"--shard and --resume {what}", ctx)
-    run = run_resumable(query, file, chosen, quiet=quiet) if shard is None else run_shard(query, shard, file, quiet=quiet)
+    if shard is None:
+        run = run_resumable(query, file, chosen, quiet=quiet)
+    else:
+        run = run_shard(query, shard, file, quiet=quiet)
     query.funnel = replace(run, warnings=query.funnel.warnings)
 
 

@@ -21,8 +21,9 @@ from scenicq.report.png import can_make_png, png
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label
 
-from .explain import ONE_FRAME, SHARED, find_label
-from .match import match, query_options
+from .explain import find_label
+from .match import match
+from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
 
 __all__ = ["show"]

@@ -49,7 +49,8 @@ def define_class(run: _Definer, node: ast.ClassDef, scope: Environment) -> Sceni
                    "a second base", ("derive from one class and repeat the property lines of the other",))  # fmt: skip
     base = evaluate(run, first.value, scope) if first is not None else scope.get("Object", node.name_span)
     if not isinstance(base, ScenicClass):
-        raise fail("wrong-type", "a class must derive from a class of objects", node.bases[0].span,
+        place = first.span if first is not None else node.name_span
+        raise fail("wrong-type", "a class must derive from a class of objects", place,
                    f"this is {describe(base)}", ("scenarios have classes of points and objects only",))  # fmt: skip
     definitions: dict[str, PropertyDefinition] = {}
     inner = Environment({}, scope)
@@ -82,8 +83,8 @@ def _first_names(version: int, name: str) -> str:
 
 def _property_name(version: int, line: ast.PropertyDefault, scope: Environment) -> str:
     if line.name in _IN_SPACE:
-        raise fail("unsupported-construct", f"`{line.name}` is not supported", line.name_span, "labels are matched in 2D",
-                   ("state the heading",))  # fmt: skip
+        raise fail("unsupported-construct", f"`{line.name}` is not supported", line.name_span,
+                   "labels are matched in 2D", ("state the heading",))  # fmt: skip
     if line.name == "heading" and version == 3:
         return "parentOrientation"
     return line.name if scope.library else _first_names(version, line.name)

@@ -90,7 +90,7 @@ def to_node(value: ModelValue, span: Span | None) -> Node:
         return cast(Node, value)
     if isinstance(value, bool | int | float | str) or value is None:
         return constant(value, span)
-    if isinstance(value, NetworkElement) or isinstance(value, Region):
+    if isinstance(value, NetworkElement | Region):
         return to_region(value, span)
     if isinstance(value, tuple | list) and len(cast("list[ModelValue]", value)) in (2, 3):
         return to_vector(value, span)
@@ -138,7 +138,7 @@ def to_vector(value: ModelValue, span: Span | None) -> Node:
     if isinstance(value, Instance):
         return to_vector(property_node(value, "position", span), span)
     if isinstance(value, tuple | list):
-        parts = cast("list[ModelValue]", list(cast("tuple[ModelValue]", value)))
+        parts = list(cast("tuple[ModelValue, ...]", value))
         flat = len(parts) == 3 and parts[2] in (0, 0.0)
         if len(parts) == 3 and not flat:
             raise fail("unsupported-construct", "a position with a height is not supported: labels are matched in 2D",
@@ -159,7 +159,7 @@ def to_region(value: ModelValue, span: Span | None) -> Node:
     if isinstance(value, NetworkElement):
         return constant(value.region, span)
     if isinstance(value, Region):
-        return constant(cast(Region, value), span)
+        return constant(value, span)
     if is_node(value) and kind_of(value) == "region":
         return cast(Node, value)
     if isinstance(value, Choice):

@@ -116,7 +116,8 @@ def _measure(
             return lift(lambda a, b: operators.combine("or", [operators.combine("not", [a], span), b], span),
                         value(node.left), value(node.right))  # fmt: skip
         case ast.Temporal() | ast.Until():
-            raise fail("unsupported-construct", f"`{span.text}` is not supported", span, "does not describe one instant",
+            raise fail("unsupported-construct", f"`{span.text}` is not supported", span,
+                       "does not describe one instant",
                        ("a scene is matched at one instant: state what holds then",))  # fmt: skip
         case _:
             raise fail("unsupported-construct", f"`{span.text}` is not supported", span, "labels are matched in 2D",

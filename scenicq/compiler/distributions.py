@@ -100,7 +100,7 @@ def _deviation(node: Node, span: Span) -> float | None:
     return value
 
 
-def _normal(span: Span, mean: ModelValue, stdDev: ModelValue) -> ModelValue:
+def _normal(span: Span, mean: ModelValue, stdDev: ModelValue) -> ModelValue:  # noqa: N803 - Scenic's name
     middle, deviation = to_scalar(mean, span), to_scalar(stdDev, span)
     return middle if _deviation(deviation, span) == 0 else Normal(middle, deviation, span=span)
 
@@ -108,7 +108,7 @@ def _normal(span: Span, mean: ModelValue, stdDev: ModelValue) -> ModelValue:
 def _truncated_normal(
     span: Span,
     mean: ModelValue,
-    stdDev: ModelValue,
+    stdDev: ModelValue,  # noqa: N803 - Scenic's name
     low: ModelValue,
     high: ModelValue,
 ) -> ModelValue:
@@ -128,7 +128,7 @@ def _discrete_range(
     low: ModelValue,
     high: ModelValue,
     weights: ModelValue = None,
-    emptyMessage: ModelValue = None,
+    emptyMessage: ModelValue = None,  # noqa: N803 - Scenic's name
 ) -> ModelValue:
     ends = [to_scalar(end, span) for end in (low, high)]
     values = [_number(end) for end in ends]

@@ -80,7 +80,7 @@ class Environment:
         library: bool = False,
         user: bool = False,
     ) -> None:
-        """Take the names and the enclosing environment; one inside a library's is a library's unless it is the user's."""
+        """Take the names and the enclosing environment; inside a library's, it is a library's unless the user's."""
         self.names = names
         self.parent = parent
         self.shared: dict[str, Environment] = {}

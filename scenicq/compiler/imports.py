@@ -69,7 +69,5 @@ def _merged(one: Module, other: Module) -> Module:
     names = dict(one.names)
     for name, value in other.names.items():
         held = names.get(name)
-        if isinstance(held, Module) and isinstance(value, Module):
-            value = _merged(held, value)
-        names[name] = value
+        names[name] = _merged(held, value) if isinstance(held, Module) and isinstance(value, Module) else value
     return Module(one.name, names)

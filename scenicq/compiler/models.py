@@ -131,5 +131,6 @@ def plain_module(name: str, span: Span) -> Module:
             return Module(name, {})
         case _:
             raise fail("unknown-model", f"`{name}` is not a model or module known here", span, "not found",
-                       ("known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, and `math`",
+                       ("known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "
+                        "and `math`",
                         "a scenario never imports Python code: write what it needs in Scenic"))  # fmt: skip

@@ -1,6 +1,7 @@
 """Scenic's operators on values (language paper, tables 2-4 and appendix B.4-B.9).
 
-Every function takes evaluated values and the span of the construct; the ego is passed in where an operator refers to it.
+Every function takes evaluated values and the span of the construct; the ego is passed in where an operator refers to
+it.
 """
 
 from __future__ import annotations

@@ -168,7 +168,7 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
 def _visible(
     node: ast.VisibleSpecifier | ast.NotVisibleSpecifier, viewer: ModelValue, around: Surroundings
 ) -> BoundSpecifier:
-    """`visible`, `not visible`: up to Scenic 2 about the position; in Scenic 3 also about the object, however it is placed."""
+    """`visible`, `not visible`: up to Scenic 2 about the position; in 3 also about the object, however placed."""
     span, hidden = node.span, isinstance(node, ast.NotVisibleSpecifier)
     seen = operators.visible_region(viewer, span)
     if around.version < 3:
@@ -331,7 +331,8 @@ def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Boun
                 return _position(span, region)
             if isinstance(region, Instance):
                 raise fail("unsupported-construct", "a place on an object is not supported", span,
-                           "labels are matched in 2D", ("place it `at` the object's position, or `ahead of` it",))  # fmt: skip
+                           "labels are matched in 2D",
+                           ("place it `at` the object's position, or `ahead of` it",))  # fmt: skip
             return _in_region(span, region, modifies=around.version == 3)
         case ast.InSpecifier():
             return _in_region(span, evaluate(node.region))

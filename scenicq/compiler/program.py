@@ -297,7 +297,7 @@ def _known(instance: Instance, name: str) -> bool:
 
 
 def _built_in(run: Interpreter, ego: Instance) -> list[Requirement]:
-    """Scenic's own requirements: visibility and containment (language paper, section 5.4); see `solid` for collisions."""
+    """Scenic's own requirements: visibility, containment (language paper, section 5.4); see `solid` for collisions."""
     found: list[Requirement] = []
     for instance in run.objects:
         span = instance.spans.get("requireVisible") or instance.span

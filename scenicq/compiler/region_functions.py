@@ -98,7 +98,7 @@ def _point_set(
     span: Span,
     name: ModelValue,
     points: ModelValue,
-    kdTree: ModelValue = None,
+    kdTree: ModelValue = None,  # noqa: N803 - Scenic's name
     orientation: ModelValue = None,
     tolerance: ModelValue = None,
 ) -> ModelValue:

@@ -41,7 +41,7 @@ def _imports_first_library(module: ast.Module) -> bool:
 
 
 def _stands_alone(statement: ast.Node, module: ast.Module) -> bool:
-    """Whether a statement is a bare name, as in `Car` or `ego = Car`: no version but the early ones has a use for it."""
+    """Whether a statement is a bare name, as in `Car` or `ego = Car`: only the early versions have a use for it."""
     match statement:
         case ast.ExpressionStatement(value=ast.Name()):
             return True

@@ -69,7 +69,7 @@ def _largest(a: Interval) -> float:
     return max(abs(a[0]), abs(a[1]))
 
 
-def _arithmetic(op: ArithmeticOp, args: list[Interval]) -> Interval:  # noqa: PLR0911, PLR0912
+def _arithmetic(op: ArithmeticOp, args: list[Interval]) -> Interval:
     first = args[0]
     match op:
         case ArithmeticOp.ADD:
@@ -143,7 +143,7 @@ def _of_leaf(node: Node, args: list[_Bounds], leaves: Mapping[Identity, _Bounds]
     return own
 
 
-def _bounds(root: Node, leaves: Mapping[Identity, _Bounds]) -> dict[int, _Bounds]:  # noqa: PLR0912
+def _bounds(root: Node, leaves: Mapping[Identity, _Bounds]) -> dict[int, _Bounds]:
     found: dict[int, _Bounds] = {}
     for node in postorder((root,)):
         args = [found[id(child)] for child in children(node)]

@@ -1,6 +1,7 @@
 """Building expressions: small constructors that fold what is already known.
 
-The vocabulary of the language paper's appendix B: `offset_local`, `rotate`, `heading_toward`, `visible_region` and so on.
+The vocabulary of the language paper's appendix B: `offset_local`, `rotate`, `heading_toward`, `visible_region` and
+so on.
 """
 
 from __future__ import annotations

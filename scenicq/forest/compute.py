@@ -70,7 +70,7 @@ from scenicq.geometry.terms import UndecidedError
 __all__ = ["CannotEvaluate", "compute", "directions", "fold"]
 
 
-class CannotEvaluate(Exception):  # noqa: N818  (an answer that is missing, not an error)
+class CannotEvaluate(Exception):
     """A question that plain evaluation cannot answer; the message says which."""
 
 

@@ -46,8 +46,8 @@ def evaluate_all(
 
     Args:
         roots: Expressions.
-        assignment: The value of each random variable by its identity, or a function from the variable and the values of its
-            distribution's parameters to its value (for sampling).
+        assignment: The value of each random variable by its identity, or a function from the variable and the values
+            of its distribution's parameters to its value (for sampling).
         observed: The values of features referred to.
         choose: Picks among several directions of a field; the first if not given.
 

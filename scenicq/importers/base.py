@@ -158,9 +158,7 @@ class ClassNames:
 class Labels:
     """Checks what must hold between labels of a source; each check that fails leaves something out and is reported."""
 
-    def __init__(
-        self, maps: Collection[str], report: Report, taken: Collection[tuple[str, str]] = frozenset()
-    ) -> None:
+    def __init__(self, maps: Collection[str], report: Report, taken: Collection[tuple[str, str]] = frozenset()) -> None:
         """Start without labels.
 
         Args:

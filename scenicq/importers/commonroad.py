@@ -88,14 +88,18 @@ def _read_scenario(place: Place, classes: ClassNames, report: Report) -> list[tu
             kind = _type(element)
             name, size = attribute(element, "id"), _size(element)
             states = element.findall("initialState") + element.findall("trajectory/state")
-            for index, state in enumerate(states):
+        except InvalidError as error:
+            report.left_out("track", "record-invalid", f"{where}: {error}")
+            continue
+        for index, state in enumerate(states):
+            try:
                 member = _object(name, kind, size, state, classes)
                 if _is_static(element):
                     standing.append(member)
                     break
                 moving.setdefault(_time(state, index), []).append(member)
-        except InvalidError as error:
-            report.left_out("track", "record-invalid", f"{where}: {error}")
+            except InvalidError as error:
+                report.left_out("object", "record-invalid", f"{where}: state {index}: {error}")
     params = _params(root)
     moments = [
         Moment(f"{place.name}/{step}", round(step * step_s * 1e6), (*moving.get(step, ()), *standing), params)

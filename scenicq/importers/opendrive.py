@@ -80,6 +80,8 @@ def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeo
             copy, made = Path(folder) / "map.xodr", Path(folder) / "map.geojson"
             copy.write_bytes(content)
             _run(path, [python, "-I", str(_WORKER), str(copy), str(made)], Path(folder), timeout_s)
+            if not made.is_file():
+                raise DataError(Diagnostic("file-invalid", f"map {path}: Scenic's parser gave nothing"))
             beside = cache / f".{key}.{os.getpid()}.tmp"
             shutil.copyfile(made, beside)
             beside.replace(kept)

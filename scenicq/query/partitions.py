@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from itertools import pairwise
@@ -110,10 +109,7 @@ def write_partition(
         with partial.open("w", encoding="utf-8") as file:
             for each in records:
                 file.write(json.dumps(each, ensure_ascii=False) + "\n")
-            counts = {
-                name: dict(value) if isinstance(value, Counter) else value
-                for name, value in ((name, getattr(funnel, name)) for name in _COUNTS)
-            }
+            counts = {name: getattr(funnel, name) for name in _COUNTS}
             file.write(json.dumps({"funnel": counts}) + "\n")
             file.flush()
             os.fsync(file.fileno())
@@ -177,7 +173,7 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
     found = [path for path in found if path.name.startswith(f"{chosen}-{'' if only is None else f'{only:05}-'}")]
     if not found:
         raise DataError(Diagnostic("file-missing", f"{folder} holds no piece of a result",
-                                   hints=("run `scenicq match ... --shard i/n -o` with this folder first",)))  # fmt: skip
+                                   hints=("run `scenicq match ... --shard i/n -o` with this folder",)))  # fmt: skip
     counts = {int(path.stem.rsplit("-", 1)[1]) for path in found}
     count = max(counts)
     missing = [str(n + 1) for n in range(count) if not is_done(folder, chosen, n, count)]

@@ -76,14 +76,13 @@ class Plan:
                 step = None if missed is None else self.steps[missed]
                 yield Excluded(row["frame"], row["recording"], row["timestamp_us"], step)
 
-
     def left(self, connection: Any) -> list[int]:
         """How many frames of the map are left before the first step and after each."""
         sql = f"SELECT missed, count(*) FROM ({self.sql}) GROUP BY missed"
         missed: dict[int | None, int] = dict(connection.execute(sql).fetchall())
         left = [sum(missed.values())]
-        for number in range(len(self.steps)):
-            left.append(left[-1] - missed.get(number, 0))
+        for step in range(len(self.steps)):
+            left.append(left[-1] - missed.get(step, 0))
         return left
 
 
@@ -179,7 +178,8 @@ def _query(
     columns = "objects.* EXCLUDE (recording, timestamp_us), frames.* EXCLUDE (frame)"
     if near:
         parts.append(_flags("object_flags", near, ego=False))
-        source = f"{source} LEFT JOIN object_flags ON object_flags.frame = objects.frame AND object_flags.object = objects.id"
+        on = "object_flags.frame = objects.frame AND object_flags.object = objects.id"
+        source = f"{source} LEFT JOIN object_flags ON {on}"
         columns = f"{columns}, {', '.join(f'object_flags.{flag}' for flag in near.values())}"
     if ego_near:
         parts.append(_flags("ego_flags", ego_near, ego=True))

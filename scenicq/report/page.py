@@ -92,7 +92,7 @@ def runs_section(cards: Sequence[str], recordings: Sequence[str], note: str) -> 
     """
     empty = element("p", "No frame matches. The funnel says what excluded them.", class_="hint") if not cards else ""
     legend = (
-        "<b>Solid box</b>: an object of the label, its line points to the front; <b>dark box</b>: the ego; "
+        "<b>Solid box</b>: an object of the label, its line points to the front; <b>filled box</b>: the ego; "
         "<b>dashed box</b>: a size that the label does not have. <b>Tinted area</b>: where a role may be; "
         "<b>wedge</b>: which way it may face; <b>dashed yellow</b>: a view region; "
         "<b>cross</b>: a hidden point of the witness."

@@ -78,7 +78,7 @@ class AtomParser(BindingParser):
         arguments: list[ast.Argument] = []
         while self.text != ")":
             arguments.append(self.argument())
-            if arguments[-1].star == "" and self.text in ("for", "async"):
+            if arguments[-1].star == "" and self.at("for", "async"):
                 element = arguments.pop()
                 clauses = self.clauses()
                 value = ast.Comprehension(self.span(element.span.start), "generator", element.value, clauses)
@@ -223,7 +223,7 @@ class AtomParser(BindingParser):
                 return ast.Set(self.span(opening.start), items)
             self.advance()
             value = self.expression()
-            if self.text in ("for", "async"):
+            if self.at("for", "async"):
                 clauses = self.clauses()
                 self.close("}", "dictionary", opening)
                 return ast.DictComprehension(self.span(opening.start), first, value, clauses)
@@ -231,7 +231,7 @@ class AtomParser(BindingParser):
         else:
             pairs = [self.pair()]
         while self.accept(","):
-            if self.text == "}":
+            if self.at("}"):
                 break
             pairs.append(self.pair())
         self.close("}", "values", opening)

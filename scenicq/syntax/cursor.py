@@ -37,7 +37,7 @@ class Cursor:
         self.index = 0
         self.token = tokens[0]
         self.text = self.token.text
-        self.depth = 0
+        self.depth: int = 0
 
     def move(self, index: int) -> None:
         """Go to a token, forwards or back."""
@@ -57,6 +57,10 @@ class Cursor:
     def peek(self, ahead: int = 1) -> Token:
         """A token after the next one."""
         return self.tokens[min(self.index + ahead, len(self.tokens) - 1)]
+
+    def at(self, *texts: str) -> bool:
+        """Whether the next token reads like one of these."""
+        return self.text in texts
 
     def accept(self, text: str) -> bool:
         """Go past the next token if it reads so."""

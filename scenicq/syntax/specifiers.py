@@ -16,8 +16,8 @@ __all__ = ["InstanceParser"]
 
 _SPECIFIERS = [
     "with", "at", "in", "on", "contained in", "offset by", "offset along", "beyond", "visible", "not visible",
-    "left of", "right of", "ahead of", "behind", "above", "below", "following", "facing", "facing toward", "facing away from",
-    "apparently facing", "using",
+    "left of", "right of", "ahead of", "behind", "above", "below", "following", "facing", "facing toward",
+    "facing away from", "apparently facing", "using",
 ]  # fmt: skip
 _ONE_WORD = frozenset(("on", "at", "facing", "following", "beyond", "behind", "above", "below", "using"))
 _UNMISTAKABLE = _ONE_WORD - {"at"}

@@ -37,12 +37,14 @@ class StatementParser(SimpleParser):
             raise self.fail(f"`:` is missing after {header}", label=self.found(), hint=hint)
         self.advance()
         statements: list[ast.Statement] = []
-        if self.token.kind != "newline":
+        start = self.token.kind
+        if start != "newline":
             while not statements or not self.ended():
                 self.simple(statements, in_class)
             return tuple(statements)
         self.advance()
-        if self.token.kind != "indent":
+        start = self.token.kind
+        if start != "indent":
             raise self.fail(f"an indented block is missing after {header}", hint="write `pass` for an empty block")
         self.advance()
         while self.token.kind not in ("dedent", "end"):
@@ -116,10 +118,10 @@ class StatementParser(SimpleParser):
 
     def skip(self) -> None:
         """Go past a statement with its block, whatever it holds."""
-        while self.token.kind not in ("newline", "end"):
-            self.advance()
-        self.advance()
-        if self.token.kind != "indent":
+        while self.advance().kind not in ("newline", "end"):
+            pass
+        kind = self.token.kind
+        if kind != "indent":
             return
         depth = 0
         while self.token.kind != "end":
@@ -239,7 +241,7 @@ class StatementParser(SimpleParser):
         while self.text == "except":
             place = self.advance().start
             self.accept("*")
-            kind = None if self.text == ":" else self.expressions()
+            kind = None if self.at(":") else self.expressions()
             name = self.name("the name of the exception").text if self.accept("as") else None
             handler = self.block("the exception")
             handlers.append(ast.ExceptHandler(self.span(place), kind, name, handler))

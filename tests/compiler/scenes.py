@@ -14,7 +14,10 @@ from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 
 Vector = tuple[float, float]
-EGO = "ego = new Object at (3, -4), facing 40 deg, with width 2, with length 5, with visibleDistance 30, with viewAngle 80 deg\n"
+EGO = (
+    "ego = new Object at (3, -4), facing 40 deg, with width 2, with length 5, with visibleDistance 30, "
+    "with viewAngle 80 deg\n"
+)
 EGO_POSITION, EGO_HEADING = (3.0, -4.0), math.radians(40)
 
 

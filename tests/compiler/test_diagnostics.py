@@ -72,7 +72,8 @@ def test_an_ego_set_in_a_function_is_the_ego() -> None:
 
 def test_a_method_gets_its_object() -> None:
     scenario = compiled(
-        "class A:\n    size: 3\n    def twice(self, n):\n        return self.size * n\nego = new A\nparam x = ego.twice(2)\n"
+        "class A:\n    size: 3\n    def twice(self, n):\n        return self.size * n\n"
+        "ego = new A\nparam x = ego.twice(2)\n"
     )
     assert scenario.params["x"].value.value == 6.0  # type: ignore[union-attr]
 

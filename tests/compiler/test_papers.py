@@ -72,8 +72,10 @@ def test_height_is_the_first_versions_length() -> None:
 
 
 SPELLINGS = {
-    1: "import gtaLib\nego = Object at (1, 2) @ 3, facing (5, 10) deg\nObject left of ego by (1, 2), with requireVisible False\n",
-    2: "ego = Object at Range(1, 2) @ 3, facing Range(5, 10) deg\nObject left of ego by Range(1, 2), with requireVisible False\n",
+    1: "import gtaLib\nego = Object at (1, 2) @ 3, facing (5, 10) deg\n"
+    "Object left of ego by (1, 2), with requireVisible False\n",
+    2: "ego = Object at Range(1, 2) @ 3, facing Range(5, 10) deg\n"
+    "Object left of ego by Range(1, 2), with requireVisible False\n",
     3: "ego = new Object at (Range(1, 2), 3), facing Range(5, 10) deg\nnew Object left of ego by Range(1, 2)\n",
 }
 
@@ -138,7 +140,10 @@ def test_curbs_are_the_right_edges_of_the_outermost_lanes_where_the_map_has_none
 
 
 def test_maneuvers_have_types() -> None:
-    text = "from scenic.domains.driving.roads import ManeuverType\nx = ManeuverType.LEFT_TURN\nparam same = x is ManeuverType.LEFT_TURN\nego = new Object\n"
+    text = (
+        "from scenic.domains.driving.roads import ManeuverType\nx = ManeuverType.LEFT_TURN\n"
+        "param same = x is ManeuverType.LEFT_TURN\nego = new Object\n"
+    )
     scene = draw_scene(compiled(text), random.Random(0))
     assert scene is not None
     assert scene.params["same"] is True

@@ -15,7 +15,9 @@ HOSTILE = {
     "many long lists": "l = []\nfor i in range(50000):\n    l.append(list(range(50000)))\n",
     "nested multiplication": "l = [0] * 1000\nfor i in range(10):\n    l = [l] * 1000\nx = l == [l]\n",
     "shared lists compared": "a = [0]\nb = [0]\nfor i in range(60):\n    a = [a, a]\n    b = [b, b]\nx = a == b\n",
-    "shared lists searched": "a = [0]\nb = [0]\nfor i in range(60):\n    a = [a, a]\n    b = [b, b]\nx = [b].index(a)\n",
+    "shared lists searched": (
+        "a = [0]\nb = [0]\nfor i in range(60):\n    a = [a, a]\n    b = [b, b]\nx = [b].index(a)\n"
+    ),
     "shared tuples hashed": "t = (0,)\nfor i in range(60):\n    t = (t, t)\nd = {t: 1}\n",
     "a list in itself": "l = []\nl.append(l)\nx = l == [l]\n",
     "huge power": "x = 10 ** 10 ** 8\n",

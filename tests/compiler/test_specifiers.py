@@ -92,7 +92,10 @@ def test_not_visible_in_scenic_3_hides_all_of_the_object(seed: int) -> None:
 
 
 def test_on_a_region_modifies_a_position_given_otherwise() -> None:
-    text = "model scenic.domains.driving.model\nego = new Car at (1.75, 30)\nnew Car ahead of ego by Range(0, 200), on road\n"
+    text = (
+        "model scenic.domains.driving.model\nego = new Car at (1.75, 30)\n"
+        "new Car ahead of ego by Range(0, 200), on road\n"
+    )
     for seed in range(5):
         (x, y), heading = last(text, seed)
         assert x == pytest.approx(1.75)
@@ -107,7 +110,10 @@ def test_contained_in_is_the_authors_requirement() -> None:
 
 
 def test_a_place_beside_a_random_object_follows_the_object() -> None:
-    text = f"{EGO}a = new Object at (50, 0), with width 4\nb = new Object at (90, 0), with width 8\nnew Object left of Uniform(a, b)\n"
+    text = (
+        f"{EGO}a = new Object at (50, 0), with width 4\nb = new Object at (90, 0), with width 8\n"
+        "new Object left of Uniform(a, b)\n"
+    )
     places = {round(last(text, seed)[0][0], 6) for seed in range(20)}
     assert places == {50 - 2 - 0.5, 90 - 4 - 0.5}
 
@@ -131,7 +137,8 @@ def test_chains_of_places_agree_with_the_formulas(start, turn, steps) -> None:
     for number, (kind, x, y) in enumerate(steps):
         before = "ego" if number == 0 else f"o{number - 1}"
         if kind == "offset":
-            text += f"o{number} = new OrientedPoint at ({before} offset by ({x}, {y})), facing {y} deg relative to {before}\n"
+            place = f"({before} offset by ({x}, {y}))"
+            text += f"o{number} = new OrientedPoint at {place}, facing {y} deg relative to {before}\n"
             position, heading = offset_local(position, heading, (x, y)), heading + D(y)
         elif kind == "beyond":
             text += f"o{number} = new OrientedPoint beyond {before} by ({x}, {y}) from (99, 99), facing {x} deg\n"

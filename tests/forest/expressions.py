@@ -13,17 +13,17 @@ from scenicq.forest.nodes import (
     Bearing,
     Coordinate,
     Identity,
+    Index,
+    Node,
     Norm,
     PointIn,
     Range,
     Rotate,
     Scale,
     Select,
+    Value,
     VectorOf,
     VectorSum,
-    Index,
-    Node,
-    Value,
 )
 from scenicq.geometry.regions import Rectangle
 
@@ -59,28 +59,52 @@ def expressions(draw, *, affine: bool = False) -> tuple[Node, dict[Identity, Val
         u, v = draw(st.sampled_from(vectors)), draw(st.sampled_from(vectors))
         kind = draw(st.integers(0, 3 if affine else 8))
         known = build.constant(draw(NUMBERS))
-        if affine:
-            new = [
-                lambda: Arithmetic(draw(st.sampled_from([ArithmeticOp.ADD, ArithmeticOp.SUB])), (a, b)),
-                lambda: Arithmetic(ArithmeticOp.MUL, (a, known)),
-                lambda: VectorSum(u, Rotate(VectorOf(a, b), known)),
-                lambda: Scale(v, known),
-            ][kind]()
-        else:
-            op = draw(st.sampled_from(SCALAR_OPS))
-            new = [
-                lambda: Arithmetic(op, (a,) if op in UNARY else (a, b)),
-                lambda: VectorSum(u, Rotate(v, a)),
-                lambda: VectorOf(a, b),
-                lambda: Scale(u, a),
-                lambda: Norm(u),
-                lambda: Bearing(u),
-                lambda: Coordinate(u, draw(st.integers(0, 1))),
-                lambda: VectorSum(u, v),
-                lambda: _pick(draw, a, b, values),
-            ][kind]()
+        new = _affine(draw, kind, (a, b), (u, v), known) if affine else _node(draw, kind, (a, b), (u, v), values)
         (vectors if isinstance(new, VectorSum | VectorOf | Scale) else scalars).append(new)
     return VectorSum(vectors[-1], VectorOf(scalars[-1], scalars[-2])), values
+
+
+def _affine(draw, kind: int, scalars: tuple[Node, Node], vectors: tuple[Node, Node], known: Node) -> Node:
+    """A node that is affine in the random variables if its parts are."""
+    a, b = scalars
+    u, v = vectors
+    match kind:
+        case 0:
+            return Arithmetic(draw(st.sampled_from([ArithmeticOp.ADD, ArithmeticOp.SUB])), (a, b))
+        case 1:
+            return Arithmetic(ArithmeticOp.MUL, (a, known))
+        case 2:
+            return VectorSum(u, Rotate(VectorOf(a, b), known))
+        case _:
+            return Scale(v, known)
+
+
+def _node(
+    draw, kind: int, scalars: tuple[Node, Node], vectors: tuple[Node, Node], values: dict[Identity, Value]
+) -> Node:
+    """Any node; a random choice notes its value."""
+    a, b = scalars
+    u, v = vectors
+    op = draw(st.sampled_from(SCALAR_OPS))
+    match kind:
+        case 0:
+            return Arithmetic(op, (a,) if op in UNARY else (a, b))
+        case 1:
+            return VectorSum(u, Rotate(v, a))
+        case 2:
+            return VectorOf(a, b)
+        case 3:
+            return Scale(u, a)
+        case 4:
+            return Norm(u)
+        case 5:
+            return Bearing(u)
+        case 6:
+            return Coordinate(u, draw(st.integers(0, 1)))
+        case 7:
+            return VectorSum(u, v)
+        case _:
+            return _pick(draw, a, b, values)
 
 
 def _pick(draw, a: Node, b: Node, values: dict[Identity, Value]) -> Node:

@@ -11,18 +11,18 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 sys.path.insert(0, str(Path(__file__).parent))
-from expressions import expressions, near  # noqa: E402
+from expressions import expressions, near
 
-from scenicq.compiler.program import compile_scenario  # noqa: E402
-from scenicq.compiler.standin import street  # noqa: E402
-from scenicq.errors import Source  # noqa: E402
-from scenicq.forest import build  # noqa: E402
-from scenicq.forest.bounds import point_boxes, vector_bounds  # noqa: E402
-from scenicq.forest.condition import condition, expand  # noqa: E402
-from scenicq.forest.evaluate import admits, evaluate  # noqa: E402
-from scenicq.forest.groups import Comparison, group_constraints  # noqa: E402
-from scenicq.forest.improvise import draw_scene  # noqa: E402
-from scenicq.forest.nodes import (  # noqa: E402
+from scenicq.compiler.program import compile_scenario
+from scenicq.compiler.standin import street
+from scenicq.errors import Source
+from scenicq.forest import build
+from scenicq.forest.bounds import point_boxes, vector_bounds
+from scenicq.forest.condition import condition, expand
+from scenicq.forest.evaluate import admits, evaluate
+from scenicq.forest.groups import Comparison, group_constraints
+from scenicq.forest.improvise import draw_scene
+from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
     Constant,
@@ -36,10 +36,10 @@ from scenicq.forest.nodes import (  # noqa: E402
     Select,
     Undefined,
 )
-from scenicq.forest.show import show  # noqa: E402
-from scenicq.forest.walk import features, leaves, postorder, transform  # noqa: E402
-from scenicq.geometry.regions import PolygonSet  # noqa: E402
-from scenicq.match.affine import affine_vector  # noqa: E402
+from scenicq.forest.show import show
+from scenicq.forest.walk import features, leaves, postorder, transform
+from scenicq.geometry.regions import PolygonSet
+from scenicq.match.affine import affine_vector
 
 STREET = street()
 
@@ -180,7 +180,9 @@ def test_expanding_replaces_chains_of_features():
 def test_groups_are_the_connected_components_over_shared_variables(uses):
     pool = [interval(0, 1) for _ in range(8)]
     items = [
-        Comparison(number, "heading", Arithmetic(ArithmeticOp.ADD, (build.constant(0.0), *(pool[i] for i in use))), None)
+        Comparison(
+            number, "heading", Arithmetic(ArithmeticOp.ADD, (build.constant(0.0), *(pool[i] for i in use))), None
+        )
         for number, use in enumerate(uses)
     ]
     # The transitive closure by repetition, instead of union-find.

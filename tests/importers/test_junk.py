@@ -47,6 +47,11 @@ def spoil(text: str, draw: st.DataObject) -> str:
     return json.dumps(whole)
 
 
+def check_messages(error: DataError) -> None:
+    assert error.diagnostics
+    assert all(diagnostic.message for diagnostic in error.diagnostics)
+
+
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 @given(name=st.sampled_from(LINES * 3 + TABLES), draw=st.data())
 def test_junk_in_one_place(tmp_path: Path, name: str, draw: st.DataObject) -> None:
@@ -64,7 +69,7 @@ def test_junk_in_one_place(tmp_path: Path, name: str, draw: st.DataObject) -> No
     try:
         summary = ingest(root, tmp_path / "d", format=format, force=True)
     except DataError as error:
-        assert all(diagnostic.message for diagnostic in error.diagnostics)
+        check_messages(error)
     else:
         dataset = open_dataset(tmp_path / "d")
         assert len(list(dataset.labels())) == summary.frames

@@ -1,4 +1,4 @@
-"""Files with some bytes changed: an ingest ends with a dataset or with a `DataError`, in bounded time, never otherwise."""
+"""Some bytes changed: an ingest ends with a dataset or with a `DataError`, in bounded time, never otherwise."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,7 @@ def test_quarter_turn_to_the_left_then_straight() -> None:
     assert points[-1] == pytest.approx((10.0, 30.0))
     # Every point of the arc lies on its circle.
     assert all(math.hypot(x, y - 10) == pytest.approx(10) for x, y in points if y < 9.9)
-    assert max(math.dist(a, b) for a, b in zip(points, points[1:], strict=False)) <= 1.0 + 1e-9
+    assert max(math.dist(a, b) for a, b in pairwise(points)) <= 1.0 + 1e-9
 
 
 def test_right_is_the_mirror_of_left() -> None:
@@ -47,8 +48,10 @@ def test_tiny_town() -> None:
     assert problems == []
     kinds = sorted(feature.kind for feature in features)
     assert kinds == sorted(
-        ["drivable", "road", "intersection", "lane", "lane", "lane", "lane_group", "lane_group"]
-        + ["crossing", "sidewalk", "stop_line", "carpark_area"]
+        [
+            *["drivable", "road", "intersection", "lane", "lane", "lane", "lane_group", "lane_group"],
+            *["crossing", "sidewalk", "stop_line", "carpark_area"],
+        ]
     )
     network = Network("tiny-town", features)
     assert network.problems == ()

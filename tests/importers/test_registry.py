@@ -43,7 +43,10 @@ def test_built_in_importers_are_always_there() -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_an_installed_importer_is_found_and_may_be_ambiguous(tmp_path: Path) -> None:
-    assert list(registry.importers()) == ["interchange", "nuscenes", "greedy"]
+    names = list(registry.importers())
+    assert names[:2] == ["interchange", "nuscenes"]
+    assert names[-1] == "greedy"
+    assert names.count("interchange") == 1
     assert registry.choose_importer(tmp_path).name == "greedy"
     (tmp_path / "dataset.json").write_text('{"interchange": 1}')
     with pytest.raises(DataError, match="recognised by `interchange` and `greedy`") as error:

@@ -333,7 +333,7 @@ SCENARIOS: Mapping[int, Callable[[Scene], Iterator[Correspondence]]] = {
 
 def _kind(name: str, coarse: bool) -> str | None:
     """`Car`, `Pedestrian` or neither, for a class name of nuScenes or of Scenic's libraries."""
-    family = name.split(".")[0]
+    family = name.split(".", maxsplit=1)[0]
     if name in SCENIC_PEOPLE:
         return "Pedestrian"
     if name in SCENIC_VEHICLES:

@@ -1,10 +1,9 @@
-"""The efficacy experiment of the query paper (section 6.1) on the recordings it used, against an independent reading."""
+"""The efficacy experiment of the query paper (section 6.1) on its recordings, against an independent reading."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,13 +28,13 @@ import five_scenarios  # noqa: E402
 
 
 @pytest.fixture(scope="module", params=SOURCES)
-def data(request, tmp_path_factory) -> Iterator[tuple[Path, Dataset]]:
+def data(request, tmp_path_factory) -> tuple[Path, Dataset]:
     source = SOURCES[request.param]
     if not source.exists():
         pytest.skip(f"{source} is not there: the recordings of the experiment are not free to redistribute")
     target = tmp_path_factory.mktemp("data") / request.param
     ingest(source, target)
-    yield source, open_dataset(target)
+    return source, open_dataset(target)
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,8 @@ from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "match"))
-from programs import HEADER, PROGRAMS  # noqa: E402
-from scenes import label_of  # noqa: E402
+from programs import HEADER, PROGRAMS
+from scenes import label_of
 
 STREET = street()
 OPTIONS = {

@@ -142,15 +142,19 @@ WORDS = [
 SPACES = ["\n", "\n    ", "\n        ", "\t", " "]
 
 
+def check_problem(problem: ScenarioError, text: str) -> None:
+    (diagnostic,) = problem.diagnostics
+    assert diagnostic.span is not None
+    assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+    assert str(problem)
+
+
 def check(text: str, version: int | None = None) -> None:
     source = Source("soup.scenic", text)
     try:
         module = parse(source, version)
     except ScenarioError as problem:
-        (diagnostic,) = problem.diagnostics
-        assert diagnostic.span is not None
-        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
-        assert str(problem)
+        check_problem(problem, text)
         return
     for node in walk(*module.body):
         assert 0 <= node.span.start <= node.span.end <= len(text)

@@ -55,7 +55,7 @@ class Name(Node):
 class Constant(Node):
     """A literal: `1`, `2.5`, `'text'` (adjacent strings are joined), `b'x'`, `True`, `None`, `...`."""
 
-    value: None | bool | int | float | complex | str | bytes | EllipsisType
+    value: bool | int | float | complex | str | bytes | EllipsisType | None
 
 
 @dataclass(frozen=True, slots=True)

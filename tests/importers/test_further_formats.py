@@ -1,0 +1,183 @@
+"""KITTI, OpenLABEL, INTERACTION, motion forecasting: what they lack stays absent; what is unsound is left out."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from scenicq.errors import DataError
+from scenicq.geometry.network import Network
+from scenicq.importers.base import Options
+from scenicq.importers.ingest import IngestSummary, ingest
+from scenicq.importers.interaction import Interaction
+from scenicq.importers.lanelet2_map import utm
+from scenicq.importers.report import Report
+from scenicq.store.dataset import open_dataset
+from scenicq.store.labels import Label
+
+SAMPLES = Path(__file__).parents[2] / "sample_data"
+
+
+def copy(name: str, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(SAMPLES / name, tmp_path / "source"))
+
+
+def read(source: Path, tmp_path: Path, **options: Any) -> tuple[list[Label], IngestSummary]:
+    summary = ingest(source, tmp_path / "d", **options)
+    return list(open_dataset(tmp_path / "d").labels()), summary
+
+
+class TestKitti:
+    def test_the_ego_has_no_size_and_dont_care_is_no_object(self, tmp_path: Path) -> None:
+        labels, _ = read(SAMPLES / "kitti_tiny", tmp_path)
+        assert [label.ego.width for label in labels] == [None] * 6
+        assert [label.ego.x for label in labels] == pytest.approx([0, 1, 2, 3, 4, 5], abs=1e-6)
+        assert labels[2].ego.velocity == pytest.approx((10, 0), abs=1e-5)
+        assert {member.source_class for label in labels for member in label.objects} == {"Car", "Pedestrian"}
+        assert labels[0].sensors == {"image_02": "training/image_02/0000/000000.png"}
+
+    def test_without_poses_nothing_has_a_velocity(self, tmp_path: Path) -> None:
+        source = copy("kitti_tiny", tmp_path)
+        shutil.rmtree(source / "training" / "oxts")
+        labels, summary = read(source, tmp_path)
+        assert {member.velocity for label in labels for member in (label.ego, *label.objects)} == {None}
+        assert {(label.ego.x, label.ego.y) for label in labels} == {(0.0, 0.0)}
+        assert labels[1].objects[0].x == pytest.approx(38.2)
+        assert any(entry.code == "file-missing" and entry.kept for entry in summary.left_out)
+
+    @pytest.mark.parametrize("name", ["oxts", "calib"])
+    def test_an_unsound_companion_leaves_the_sequence_out(self, tmp_path: Path, name: str) -> None:
+        source = copy("kitti_tiny", tmp_path)
+        (source / "training" / name / "0000.txt").write_text("1 2 x\n")
+        with pytest.raises(DataError) as error:
+            ingest(source, tmp_path / "d")
+        assert "file-invalid" in {diagnostic.code for diagnostic in error.value.diagnostics}
+
+    def test_frames_beyond_the_poses_are_left_out(self, tmp_path: Path) -> None:
+        source = copy("kitti_tiny", tmp_path)
+        poses = source / "training" / "oxts" / "0000.txt"
+        poses.write_text("\n".join(poses.read_text().splitlines()[:4]))
+        labels, summary = read(source, tmp_path)
+        assert len(labels) == 4
+        assert [entry.count for entry in summary.left_out if entry.what == "object"] == [4]
+
+
+class TestOpenLabel:
+    def edited(self, tmp_path: Path, edit: Callable[[dict[str, Any]], object]) -> Path:
+        source = copy("openlabel_tiny", tmp_path)
+        content = json.loads((source / "tiny.json").read_text())
+        edit(content["openlabel"])
+        (source / "tiny.json").write_text(json.dumps(content))
+        return source
+
+    def test_the_ego_is_the_vehicle_of_a_coordinate_system(self, tmp_path: Path) -> None:
+        labels, _ = read(SAMPLES / "openlabel_tiny", tmp_path)
+        assert [label.ego.x for label in labels] == pytest.approx([10, 11, 12, 13, 14, 15])
+        assert {label.ego.length for label in labels} == {None}
+        sizes = {(member.length, member.width, member.height) for label in labels for member in label.objects}
+        assert sizes == {(4.5, 1.9, 1.6), (0.7, 0.6, 1.75)}
+        assert [label.timestamp_us for label in labels] == [0, 100000, 200000, 300000, 400000, 500000]
+
+    def test_without_a_vehicle_the_ego_is_chosen(self, tmp_path: Path) -> None:
+        def edit(content: dict[str, Any]) -> None:
+            content["coordinate_systems"] = {}
+            for frame in content["frames"].values():
+                for name in ("0", "1"):
+                    del frame["objects"][name]["object_data"]["cuboid"][0]["coordinate_system"]
+                    frame["objects"][name]["object_data"]["cuboid"][0]["val"][3:-3] = [0.0, 0.0, 1.0]
+
+        labels, summary = read(self.edited(tmp_path, edit), tmp_path)
+        assert {label.ego.track for label in labels} == {"0"}
+        assert labels[0].ego.heading == pytest.approx(1 - math.pi / 2)
+        assert any(entry.name == "no ego" for entry in summary.left_out)
+
+    @pytest.mark.parametrize(
+        "edit",
+        [
+            lambda content: content["coordinate_systems"]["odom"].update(parent="CAM_LEFT"),
+            lambda content: content.update(frames=[]),
+            lambda content: content.pop("frames"),
+        ],
+    )
+    def test_unsound_files_end_in_diagnostics(self, tmp_path: Path, edit: Callable[[dict[str, Any]], object]) -> None:
+        source = self.edited(tmp_path, edit)
+        with pytest.raises(DataError) as error:
+            ingest(source, tmp_path / "d")
+        assert error.value.diagnostics[0].code == "dataset-empty"
+        assert len(error.value.diagnostics) < 30
+
+    def test_a_camera_without_a_sound_pose_has_no_objects(self, tmp_path: Path) -> None:
+        def edit(content: dict[str, Any]) -> None:
+            content["coordinate_systems"]["CAM_LEFT"]["pose_wrt_parent"]["matrix4x4"] = [0.0] * 16
+
+        _, summary = read(self.edited(tmp_path, edit), tmp_path)
+        assert summary.objects == 0
+        assert [entry.count for entry in summary.left_out if entry.what == "object"] == [12]
+
+
+class TestInteraction:
+    def test_people_have_neither_heading_nor_size(self, tmp_path: Path) -> None:
+        labels, _ = read(SAMPLES / "interaction_tiny", tmp_path, ego="1")
+        walkers = [member for label in labels for member in label.objects if member.category == "Pedestrian"]
+        assert {(member.heading, member.width, member.length) for member in walkers} == {(None, None, None)}
+        assert walkers[0].velocity == (0.0, 1.5)
+        assert {label.ego.track for label in labels} == {"1"}
+        assert [label.timestamp_us for label in labels][:2] == [100_000, 200_000]
+
+    def test_lanelets(self) -> None:
+        source = Interaction().read(SAMPLES / "interaction_tiny", Options(), Report())
+        network = Network("TINY_Street", source.maps["TINY_Street"])
+        lanes = {lane.id: lane for lane in network.lanes}
+        # All four share their left line with the opposite lane, which runs backwards for two of them.
+        assert network.roadDirection.values(30, -1) == pytest.approx((-math.pi / 2,), abs=1e-6)
+        assert network.roadDirection.values(30, 1) == pytest.approx((math.pi / 2,), abs=1e-6)
+        assert [lane.id for lane in lanes["1"].successors] == ["3"]
+        assert lanes["1"].group is not None
+        assert lanes["1"].group.opposite is lanes["2"].group
+        assert len(network.intersections) == 1
+        assert lanes["1"].polygon.area == pytest.approx(60 * 3.5, rel=1e-4)
+
+    @pytest.mark.parametrize(
+        ("place", "east", "north"),
+        # By the definition of the grid: 500 km less at the zone's middle; the quadrant to 45 degrees there.
+        [((0.0, 3.0), 333_978.556, 0.0), ((45.0, 3.0), 333_978.556, 4_982_950.400)],
+    )
+    def test_projection(self, place: tuple[float, float], east: float, north: float) -> None:
+        assert utm(*place) == pytest.approx((east, north), abs=0.01)
+
+    def test_a_wrong_table_is_a_diagnostic(self, tmp_path: Path) -> None:
+        source = copy("interaction_tiny", tmp_path)
+        next(source.rglob("vehicle_tracks_000.csv")).write_text("a,b\n1,2\n")
+        with pytest.raises(DataError, match="lacks the columns"):
+            ingest(source, tmp_path / "d")
+
+
+class TestForecasting:
+    def test_nothing_has_a_size(self, tmp_path: Path) -> None:
+        labels, _ = read(SAMPLES / "forecasting_tiny", tmp_path)
+        assert {member.length for label in labels for member in (label.ego, *label.objects)} == {None}
+        assert labels[3].ego.x == pytest.approx(13)
+        assert len(open_dataset(tmp_path / "d").network(labels[0].map).lanes) == 4
+
+    def test_another_schema_is_a_diagnostic(self, tmp_path: Path) -> None:
+        source = copy("forecasting_tiny", tmp_path)
+        pq.write_table(pa.table({"x": [1]}), next(source.rglob("*.parquet")))
+        with pytest.raises(DataError, match="lacks the columns"):
+            ingest(source, tmp_path / "d")
+
+    def test_frames_without_the_ego_are_left_out(self, tmp_path: Path) -> None:
+        source = copy("forecasting_tiny", tmp_path)
+        file = next(source.rglob("*.parquet"))
+        rows = [row for row in pq.read_table(file).to_pylist() if row["track_id"] != "AV" or row["timestep"] != 2]
+        pq.write_table(pa.Table.from_pylist(rows), file)
+        labels, summary = read(source, tmp_path)
+        assert len(labels) == 5
+        assert [entry.count for entry in summary.left_out if entry.what == "label"] == [1]
