@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -13,16 +13,19 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.standin import street
 from scenicq.errors import DataError, Diagnostic, ScenarioError, ScenicqError, Source
 from scenicq.forest.scenario import Scenario
+from scenicq.forest.show import show_forest
 from scenicq.geometry.network import Network
 from scenicq.importers.base import read_maps
 from scenicq.importers.report import Report
+from scenicq.match.constraints import build_groups, describe_constraint
+from scenicq.match.options import MatchOptions
 from scenicq.query.run import beside, read_program
 from scenicq.store.dataset import open_dataset
 
 from .main import ERROR
 from .report import as_json, count, show
 
-__all__ = ["check", "read_version"]
+__all__ = ["check", "networks_of", "read_version"]
 
 _VERSIONS: dict[str, Literal[1, 2, 3]] = {"1": 1, "2": 2, "3": 3}
 
@@ -32,7 +35,7 @@ def read_version(text: str | None) -> Literal[1, 2, 3] | None:
     return None if text is None else _VERSIONS[text]
 
 
-def _networks(dataset: Path | None, map_file: Path | None) -> Iterator[Network]:
+def networks_of(dataset: Path | None, map_file: Path | None) -> Iterator[Network]:
     """The maps to compile against: of the dataset, the one given, or the built-in street."""
     if dataset is not None and map_file is not None:
         hint = "give one of them"
@@ -59,8 +62,22 @@ def _told(scenario: Scenario) -> str:
     )
 
 
+Details = list[Callable[[Scenario], list[str]]]
+
+
+def _groups(scenario: Scenario) -> list[str]:
+    """The groups of jointly dependent constraints in dependency order, all positions and headings observed."""
+    seen = frozenset({"position", "heading"})
+    signature = (*(seen for _ in scenario.objects), frozenset[str](scenario.params))
+    groups = build_groups(scenario, signature, MatchOptions())
+    return [
+        f"{number}. " + ", ".join(describe_constraint(scenario, each) for each in group.constraints)
+        for number, group in enumerate(groups, 1)
+    ]
+
+
 def _found(
-    source: Source, networks: Iterator[Network], version: int | None, initial: bool
+    source: Source, networks: Iterator[Network], version: int | None, initial: bool, details: Details
 ) -> tuple[list[str], list[Diagnostic]]:
     """A line for each map that the scenario fits, and every diagnostic once.
 
@@ -78,7 +95,7 @@ def _found(
             codes = {diagnostic.code for diagnostic in error.diagnostics}
             (lacking if codes == {"map-lacks"} else errors).extend(error.diagnostics)
             continue
-        lines.append(_told(scenario))
+        lines += [_told(scenario), *(f"  {line}" for part in details for line in part(scenario))]
         rest += [*scenario.warnings, *scenario.ignored]
     if lines:
         rest += [
@@ -101,6 +118,8 @@ def _found(
 @click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON map.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
+@click.option("--forest", is_flag=True, help="Print the expression forest.")
+@click.option("--groups", is_flag=True, help="Print the groups of jointly dependent constraints, in order.")
 @click.option(
     "--format",
     "format_",
@@ -110,14 +129,16 @@ def _found(
 )
 @click.pass_context
 def check(ctx: click.Context, scenario: Path, dataset: Path | None, *, map_file: Path | None,
-          scenic: str | None, initial: bool, format_: str) -> None:  # fmt: skip
+          scenic: str | None, initial: bool, forest: bool, groups: bool, format_: str) -> None:  # fmt: skip
     """Say whether a scenario is sound, and how it is read.
 
     It is compiled against each map of the dataset, the map that is given, or else a small built-in street.
     """
     lines: list[str] = []
+    details: Details = [show_forest] * forest + [_groups] * groups
     try:
-        lines, diagnostics = _found(read_program(scenario), _networks(dataset, map_file), read_version(scenic), initial)
+        networks, version = networks_of(dataset, map_file), read_version(scenic)
+        lines, diagnostics = _found(read_program(scenario), networks, version, initial, details)
     except ScenicqError as error:
         if format_ == "text":
             raise

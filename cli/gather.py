@@ -14,10 +14,7 @@ from .pieces import write_gathered
 __all__ = ["gather"]
 
 
-@click.command(
-    epilog="\b\nExample:\n"
-    "  scenicq gather pieces -o matches.parquet"
-)
+@click.command(epilog="\b\nExample:\n  scenicq gather pieces -o matches.parquet")
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, parquet or ids.  [default: as for `match`]")  # fmt: skip

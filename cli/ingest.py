@@ -72,12 +72,13 @@ def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
     metavar="N",
     type=click.IntRange(1),
     default=1,
-    help="Threads that compute what depends on the map.",
+    help="Processes that read and compute.",
 )
 @click.option("--force", is_flag=True, help="Replace a dataset that is there already.")
+@click.option("--update", is_flag=True, help="Add what is new in the source to the dataset that is there already.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary, no warnings.")
 def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str, ...], class_map: Path | None,
-           ego: str | None, strict: bool, jobs: int, force: bool, quiet: bool) -> None:  # fmt: skip
+           ego: str | None, strict: bool, jobs: int, force: bool, update: bool, quiet: bool) -> None:  # fmt: skip
     """Make a dataset from a source, such as a nuScenes folder.
 
     The dataset appears when it is complete: an error or an interrupt leaves what was there before.
@@ -94,6 +95,7 @@ def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str,
             map_cache=user_cache() / "maps",
             strict=strict,
             force=force,
+            update=update,
             jobs=jobs,
             progress=lambda progress: bar.reach(progress.frames, progress.total),
         )

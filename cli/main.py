@@ -28,10 +28,12 @@ COMMANDS = {
     "match": "Find the frames of a dataset that match a scenario.",
     "gather": "Put the shards of a query together, in the order of the dataset.",
     "check": "Say whether a scenario is sound, and how it is read.",
+    "sample": "Draw scenes from a scenario, as labels.",
     "explain": "Say why one frame matches, or what keeps it from it and which tolerance would do.",
     "show": "Draw one frame from above: map, boxes, and what a scenario says of it.",
     "report": "Say which matches came, went and stayed between two result files.",
     "info": "Say what a dataset holds and what was left out of it.",
+    "index": "Compute anew what a dataset holds beside the labels.",
     "doctor": "Say which solvers load here and what is missing.",
     "completion": "Print what makes a shell complete commands and options.",
 }

@@ -75,11 +75,11 @@ def destination(file: Path | None) -> Generator[BinaryIO]:
 
 def _complete(name: Path, file: Path) -> Generator[BinaryIO]:
     beside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-    with writing(name):
-        if file.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-        sink = beside.open("wb")
     try:
+        with writing(name):
+            if file.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            sink = beside.open("wb")
         with sink:
             yield sink
             with writing(name):

@@ -132,7 +132,7 @@ def argoverse2(root: Path) -> None:
                 boxes[key].append(value)
     feather(log / "city_SE3_egovehicle.feather", poses)
     feather(log / "annotations.feather", boxes)
-    write(log / "map" / f"log_map_archive_{log.name}____TNY_city_1.json", json.dumps(archive()))
+    write(log / "map" / f"log_map_archive_{log.name}____TNY_city_1.json", json.dumps(archive(), separators=(",", ":")))
 
 
 def forecasting(root: Path) -> None:
@@ -165,7 +165,7 @@ def forecasting(root: Path) -> None:
     folder = root / "val" / name
     folder.mkdir(parents=True)
     pq.write_table(pa.Table.from_pylist(rows), folder / f"scenario_{name}.parquet", compression="none")
-    write(folder / f"log_map_archive_{name}.json", json.dumps(archive()))
+    write(folder / f"log_map_archive_{name}.json", json.dumps(archive(), separators=(",", ":")))
 
 
 def varint(number: int) -> bytes:
@@ -371,7 +371,7 @@ def openlabel(root: Path) -> None:
             "frame_intervals": [{"frame_start": 0, "frame_end": STEPS - 1}],
         }
     }
-    write(root / "tiny.json", json.dumps(content))
+    write(root / "tiny.json", json.dumps(content, separators=(",", ":")))
 
 
 def interaction(root: Path) -> None:

@@ -25,9 +25,10 @@ from scenicq.forest.nodes import (
     Undefined,
     Value,
 )
+from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import children, is_leaf, postorder
 
-__all__ = ["show", "show_constant"]
+__all__ = ["show", "show_constant", "show_forest"]
 
 
 def show_constant(value: Value) -> str:
@@ -98,3 +99,19 @@ def _show(
             return f"#{number}:{type(node).__name__}({shown})"
         case _:
             return f"{type(node).__name__}({', '.join(args)})"
+
+
+def show_forest(scenario: Scenario) -> list[str]:
+    """The whole forest as lines: what is random or set by the program of each object, requirements, parameters."""
+    numbers: dict[Identity, int] = {}
+    names = {thing.index: thing.name for thing in scenario.objects}
+    lines: list[str] = []
+    for thing in scenario.objects:
+        for name, given in thing.properties.items():
+            if given.explicit or not isinstance(given.value, Constant):
+                lines.append(f"{thing.name}.{name} = {show(given.value, names, numbers)}")
+    lines += [f"param {name} = {show(given.value, names, numbers)}" for name, given in scenario.params.items()]
+    for requirement in scenario.requirements:
+        kind = f" ({requirement.built_in.value})" if requirement.built_in else ""
+        lines.append(f"require{kind} {show(requirement.condition, names, numbers)}")
+    return lines

@@ -14,7 +14,7 @@ from scenicq.geometry.features import MapFeature
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["write_interchange"]
+__all__ = ["label_record", "write_interchange", "write_map"]
 
 
 def write_interchange(dataset: Dataset, frames: Collection[str], folder: Path) -> list[Diagnostic]:
@@ -40,13 +40,13 @@ def write_interchange(dataset: Dataset, frames: Collection[str], folder: Path) -
             skipped += len(label.objects) - len(sound)
             classes.update((member.source_class, member.category) for member in (label.ego, *sound))
             maps.add(label.map)
-            file.write(json.dumps(_line(label, sound), ensure_ascii=False) + "\n")
+            file.write(json.dumps(label_record(label, sound), ensure_ascii=False) + "\n")
     classes.pop("", None)
     known = sorted(maps.intersection(dataset.manifest.maps))
     # The name of a map is that of its file, so it must be one: a name with a slash could lead out of the folder.
     named = [name for name in known if Path(name).name == name]
     for name in named:
-        _write_map(folder / "maps" / f"{name}.geojson", dataset.features(name))
+        write_map(folder / "maps" / f"{name}.geojson", dataset.features(name))
     header = {"name": dataset.manifest.name, "interchange": 1, "angle": "heading", "classes": "classes.json"}
     (folder / "dataset.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
     text = json.dumps(classes or {"car": "Car"}, indent=1, ensure_ascii=False, sort_keys=True)
@@ -61,7 +61,8 @@ def write_interchange(dataset: Dataset, frames: Collection[str], folder: Path) -
     ]
 
 
-def _line(label: Label, objects: list[LabelObject]) -> dict[str, Any]:
+def label_record(label: Label, objects: list[LabelObject]) -> dict[str, Any]:
+    """A label with some of its objects as one line's worth of plain values."""
     line: dict[str, Any] = {
         "id": label.frame,
         "recording": label.recording,
@@ -90,7 +91,8 @@ def _object(member: LabelObject, *, named: bool) -> dict[str, Any]:
     return found
 
 
-def _write_map(file: Path, features: tuple[MapFeature, ...]) -> None:
+def write_map(file: Path, features: tuple[MapFeature, ...]) -> None:
+    """Write map elements as GeoJSON, making the folder if need be."""
     file.parent.mkdir(exist_ok=True)
     collection = {"type": "FeatureCollection", "features": [_feature(feature) for feature in features]}
     file.write_text(json.dumps(collection, ensure_ascii=False) + "\n", encoding="utf-8")

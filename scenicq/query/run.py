@@ -13,7 +13,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
@@ -124,8 +124,22 @@ class Query:
         )
         return scenario, network
 
+    def _check_ego(self) -> None:
+        """Refuse to take a stand-in for an ego that the source does not have."""
+        facts = cast("dict[str, object]", self.dataset.manifest.provenance.get("facts") or {})
+        said = str(facts.get("ego", ""))
+        if said.startswith("none") and self.options.match.ego == "label":
+            raise DataError(
+                Diagnostic(
+                    "option-invalid",
+                    f"{self.dataset.path} was ingested without an ego",
+                    hints=("`--ego any` lets the scenario's ego be any object of its class",),
+                )
+            )
+
     def _worlds(self) -> list[tuple[str, Scenario, Network]]:
         """The scenario over each map that it fits; an error if it fits none."""
+        self._check_ego()
         found: list[tuple[str, Scenario, Network]] = []
         errors: list[ScenarioError] = []
         for name in self.dataset.maps:

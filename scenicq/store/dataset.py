@@ -44,7 +44,8 @@ class Dataset:
 
     def files(self, table: str) -> tuple[Path, ...]:
         """Absolute paths of a table's Parquet files, in the order of their rows."""
-        return tuple((self.path / part.path).resolve() for part in self.manifest.tables[table])
+        root = self.path.resolve()
+        return tuple(root / part.path for part in self.manifest.tables[table])
 
     def connect(self, *, threads: int | None = None, memory_limit: str | None = None) -> duckdb.DuckDBPyConnection:
         """An in-memory DuckDB with one view a table, that can read the dataset's files and nothing else.

@@ -133,10 +133,10 @@ from scenicq.syntax.nodes.statements import (
 
 __all__ = [
     "Altitude", "Angle", "AnnotatedAssign", "ApparentHeading", "ApparentlyFacingSpecifier", "Argument", "Assert",
-    "Assign", "AtSpecifier", "Attribute", "AugmentedAssign", "BeyondSpecifier", "BinaryOp", "BoolOp", "Branch", "Break", "Call",
-    "CanSee", "ClassDef", "Clause", "Compare", "Comparison", "Comprehension", "Constant", 
-    "ContainedInSpecifier", "Continue", "Deg", "Delete", "Dict", "DictComprehension", "DictItem", "DirectionSpecifier", "Distance",
-    "DistancePast", "DynamicDefinition", "DynamicStatement", "Evidence", "ExceptHandler", "Expression",
+    "Assign", "AtSpecifier", "Attribute", "AugmentedAssign", "BeyondSpecifier", "BinaryOp", "BoolOp", "Branch", "Break",
+    "Call", "CanSee", "ClassDef", "Clause", "Compare", "Comparison", "Comprehension", "Constant",
+    "ContainedInSpecifier", "Continue", "Deg", "Delete", "Dict", "DictComprehension", "DictItem", "DirectionSpecifier",
+    "Distance", "DistancePast", "DynamicDefinition", "DynamicStatement", "Evidence", "ExceptHandler", "Expression",
     "ExpressionStatement", "FacingAwayFromSpecifier", "FacingSpecifier", "FacingTowardSpecifier", "FieldAt", "Follow",
     "FollowingSpecifier", "For", "FormattedString", "FunctionDef", "Global", "If", "IfElse", "Implies", "Import",
     "ImportAlias", "ImportFrom", "InSpecifier", "InitialScenario", "Intersects", "Lambda", "List", "Model", "Module",

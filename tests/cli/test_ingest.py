@@ -62,7 +62,7 @@ def test_strict_stops_at_the_first_problem(run, source, tmp_path):
     [
         (["nowhere", "dataset"], "file-missing", "nowhere"),
         (["EMPTY", "dataset"], "dataset-unrecognised", "interchange"),
-        (["SOURCE", "dataset", "--format", "kitti"], "option-invalid", "nuscenes"),
+        (["SOURCE", "dataset", "--format", "laserdisc"], "option-invalid", "nuscenes"),
         (["SOURCE", "dataset", "--map", "no.geojson"], "file-missing", "no.geojson"),
         (["SOURCE", "dataset", "--class-map", "no.json"], "file-missing", "no.json"),
         (["SOURCE", "dataset", "--class-map", "CLASSES"], "unknown-class", "Spaceship"),

@@ -1,0 +1,31 @@
+"""`scenicq index`: compute anew what is derived in a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from scenicq.store.dataset import open_dataset
+from scenicq.store.rebuild import rebuild
+
+from .output import ProgressBar
+from .report import count
+
+__all__ = ["index"]
+
+
+@click.command(epilog="\b\nExample:\n  scenicq index demo/crossroads")
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
+def index(dataset: Path, *, quiet: bool) -> None:
+    """Compute anew what a dataset holds beside the labels.
+
+    Lanes, road directions, memberships, positions relative to the ego and counts are replaced, all at once. Labels,
+    objects, sensor paths and maps stay as they are.
+    """
+    opened = open_dataset(dataset)
+    with ProgressBar(opened.manifest.total.frames, quiet=quiet) as bar:
+        manifest = rebuild(opened, bar.advance)
+    if not quiet:
+        click.echo(f"{dataset}: {count(manifest.total.frames, 'frame')} indexed", err=True)
