@@ -20,47 +20,12 @@ from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "Arithmetic",
-    "ArithmeticOp",
-    "Bearing",
-    "Compare",
-    "CompareOp",
-    "Constant",
-    "Contains",
-    "Coordinate",
-    "DirectionAt",
-    "DiscAt",
-    "DiscreteRange",
-    "Distance",
-    "Encloses",
-    "Feature",
-    "Identity",
-    "Index",
-    "Intersects",
-    "Kind",
-    "Leaf",
-    "Logic",
-    "LogicOp",
-    "Node",
-    "Norm",
-    "Normal",
-    "PointIn",
-    "Range",
-    "RectangleAt",
-    "RegionDifference",
-    "RegionIntersection",
-    "RegionUnion",
-    "Rotate",
-    "Scale",
-    "SectorAt",
-    "Select",
-    "TruncatedNormal",
-    "Undefined",
-    "Value",
-    "Vector",
-    "VectorOf",
-    "VectorSum",
-]
+    "Arithmetic", "ArithmeticOp", "Bearing", "Compare", "CompareOp", "Constant", "Contains", "Coordinate",
+    "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects",
+    "Kind", "Leaf", "Logic", "LogicOp", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt",
+    "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select",
+    "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
+]  # fmt: skip
 
 Vector: TypeAlias = tuple[float, float]
 Kind: TypeAlias = Literal["scalar", "boolean", "vector", "region", "field", "other"]
@@ -418,29 +383,7 @@ class Encloses(_Node):
 
 Leaf: TypeAlias = Range | Normal | TruncatedNormal | DiscreteRange | Index | PointIn
 Node: TypeAlias = (
-    Constant
-    | Feature
-    | Leaf
-    | Select
-    | Arithmetic
-    | Coordinate
-    | Norm
-    | Bearing
-    | Distance
-    | DirectionAt
-    | VectorOf
-    | VectorSum
-    | Scale
-    | Rotate
-    | DiscAt
-    | SectorAt
-    | RectangleAt
-    | RegionUnion
-    | RegionIntersection
-    | RegionDifference
-    | Compare
-    | Logic
-    | Contains
-    | Intersects
-    | Encloses
-)
+    Constant | Feature | Leaf | Select | Arithmetic | Coordinate | Norm | Bearing | Distance | DirectionAt |
+    VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt | RectangleAt | RegionUnion | RegionIntersection |
+    RegionDifference | Compare | Logic | Contains | Intersects | Encloses
+)  # fmt: skip

@@ -43,9 +43,13 @@ class Partial:
             OSError: The place cannot be written.
             DataError: `target-exists` while another process writes there.
         """
-        while self._lock is None:
-            self.folder.mkdir(exist_ok=True)
-            self._lock = self._locked()
+        try:
+            while self._lock is None:
+                self.folder.mkdir(exist_ok=True)
+                self._lock = self._locked()
+        except KeyboardInterrupt:
+            self._abandon()
+            raise
         if self._aside.exists():
             if os.path.lexists(self.target):
                 shutil.rmtree(self._aside)
@@ -67,6 +71,13 @@ class Partial:
             message = f"another ingest is writing {self.target}"
             raise DataError(Diagnostic("target-exists", message, hints=("wait until it ends",))) from error
         return file
+
+    def _abandon(self) -> None:
+        """Remove a folder that was made and not yet held, unless somebody holds it or it is worth going on from."""
+        with suppress(OSError, DataError):
+            self._lock = self._locked()
+            if self._lock is not None and [path.name for path in self.folder.iterdir()] == [_LOCK]:
+                self.remove()
 
     def clear(self) -> None:
         """Remove what an earlier process left in the folder."""

@@ -132,7 +132,7 @@ def test_an_interrupted_ingest_leaves_nothing(command, big_source, tmp_path, num
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_match_leaves_no_file(command, crossroads, scenarios, tmp_path, number):
     file = tmp_path / "matches.jsonl"
-    slow = ("--no-prefilter", "--method", "smt", "--solver", "portable", "--all")
+    slow = ("--no-prefilter", "--method", "smt", "--solver", "sleep 60", "--timeout", "60", "--all")
     words = [command, "match", str(scenarios / "04_two_lane_traffic.scenic"), str(crossroads), "-o", str(file), *slow]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         deadline = time.monotonic() + 60
