@@ -112,11 +112,24 @@ def big_source(tmp_path_factory):
     return source
 
 
+def _heed_interrupts() -> None:
+    """A job in the background of a shell ignores interrupts, and so would what it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+PIPES = {
+    "stdout": subprocess.PIPE,
+    "stderr": subprocess.PIPE,
+    "text": True,
+    "preexec_fn": None if os.name == "nt" else _heed_interrupts,
+}
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_ingest_leaves_nothing(command, big_source, tmp_path, number):
     words = [command, "ingest", str(big_source), str(tmp_path / "dataset"), "-q"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(words, **PIPES) as process:
         # it has begun as soon as something is written beside the target
         deadline = time.monotonic() + 60
         while not any(tmp_path.iterdir()) and process.poll() is None and time.monotonic() < deadline:
@@ -134,7 +147,7 @@ def test_an_interrupted_match_leaves_no_file(command, crossroads, scenarios, tmp
     file = tmp_path / "matches.jsonl"
     slow = ("--no-prefilter", "--method", "smt", "--solver", "sleep 60", "--timeout", "60", "--all")
     words = [command, "match", str(scenarios / "04_two_lane_traffic.scenic"), str(crossroads), "-o", str(file), *slow]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(words, **PIPES) as process:
         deadline = time.monotonic() + 60
         while not any(tmp_path.iterdir()) and process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.01)

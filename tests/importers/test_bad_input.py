@@ -377,6 +377,11 @@ def test_progress_counts_up(source: Path, tmp_path: Path) -> None:
     assert {progress.total for progress in seen} == {156}
 
 
+def _heed_interrupts() -> None:
+    """A job in the background of a shell ignores interrupts, and so would what it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_in_the_middle(source: Path, tmp_path: Path, number: signal.Signals) -> None:
@@ -390,7 +395,9 @@ def test_signal_in_the_middle(source: Path, tmp_path: Path, number: signal.Signa
     """)
     arguments = [sys.executable, "-c", program, str(source), str(tmp_path / "d")]
     environment = os.environ | {"PYTHONPATH": str(SAMPLES.parent)}
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment) as process:
+    with subprocess.Popen(
+        arguments, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment, preexec_fn=_heed_interrupts
+    ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == b"writing\n"
         assert len(list(tmp_path.iterdir())) == 2
