@@ -396,7 +396,11 @@ def test_signal_in_the_middle(source: Path, tmp_path: Path, number: signal.Signa
     arguments = [sys.executable, "-c", program, str(source), str(tmp_path / "d")]
     environment = os.environ | {"PYTHONPATH": str(SAMPLES.parent)}
     with subprocess.Popen(
-        arguments, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment, preexec_fn=_heed_interrupts
+        arguments,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env=environment,
+        preexec_fn=_heed_interrupts,  # noqa: PLW1509
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == b"writing\n"
