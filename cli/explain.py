@@ -32,7 +32,7 @@ def find_label(dataset: Dataset, frame: str) -> Label:
     """
     for label in dataset.labels([frame]):
         return label
-    hint = "`scenicq match SCENARIO DATASET --all --format ids` lists the frames"
+    hint = "`scenicq match SCENARIO DATASET --all` lists the frames"
     raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{frame}`", hints=(hint,)))
 
 
