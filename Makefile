@@ -47,7 +47,7 @@ golden: $(READY) ## Rewrite the golden files that tests compare with
 
 bench: $(READY) ## Measure queries, start-up and ingest; numbers go to bench-results/
 	$(BIN)/python tests/bench/queries.py
-	$(BIN)/python tests/bench/scalability.py
+	$(BIN)/python tests/bench/scalability.py --quick
 
 MAP ?= Town01.xodr
 conformance: $(READY) ## Compare with Scenic 3.1.1: scenes that it draws must match (MAP=an OpenDRIVE file)
