@@ -27,6 +27,7 @@ from .main import NOTHING
 from .options import DEFAULTS, query_options
 from .output import ProgressBar, choose_format, destination, writing
 from .pieces import Shard, parse_shard, run_resumable, run_shard
+from .plan import show_plan
 from .report import show_few
 
 __all__ = ["match"]
@@ -96,6 +97,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--export", metavar="FORM DIR", type=(click.Choice(list(EXPORTS)), click.Path(path_type=Path)),
               help="Hand the matching frames on, too, in a new folder DIR: nuscenes-tokens, argoverse2, paths (of "
               "sensor files), interchange (to ingest elsewhere) or openlabel.")
+@click.option("--explain", is_flag=True,
+              help="Print what SQL decides and what stays for the matcher, and match nothing.")
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures of the matches, too: DIR/index.html.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
@@ -107,7 +110,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.pass_context
 def match(ctx: click.Context, scenario: Path, dataset: Path, *, format_: str | None, output: Path | None,
           export: tuple[str, Path] | None, near: int | None, report: Path | None, shard: Shard | None, resume: bool,
-          exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
+          explain: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
 
@@ -117,6 +120,9 @@ def match(ctx: click.Context, scenario: Path, dataset: Path, *, format_: str | N
     file = None if output is None or str(output) == "-" else output
     chosen = choose_format(format_, None if shard else file)
     query = Query(open_dataset(dataset), read_program(scenario), query_options(given))
+    if explain:
+        show_plan(query)
+        return
     if shard or resume:
         _in_pieces(ctx, query, shard, file, chosen, quiet=quiet)
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)

@@ -63,3 +63,14 @@ def test_pieces_need_a_place_and_go_alone(run, program, crossroads, extra):
     found = run("match", program, crossroads, "--resume", *extra)
     assert found.exit_code == 2
     assert "--resume" in found.stderr
+
+
+def test_the_plan_is_printed_with_the_frames_left_after_each_step(run, program, crossroads):
+    found = run("match", program, crossroads, *TOLERANCE, "--explain")
+    assert found.exit_code == 0, found.stderr
+    assert "map crossroads: 156 frames" in found.stdout
+    steps = [line.split() for line in found.stdout.splitlines() if program.name in line]
+    left = [int(words[0]) for words in steps]
+    assert left == sorted(left, reverse=True)
+    assert any("pedestrian.class" in words for words in steps)
+    assert "FROM memberships" in found.stdout
