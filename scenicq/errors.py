@@ -125,10 +125,6 @@ class Span:
         """The characters of the span."""
         return self.source.text[self.start : self.end]
 
-    def to(self, other: Span) -> Span:
-        """The span from the start of this one to the end of the other."""
-        return Span(self.source, self.start, max(self.end, other.end))
-
 
 @dataclass(frozen=True, slots=True)
 class Note:

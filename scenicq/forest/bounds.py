@@ -65,6 +65,12 @@ def _hull(parts: list[Interval]) -> Interval:
     return (min(low for low, _ in parts), max(high for _, high in parts))
 
 
+def _common(a: Box, b: Box) -> Box:
+    """The box that two boxes have in common; an empty one has an end before its start."""
+    (ax, ay), (bx, by) = a, b
+    return (max(ax[0], bx[0]), min(ax[1], bx[1])), (max(ay[0], by[0]), min(ay[1], by[1]))
+
+
 def _largest(a: Interval) -> float:
     return max(abs(a[0]), abs(a[1]))
 
@@ -134,10 +140,7 @@ def _of_leaf(node: Node, args: list[_Bounds], leaves: Mapping[Identity, _Bounds]
                 west, south, east, north = region_bounds(cast(Region, node.region.value))
                 own = ((west, east), (south, north))
             given = leaves.get(node.identity)
-            if given is None:
-                return own
-            pairs = zip(own, cast(Box, given), strict=True)
-            return cast(Box, tuple((max(a[0], b[0]), min(a[1], b[1])) for a, b in pairs))
+            return own if given is None else _common(own, cast(Box, given))
         case _:
             own = EVERYTHING
     return own
@@ -231,9 +234,7 @@ def point_boxes(root: Node, target: Box) -> dict[Identity, Box]:
         match node:
             case PointIn():
                 old = boxes.get(node.identity, _PLANE)
-                boxes[node.identity] = cast(
-                    Box, tuple((max(a[0], b[0]), min(a[1], b[1])) for a, b in zip(old, box, strict=True))
-                )
+                boxes[node.identity] = _common(old, box)
             case VectorSum():
                 for one, other in ((node.left, node.right), (node.right, node.left)):
                     rest = cast(Box, known[id(other)] or _PLANE)
@@ -259,7 +260,5 @@ def leaf_boxes(roots: list[tuple[Node, Box]]) -> dict[Identity, Box]:
     for root, target in roots:
         for identity, box in point_boxes(root, target).items():
             old = boxes.get(identity, _PLANE)
-            boxes[identity] = cast(
-                Box, tuple((max(a[0], b[0]), min(a[1], b[1])) for a, b in zip(old, box, strict=True))
-            )
+            boxes[identity] = _common(old, box)
     return boxes

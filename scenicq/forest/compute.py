@@ -202,9 +202,15 @@ def covers(outer: Region, box: shapely.Polygon) -> bool:
             raise CannotEvaluate(f"whether a {type(outer).__name__} holds a box")
 
 
-def directions(field: Value, point: Value) -> tuple[float, ...]:
-    """The headings that a vector field allows at a point; empty where it is undefined."""
-    return cast(VectorField, field).values(*cast(Vector, point))
+def directions(field: Value, point: Value) -> tuple[float, ...] | Undefined:
+    """The headings that a vector field allows at a point, at least one; `Undefined` where it has none."""
+    for arg in (field, point):
+        if isinstance(arg, Undefined):
+            return arg
+    x, y = cast(Vector, point)
+    allowed = cast(VectorField, field).values(x, y)
+    name = getattr(field, "name", "the field")
+    return allowed or Undefined(f"`{name}` is undefined at ({x:.2f}, {y:.2f})")
 
 
 def compute(node: Node, args: tuple[Value, ...]) -> Value:

@@ -25,7 +25,6 @@ from scenicq.forest.nodes import (
     Select,
     Undefined,
     Value,
-    Vector,
 )
 from scenicq.forest.walk import children, is_leaf, transform
 
@@ -121,15 +120,10 @@ def _fold_logic(node: Logic) -> Node:
 
 
 def _fold_direction(node: DirectionAt, args: tuple[Value, ...]) -> Node:
-    for arg in args:
-        if isinstance(arg, Undefined):
-            return Constant(arg, span=node.span)
     allowed = directions(*args)
+    if isinstance(allowed, Undefined):
+        return Constant(allowed, span=node.span)
     if len(allowed) == 1:
         return Constant(allowed[0], span=node.span)
-    if not allowed:
-        x, y = cast(Vector, args[1])
-        name = getattr(args[0], "name", "the field")
-        return Constant(Undefined(f"`{name}` is undefined at ({x:.2f}, {y:.2f})"), span=node.span)
     index = Index((1.0,) * len(allowed), span=node.span)
     return Select(index, tuple(Constant(heading, span=node.span) for heading in allowed), span=node.span)

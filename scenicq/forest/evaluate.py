@@ -83,14 +83,9 @@ def evaluate_all(
 def _direction(
     node: DirectionAt, args: tuple[Value, ...], choose: Callable[[DirectionAt, tuple[float, ...]], float] | None
 ) -> Value:
-    for arg in args:
-        if isinstance(arg, Undefined):
-            return arg
     allowed = directions(*args)
-    if not allowed:
-        x, y = cast(Vector, args[1])
-        name = getattr(args[0], "name", "the field")
-        return Undefined(f"`{name}` is undefined at ({x:.2f}, {y:.2f})")
+    if isinstance(allowed, Undefined):
+        return allowed
     first, *others = allowed
     return choose(node, allowed) if choose and others else first
 

@@ -78,11 +78,6 @@ def bounds_of(shape: Shape) -> Bounds:
     return shape.bounds
 
 
-def each_bounds(geometries: Sequence[Shape]) -> NDArray[np.float64]:
-    """Boxes (n, 4) around geometries."""
-    return shapely.bounds(array(geometries))
-
-
 def tree_query(tree: STRtree, shape: Shape) -> NDArray[np.intp]:
     """Indices of the geometries whose boxes meet the box of a shape."""
     return cast("NDArray[np.intp]", tree.query(shape))
@@ -118,11 +113,6 @@ def distance(a: Shape, b: Shape) -> float:
 def distances(a: NDArray[Any], b: NDArray[Any] | Shape) -> NDArray[np.float64]:
     """Distances of geometries, pair by pair."""
     return shapely.distance(a, b)
-
-
-def meet(a: Shape, b: Shape) -> bool:
-    """Whether two geometries share a point."""
-    return bool(shapely.intersects(a, b))
 
 
 def covers(a: Shape, b: Shape) -> bool:
@@ -232,11 +222,6 @@ def triangulate(shape: Shape) -> NDArray[np.float64]:
 def without_straight_corners(shape: Shape) -> Shape:
     """The same shape without the vertices that lie exactly on a straight edge."""
     return shapely.simplify(shape, 0.0)
-
-
-def is_polygonal(shape: Shape) -> bool:
-    """Whether it is a Polygon or MultiPolygon."""
-    return shape.geom_type in ("Polygon", "MultiPolygon")
 
 
 def polygonal_part(shape: Shape) -> tuple[Shape, ...]:

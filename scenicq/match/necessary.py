@@ -61,8 +61,6 @@ Array: TypeAlias = Any
 """A float, or an array of floats that broadcasts with the others."""
 Span: TypeAlias = tuple[Array, Array]
 """Lower and upper bounds."""
-Truth: TypeAlias = tuple[Array, Array]
-"""Whether a condition can hold, and whether it can fail."""
 Observed = Callable[[int, str], Array | tuple[Array, Array] | None]
 """What is observed of an object: numbers or a pair of them for all its candidates; None where it is no number."""
 

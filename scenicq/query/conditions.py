@@ -35,6 +35,7 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
 from scenicq.query.expression import SLACK, Columns, angle_between, number, requirement_sql
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
+from scenicq.store.sql import sql_text
 
 __all__ = ["Condition", "object_conditions"]
 
@@ -102,20 +103,16 @@ def _names(network: Network) -> _Names:
     return _Names(kinds, elements)
 
 
-def _text(value: str) -> str:
-    return "'" + value.replace("'", "''") + "'"
-
-
 def _near(region: Region, names: _Names, reach: float) -> str | None:
     """A condition on the columns of `memberships` that some row of an object in the region meets."""
     match region:
         case PolygonSet():
             known = region.ids and all(name in names.elements for name in region.ids)
             if id(region) in names.kinds:
-                wanted = ", ".join(map(_text, names.kinds[id(region)]))
+                wanted = ", ".join(map(sql_text, names.kinds[id(region)]))
                 chosen = f"kind IN ({wanted})"
             elif known and len(region.ids) <= _MOST_IDS and len(region.ids) == len(region.polygons):
-                chosen = f"region IN ({', '.join(_text(names.elements[name]) for name in region.ids)})"
+                chosen = f"region IN ({', '.join(sql_text(names.elements[name]) for name in region.ids)})"
             else:
                 return None
             return f"({chosen} AND distance <= {number(reach + SLACK)})"

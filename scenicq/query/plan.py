@@ -17,6 +17,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.query.conditions import Condition, object_conditions
 from scenicq.query.expression import SLACK, number
 from scenicq.store.classes import ROOT, class_matches, subclasses
+from scenicq.store.sql import sql_text
 
 __all__ = ["Excluded", "Plan", "Step", "frames_sql", "make_plan"]
 
@@ -86,13 +87,9 @@ class Plan:
         return left
 
 
-def _text(value: str) -> str:
-    return "'" + value.replace("'", "''") + "'"
-
-
 def _class_sql(category: str, options: MatchOptions) -> str:
     names = sorted(name for name in subclasses(ROOT) if class_matches(category, name, options.classes))
-    return f"class IN ({', '.join(map(_text, names))})" if names else "false"
+    return f"class IN ({', '.join(map(sql_text, names))})" if names else "false"
 
 
 def _filled(condition: Condition, near: dict[str, str]) -> str:
@@ -161,8 +158,10 @@ def _flags(name: str, near: dict[str, str], *, ego: bool) -> str:
 
 def frames_sql(map_name: str, recordings: tuple[str, str] | None) -> str:
     """The frames of a map, possibly between two recordings."""
-    between = "" if recordings is None else f" AND recording BETWEEN {_text(recordings[0])} AND {_text(recordings[1])}"
-    return f"SELECT * FROM labels WHERE map = {_text(map_name)}{between}"
+    between = (
+        "" if recordings is None else f" AND recording BETWEEN {sql_text(recordings[0])} AND {sql_text(recordings[1])}"
+    )
+    return f"SELECT * FROM labels WHERE map = {sql_text(map_name)}{between}"
 
 
 def _query(

@@ -66,10 +66,6 @@ class Plane:
         """Points (n, 2) of the map as points of the picture, rounded to a centimetre."""
         return np.rint((xy - np.array(self.origin)) * (100.0, -100.0)).astype(np.int64)
 
-    def to_map(self, xy: Coordinates) -> Coordinates:
-        """Points (n, 2) of the picture as points of the map."""
-        return xy / (100.0, -100.0) + np.array(self.origin)
-
     def at(self, x: float, y: float) -> tuple[int, int]:
         """One point of the map as a point of the picture."""
         (found,) = self.to_picture(np.array([(x, y)])).tolist()

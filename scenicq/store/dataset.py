@@ -21,6 +21,7 @@ from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, Part, read_manifest
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
+from scenicq.store.sql import sql_text
 
 __all__ = ["Dataset", "open_dataset"]
 
@@ -136,7 +137,7 @@ def _problem(folder: Path, part: Part) -> Diagnostic | None:
 
 
 def _sql_list(texts: Iterable[str]) -> str:
-    return "[" + ", ".join("'" + text.replace("'", "''") + "'" for text in texts) + "]"
+    return "[" + ", ".join(map(sql_text, texts)) + "]"
 
 
 def _checksum(path: Path) -> str:
