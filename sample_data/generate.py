@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -348,8 +349,10 @@ def write(path: Path, text: str) -> None:
 
 
 def compact(value: object) -> str:
-    """JSON without blanks."""
-    return json.dumps(value, separators=(",", ":"))
+    """JSON without blanks, and whole numbers without a fraction."""
+    return re.sub(r"(?<=[\[,:])(-?\d+)\.0(?=[\],}])", r"\1", json.dumps(value, separators=(",", ":"))).replace(
+        ":-0,", ":0,"
+    )
 
 
 def main(folder: Path = HERE) -> None:

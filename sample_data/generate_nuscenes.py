@@ -46,9 +46,9 @@ def nuscenes_tables() -> dict[str, list[dict[str, Any]]]:
         "log": [
             {
                 "token": token("log"),
-                "logfile": "tiny",
+                "logfile": "n000-2020-09-13-20-26-40+0800",
                 "vehicle": "tiny",
-                "date_captured": "2026-01-02",
+                "date_captured": "2020-09-13",
                 "location": "tiny-town",
             }
         ],
@@ -144,13 +144,19 @@ def add_scene(tables: dict[str, list[dict[str, Any]]], scene: str, words: str) -
 
 def nuscenes_map() -> dict[str, Any]:
     """A street of two lanes from west to east, that ends in an intersection with a connecting lane to the left."""
-    layers: dict[str, Any] = {"version": "1.3", "node": [], "polygon": []}
+    layers: dict[str, Any] = {"version": "1.3", "node": [], "polygon": [], "line": []}
 
     def polygon(name: str, corners: Sequence[Point]) -> str:
         nodes = [token(f"{name} {number}") for number in range(len(corners))]
         layers["node"] += [{"token": node, "x": x, "y": y} for node, (x, y) in zip(nodes, corners, strict=True)]
         layers["polygon"].append({"token": token(f"{name} polygon"), "exterior_node_tokens": nodes, "holes": []})
         return token(f"{name} polygon")
+
+    def line(name: str, *points: Point) -> str:
+        nodes = [token(f"{name} {number}") for number in range(len(points))]
+        layers["node"] += [{"token": node, "x": x, "y": y} for node, (x, y) in zip(nodes, points, strict=True)]
+        layers["line"].append({"token": token(f"{name} line"), "node_tokens": nodes})
+        return token(f"{name} line")
 
     def box(west: float, south: float, east: float, north: float) -> list[Point]:
         return [(west, south), (east, south), (east, north), (west, north)]
@@ -166,8 +172,20 @@ def nuscenes_map() -> dict[str, Any]:
     layer(
         "road_segment", {"street": (street, {"is_intersection": False}), "square": (square, {"is_intersection": True})}
     )
-    layer("road_block", {"eastward": (box(0, -3.5, 100, 0), {}), "westward": (box(0, 0, 100, 3.5), {})})
-    layer("lane", {"lane east": (box(0, -3.5, 100, 0), {"lane_type": "CAR"}), "lane west": (box(0, 0, 100, 3.5), {})})
+    east = {
+        "from_edge_line_token": line("east begins", (0, -3.5), (0, 0)),
+        "to_edge_line_token": line("east ends", (100, -3.5), (100, 0)),
+    }
+    west = {
+        "from_edge_line_token": line("west begins", (100, 3.5), (100, 0)),
+        "to_edge_line_token": line("west ends", (0, 3.5), (0, 0)),
+    }
+    inside = {"road_segment_token": token("street")}
+    areas = {"east": box(0, -3.5, 100, 0), "west": box(0, 0, 100, 3.5)}
+    layer("road_block", {"eastward": (areas["east"], east | inside), "westward": (areas["west"], west | inside)})
+    kind = {"lane_type": "CAR", "left_lane_divider_segments": [], "right_lane_divider_segments": []}
+    layer("lane", {"lane east": (areas["east"], kind | east), "lane west": (areas["west"], kind | west)})
+    layers["road_divider"] = [{"token": token("divider"), "line_token": line("divider", (0, 0), (100, 0)), **inside}]
     layer("lane_connector", {"turn": (box(100, -3.5, 115, 10), {})})
     layer("ped_crossing", {"crossing": (box(46, -3.5, 54, 3.5), {"road_segment_token": token("street")})})
     layer("walkway", {"walkway": (box(0, -6, 100, -3.5), {})})
@@ -193,7 +211,16 @@ def nuscenes_map() -> dict[str, Any]:
 def write(path: Path, content: object) -> None:
     """Write a JSON file."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(content, indent=0) + "\n", encoding="utf-8", newline="\n")
+    path.write_text(spelled(content) + "\n", encoding="utf-8", newline="\n")
+
+
+def spelled(content: object) -> str:
+    """JSON with a row of a table, or a layer of a map, on each line."""
+    if isinstance(content, dict):
+        rows = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
+        return "{\n" + ",\n".join(rows) + "\n}"
+    rows = [json.dumps(row) for row in content] if isinstance(content, list) else [json.dumps(content)]
+    return "[\n" + ",\n".join(rows) + "\n]"
 
 
 def main(folder: Path = HERE) -> None:

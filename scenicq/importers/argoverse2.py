@@ -20,6 +20,7 @@ from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_feather
 from scenicq.importers.fields import InvalidError
+from scenicq.importers.folders import first_files, readable
 from scenicq.importers.motion import Rigid, quaternion, velocities
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
@@ -99,7 +100,7 @@ class _Box:
 
 def archive_of(folder: Path) -> Path | None:
     """The vector map of a folder: the first by name, None if there is none."""
-    return next(iter(sorted(folder.glob("log_map_archive_*.json"))), None)
+    return next(iter(first_files(folder, "log_map_archive_*.json")), None)
 
 
 def _read_log(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
@@ -217,7 +218,7 @@ class _Log:
                 after = bisect_left(images, (time, ""))
                 near = min(images[max(0, after - 1) : after + 1], key=lambda image: abs(image[0] - time))
                 sensors[camera] = f"{start}sensors/cameras/{camera}/{near[1]}"
-        return dict(sorted(sensors.items()))
+        return {readable(channel): readable(path) for channel, path in sorted(sensors.items())}
 
 
 def _moves(places: Sequence[tuple[int, float, float]]) -> list[tuple[float, float] | None]:

@@ -17,6 +17,7 @@ from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_parquet
 from scenicq.importers.fields import InvalidError
+from scenicq.importers.folders import first_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
@@ -68,10 +69,7 @@ class Argoverse2Forecasting:
 
 
 def _scenarios(path: Path) -> list[Path]:
-    for pattern in ("scenario_*.parquet", "*/scenario_*.parquet", "*/*/scenario_*.parquet"):
-        if found := sorted(path.glob(pattern)):
-            return found
-    return []
+    return first_files(path, "scenario_*.parquet", "*/scenario_*.parquet", "*/*/scenario_*.parquet")
 
 
 def _name(file: Path) -> str:

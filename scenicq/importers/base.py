@@ -14,6 +14,7 @@ from typing import Any, Protocol, cast
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature, ProblemSink, dangling, read_geojson
 from scenicq.importers.fields import InvalidError, check_characters, parse_json
+from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.columns import RecordingColumns
@@ -286,7 +287,7 @@ def read_class_map(path: Path) -> dict[str, str]:
         DataError: `file-missing`, `file-invalid`, or `unknown-class` for a class that the tree lacks.
     """
     try:
-        content = parse_json(path.read_bytes())
+        content = parse_json(read_bytes(path))
     except OSError as error:
         raise DataError(Diagnostic("file-missing", f"class map {path} cannot be read: {error.strerror}")) from error
     except InvalidError as error:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.base import ClassNames, Entry, Labels, Source
+from scenicq.importers.folders import readable
 from scenicq.importers.report import Report
 from scenicq.store.labels import Label, Recording
 
@@ -94,10 +95,11 @@ def by_file_source(
         object_bytes: About what a label object takes in the main file.
         facts: See `Source`.
     """
-    ordered = sorted(places, key=lambda place: place.name)
+    named = (replace(place, name=readable(place.name), map=readable(place.map)) for place in places)
+    ordered = sorted(named, key=lambda place: place.name)
     by_name = {place.name: place for place in ordered}
     return Source(
-        name=name,
+        name=readable(name),
         maps=maps,
         entries=tuple(
             Entry(
@@ -159,7 +161,7 @@ def take_map(
         maps: Takes it.
         report: Takes what is unsound.
     """
-    if name in maps:
+    if (name := readable(name)) in maps:
         return
     try:
         maps[name] = read(file, map_sink(file.name, report))

@@ -85,6 +85,9 @@ def _check_rows(path: Path, rows: int) -> None:
 
 
 def _columns(path: Path, table: Any, wanted: Mapping[str, str], optional: Mapping[str, str]) -> dict[str, Any]:
+    twice = [name for name in (*wanted, *optional) if table.schema.names.count(name) > 1]
+    if twice:
+        raise DataError(Diagnostic("file-invalid", f"{path} has the column `{twice[0]}` more than once"))
     missing = [name for name in wanted if name not in table.schema.names]
     if missing:
         listed = ", ".join(f"`{name}`" for name in missing)

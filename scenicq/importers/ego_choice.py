@@ -1,8 +1,7 @@
 """An ego for sources that have none: a track that the user names, or in each frame the vehicle in the middle.
 
-Nothing is invented: the ego is one of the objects, with its own features. With `none` it is stored the same way, since
-a frame needs a point of view, but the dataset's facts say that it is no recording car; `--ego any` at matching then
-lets every object be it.
+Nothing is invented: the ego is one of the objects, with its own features. With `none` there is none, only a point to
+look from; `--ego any` at matching then lets every object be the scenario's ego.
 """
 
 from __future__ import annotations
@@ -11,11 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from scenicq.importers.folders import readable
 from scenicq.importers.report import Report
 from scenicq.store.classes import is_subclass
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["Moment", "ego_facts", "with_egos"]
+__all__ = ["Moment", "ego_facts", "viewpoint", "with_egos"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,8 @@ def ego_facts(choice: str | None) -> dict[str, Any]:
         "nearest": "the vehicle nearest to the middle of all objects, in each frame; the source has no ego",
         "none": "none: the source has no ego; match with `--ego any`",
     }
-    return {"ego": said.get(choice or "nearest", f"track `{choice}`; the source has no ego")}
+    name = readable(choice or "nearest")
+    return {"ego": said.get(name, f"track `{name}`; the source has no ego")}
 
 
 def with_egos(
@@ -58,25 +59,36 @@ def with_egos(
         report.kept("recording", "record-invalid", message, name="no ego", hints=(hint,))
     made: list[tuple[Label, str]] = []
     for moment in moments:
-        ego = _ego(moment.objects, choice)
+        ego = viewpoint(moment.objects) if choice == "none" else _ego(moment.objects, choice)
         if ego is None:
             what = f"track `{choice}`" if choice not in (None, "nearest", "none") else "object"
             report.left_out("label", "record-invalid", f"{place}: frame `{moment.frame}` has no {what} to be the ego")
             continue
         others = tuple(member for member in moment.objects if member is not ego)
-        named = replace(ego, id="ego", track=ego.track or ego.id)
+        named = ego if ego.id == "ego" else replace(ego, id="ego", track=ego.track or ego.id)
         label = Label(moment.frame, recording, moment.timestamp_us, map_name, named, others, moment.params)
         made.append((label, place))
     return made
 
 
+def viewpoint(objects: Sequence[LabelObject]) -> LabelObject | None:
+    """What stands for the ego in a frame that has none: the middle of all objects, without class, heading or size.
+
+    None where there are no objects.
+    """
+    return LabelObject("ego", "", "", *_middle(objects)) if objects else None
+
+
 def _ego(objects: Sequence[LabelObject], choice: str | None) -> LabelObject | None:
-    if choice not in (None, "nearest", "none"):
+    if choice not in (None, "nearest"):
         return next((member for member in objects if choice in (member.track, member.id)), None)
     vehicles = [member for member in objects if is_subclass(member.category, "Vehicle") and member.heading is not None]
-    candidates = vehicles or (objects if choice == "none" else ())
-    if not candidates:
+    if not vehicles:
         return None
-    x = sum(member.x for member in objects) / len(objects)
-    y = sum(member.y for member in objects) / len(objects)
-    return min(candidates, key=lambda member: ((member.x - x) ** 2 + (member.y - y) ** 2, member.id))
+    x, y = _middle(objects)
+    return min(vehicles, key=lambda member: ((member.x - x) ** 2 + (member.y - y) ** 2, member.id))
+
+
+def _middle(objects: Sequence[LabelObject]) -> tuple[float, float]:
+    count = len(objects)
+    return sum(member.x for member in objects) / count, sum(member.y for member in objects) / count

@@ -189,5 +189,5 @@ def _parquet_lines(file: Path, report: Report) -> Iterator[bytes]:
                     except TypeError as error:
                         report.left_out("label", "record-invalid", f"{file.name}:{row}: {error}")
                         yield b"\n"
-    except pa.ArrowInvalid as error:
+    except (pa.ArrowException, ValueError, OverflowError) as error:
         raise DataError(Diagnostic("file-invalid", f"{file} is not a Parquet file: {error}")) from error

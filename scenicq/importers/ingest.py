@@ -15,6 +15,7 @@ from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.base import Entry, Importer, Options, Source, read_class_map
+from scenicq.importers.folders import readable
 from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
@@ -200,7 +201,7 @@ def _write_all(
                 moves.append((number, *found))
             else:
                 names = [entry.name for entry in groups[number]]
-                waiting.append(Job(number, opened.reader(names), mark, taken))
+                waiting.append(Job(number, opened.reader(names), mark, names[0], taken))
         reused += _take_over(writer, moves, reached)
         try:
             written = write_segments(world, waiting, jobs, reached)
@@ -259,7 +260,7 @@ def _map_files(maps: Sequence[str | Path]) -> dict[str, Path]:
         path = Path(file if equals else name)
         if not path.is_file():
             raise DataError(Diagnostic("file-missing", f"map {path} is not there"))
-        files[name if equals else path.stem] = path
+        files[readable(name if equals else path.stem)] = path
     return files
 
 
@@ -267,15 +268,14 @@ def _provenance(
     source: Path, opened: Source, options: Options, class_map: str | Path | None, strict: bool
 ) -> dict[str, object]:
     return {
-        # A file's name need not be text.
-        "source": str(source).encode(errors="backslashreplace").decode(),
+        "source": readable(source),
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": {"python": platform.python_version()}
         | {package: _version(package) for package in ("scenicq", "numpy", "pyarrow", "shapely")},
         "options": {
-            "maps": {name: str(file) for name, file in options.maps.items()},
-            "class_map": None if class_map is None else str(class_map),
-            "ego": options.ego,
+            "maps": {readable(name): readable(file) for name, file in options.maps.items()},
+            "class_map": None if class_map is None else readable(class_map),
+            "ego": None if options.ego is None else readable(options.ego),
             "strict": strict,
         },
         "facts": dict(opened.facts),

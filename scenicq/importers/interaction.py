@@ -16,6 +16,7 @@ from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, missing, take_map
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
+from scenicq.importers.folders import first_files
 from scenicq.importers.lanelet2_map import read_lanelets
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.report import Report
@@ -71,10 +72,8 @@ class Interaction:
 
 
 def _files(path: Path) -> list[Path]:
-    for pattern in ("vehicle_tracks_*.csv", "*/vehicle_tracks_*.csv", "recorded_trackfiles/*/vehicle_tracks_*.csv"):
-        if found := sorted(path.glob(pattern)):
-            return found
-    return []
+    name = "vehicle_tracks_*.csv"
+    return first_files(path, name, f"*/{name}", f"recorded_trackfiles/*/{name}")
 
 
 def _map_file(file: Path, scene: str) -> Path | None:

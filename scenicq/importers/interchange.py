@@ -1,7 +1,8 @@
 """The interchange folder: the format that any team can write in an afternoon.
 
 - `dataset.json`: {"name", "interchange": 1, "angle": "heading" | "yaw", "classes": "nuscenes" | "scenic" | FILE};
-- `labels.jsonl`: one label a line; also `labels-*.jsonl`, either with `.gz`, or `labels.parquet`;
+- `labels.jsonl`: one label a line; also `labels-*.jsonl`, either with `.gz`, or `labels.parquet`. An explicit null says
+  that there is no ego, or that a heading is not known;
 - `maps/NAME.geojson`: metres of the map's frame.
 """
 
@@ -26,7 +27,9 @@ from scenicq.importers.base import (
     read_class_map,
     read_maps,
 )
+from scenicq.importers.ego_choice import ego_facts, viewpoint
 from scenicq.importers.fields import InvalidError, Record
+from scenicq.importers.folders import first_files, read_bytes, readable
 from scenicq.importers.grouped_lines import GroupedLines, group_lines
 from scenicq.importers.interchange_columns import read_columns
 from scenicq.importers.report import Report
@@ -57,7 +60,7 @@ class Interchange:
     def recognises(self, path: Path) -> bool:
         """Whether `dataset.json` has the key `interchange`."""
         try:
-            return "interchange" in fields.record(fields.parse_json((path / "dataset.json").read_bytes()), "it")
+            return "interchange" in fields.record(fields.parse_json(read_bytes(path / "dataset.json")), "it")
         except (OSError, InvalidError):
             return False
 
@@ -73,21 +76,21 @@ class Interchange:
         if angle not in ("heading", "yaw"):
             raise _invalid(path, '`angle` must be "heading" or "yaw"')
         classes = {**_taxonomy(path, header.get("classes")), **options.class_map}
-        files = sorted({file for pattern in _LABEL_FILES for file in path.glob(pattern)})
+        files = sorted({file for pattern in _LABEL_FILES for file in first_files(path, pattern)})
         if not files:
             raise DataError(Diagnostic("file-missing", f"{path} has none of {', '.join(_LABEL_FILES)}"))
-        found = {file.stem: file for file in path.glob("maps/*.geojson")}
+        found = {readable(file.stem): file for file in first_files(path, "maps/*.geojson")}
         maps = read_maps({**found, **options.maps}, report)
         lines, about, count = group_lines(files, options.scratch, report)
         name = header.get("name")
         return Source(
-            name=name if isinstance(name, str) and name else path.resolve().name,
+            name=name if isinstance(name, str) and name else readable(path.resolve().name),
             maps=maps,
             entries=tuple(Entry(name, size // _OBJECT_BYTES, digest) for name, (size, digest) in about.items()),
             reader=lambda names: LineReader(lines.of(names), classes, angle == "yaw", columnar=self.columnar),
             frames=count,
             context=json.dumps([angle, sorted(classes.items())]),
-            facts={"source": text} if isinstance(text := header.get("source"), str) else {},
+            facts=_facts(header),
         )
 
 
@@ -151,14 +154,20 @@ class _LabelReader:
         try:
             if fields.text(line, "recording") != recording:
                 raise InvalidError("`recording` is ambiguous")
-            ego = self._ego(fields.record(line.get("ego"), "`ego`"), f"{place}: ego of label `{frame}`")
+            objects = tuple(self._objects(fields.items(line, "objects"), frame, place))
+            if "ego" in line and line["ego"] is None:
+                ego = viewpoint(objects)
+                if ego is None:
+                    raise InvalidError("there is neither an ego nor an object")
+            else:
+                ego = self._ego(fields.record(line.get("ego"), "`ego`"), f"{place}: ego of label `{frame}`")
             return Label(
                 frame=frame,
                 recording=recording,
                 timestamp_us=fields.integer(line, "timestamp_us"),
                 map=fields.text(line, "map"),
                 ego=ego,
-                objects=tuple(self._objects(fields.items(line, "objects"), frame, place)),
+                objects=objects,
                 params=fields.scalars(line, "params", self._attribute(f"{place}: label `{frame}`")),
                 sensors=_sensors(line),
             )
@@ -186,14 +195,16 @@ class _LabelReader:
 
     def _object(self, entry: Record, id: str, source_class: str | None, place: str) -> LabelObject:
         x, y = fields.vector(entry, "position", 2)
-        heading = fields.number(entry, self._angle)
+        # Null says that it is not known; a key that is missing is more likely misspelt.
+        known = entry.get(self._angle, ...) is not None
+        heading = normalize(fields.number(entry, self._angle) + self._turn) if known else None
         velocity = fields.vector(entry, "velocity", 2) if entry.get("velocity") is not None else None
         return LabelObject(
             id=id,
             source_class=source_class or "",
             x=x,
             y=y,
-            heading=normalize(heading + self._turn),
+            heading=heading,
             width=fields.positive(entry, "width"),
             length=fields.positive(entry, "length"),
             height=fields.positive(entry, "height"),
@@ -221,7 +232,7 @@ def _invalid(folder: Path, message: str) -> DataError:
 
 def _header(folder: Path) -> Record:
     try:
-        content = fields.parse_json((folder / "dataset.json").read_bytes())
+        content = fields.parse_json(read_bytes(folder / "dataset.json"))
     except OSError as error:
         message = f"{folder / 'dataset.json'} cannot be read: {error.strerror}"
         raise DataError(Diagnostic("file-missing", message)) from error
@@ -235,12 +246,20 @@ def _header(folder: Path) -> Record:
     return header
 
 
+def _facts(header: Record) -> dict[str, str]:
+    said = {"source": text} if isinstance(text := header.get("source"), str) else {}
+    return said | (ego_facts("none") if header.get("ego") == "none" else {})
+
+
 def _taxonomy(folder: Path, name: object) -> Mapping[str, str]:
     if not isinstance(name, str) or not name:
         raise _invalid(folder, '`classes` must be "nuscenes", "scenic" or a file of the folder')
     if name in taxonomy_names():
         return taxonomy(name)
-    file = (folder / name).resolve()
+    try:
+        file = (folder / name).resolve()
+    except (OSError, ValueError) as error:
+        raise _invalid(folder, "`classes` names no file") from error
     if not file.is_relative_to(folder.resolve()):
         raise _invalid(folder, "`classes` names a file outside of the folder")
     return read_class_map(file)

@@ -7,20 +7,21 @@ reads the recording label by label, which tells what is wrong.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from itertools import chain
+from collections.abc import Callable, Mapping, Sequence
+from itertools import chain, repeat
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.geometry.angles import normalize
+from scenicq.geometry.angles import normalize_array
 from scenicq.importers.fields import InvalidError, parse_json
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
 
 __all__ = ["read_columns"]
 
 _LARGEST = 2**63 - 1
+_GET = cast("Callable[[dict[str, Any], str], Any]", dict[str, Any].get)
 _SCALARS = frozenset((str, bool, int, float))
 
 
@@ -60,14 +61,14 @@ def _columns(
     paths = [path for paths in sensors for path in paths.values()]
     _demand(all(type(path) is str and path for path in paths))
     egos, objects = [label["ego"] for label in labels], list(chain.from_iterable(lists))
-    _demand(all(type(entry) is dict for entry in objects))
-    ids = [entry.get("id") for entry in objects]
-    _demand(all(type(id) is str and id and id != "ego" for id in ids))
+    _demand(_are(objects, dict))
+    ids = _all(objects, "id")
+    _demand(_are(ids, str) and {"", "ego"}.isdisjoint(ids))
     start = 0
     for entries in lists:
         _demand(len(set(ids[start : start + len(entries)])) == len(entries))
         start += len(entries)
-    names = [entry.get("class") for entry in objects]
+    names = _all(objects, "class")
     _demand(set(map(type, names)) <= {str} and all(name and name in classes for name in set(names)))
     ego_names = [entry.get("class") for entry in egos]
     _demand(all(name in (None, "") or (type(name) is str and name in classes) for name in ego_names))
@@ -117,48 +118,65 @@ def _label(content: object, recording: str) -> dict[str, Any]:
 def _members(
     entries: Sequence[dict[str, Any]], ids: Sequence[str], category: Sequence[str], names: Sequence[str], *, yaw: bool
 ) -> MemberColumns:
-    places = [entry.get("position") for entry in entries]
-    _demand(all(type(place) is list and len(place) == 2 for place in places))
-    xy = _reals(list(chain.from_iterable(cast(list[list[Any]], places)))).reshape(-1, 2)
-    angles = _reals([entry.get("yaw" if yaw else "heading") for entry in entries])
+    places = _all(entries, "position")
+    _demand(_are(places, list) and set(map(len, places)) <= {2})
+    xy = _reals(list(chain.from_iterable(places))).reshape(-1, 2)
+    key = "yaw" if yaw else "heading"
+    headings = _all(entries, key)
+    _demand(None not in headings or all(key in entry for entry in entries))
+    angles = _optional_reals(headings)
     turn = -math.pi / 2 if yaw else 0.0
-    velocities = [entry.get("velocity") for entry in entries]
-    _demand(all(v is None or (type(v) is list and len(v) == 2 and None not in v) for v in velocities))
-    vxy = _optional_reals(list(chain.from_iterable(v or (None, None) for v in velocities))).reshape(-1, 2)
-    tracks = [entry.get("track") for entry in entries]
-    _demand(set(map(type, tracks)) <= {str, type(None)})
+    velocities = _all(entries, "velocity")
+    _demand(_are(velocities, list, type(None)))
+    known = [velocity for velocity in velocities if velocity is not None]
+    _demand(set(map(len, known)) <= {2})
+    vxy = np.full((len(velocities), 2), math.nan)
+    moving = [velocity is not None for velocity in velocities]
+    vxy[np.array(moving, dtype=bool)] = _reals(list(chain.from_iterable(known))).reshape(-1, 2)
+    tracks = _all(entries, "track")
+    _demand(_are(tracks, str, type(None)))
     return MemberColumns(
         id=ids,
         category=category,
         source_class=names,
         x=np.ascontiguousarray(xy[:, 0]),
         y=np.ascontiguousarray(xy[:, 1]),
-        heading=np.array([normalize(angle + turn) for angle in angles.tolist()], dtype=np.float64),
+        heading=normalize_array(angles + turn),
         width=_sizes(entries, "width"),
         length=_sizes(entries, "length"),
         height=_sizes(entries, "height"),
         vx=np.ascontiguousarray(vxy[:, 0]),
         vy=np.ascontiguousarray(vxy[:, 1]),
         track=[track or None for track in tracks],
-        attributes=_json([entry.get("attributes") for entry in entries]),
+        attributes=_json(_all(entries, "attributes")),
     )
 
 
+def _all(entries: Sequence[dict[str, Any]], key: str) -> list[Any]:
+    """The values of a key, None where an entry lacks it; not as a comprehension, which takes twice as long."""
+    return list(map(_GET, entries, repeat(key)))
+
+
+def _are(values: Sequence[Any], *types: type) -> bool:
+    """Whether the values are exactly of some types."""
+    return set(map(type, values)).issubset(types)
+
+
 def _sizes(entries: Sequence[dict[str, Any]], key: str) -> NDArray[np.float64]:
-    values = _optional_reals([entry.get(key) for entry in entries])
+    values = _optional_reals(_all(entries, key))
     _demand(not np.any(values <= 0))
     return values
 
 
 def _reals(values: list[Any]) -> NDArray[np.float64]:
-    _demand(set(map(type, values)) <= {float, int})
+    _demand(_are(values, float, int))
     reals = np.array(values, dtype=np.float64)
     _demand(bool(np.isfinite(reals).all()))
     return reals
 
 
 def _optional_reals(values: list[Any]) -> NDArray[np.float64]:
-    _demand(set(map(type, values)) <= {float, int, type(None)})
+    _demand(_are(values, float, int, type(None)))
     reals = np.array(values, dtype=np.float64)  # None becomes nan
     _demand(int(np.isfinite(reals).sum()) == len(values) - values.count(None))
     return reals
@@ -166,6 +184,8 @@ def _optional_reals(values: list[Any]) -> NDArray[np.float64]:
 
 def _json(values: Sequence[Any]) -> list[str | None]:
     texts: list[str | None] = []
+    if _are(values, type(None)):
+        return [None] * len(values)
     for value in values:
         if value is None:
             texts.append(None)

@@ -19,10 +19,12 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
+from scenicq.importers.nuscenes_roads import link_roads
 
 __all__ = ["arcline_points", "read_expansion"]
 
 _STEP_M = 1.0
+_LONGEST_M = 20_000.0
 _KINDS = {
     "drivable_area": "drivable",
     "lane": "lane",
@@ -36,19 +38,21 @@ _KINDS = {
 """Layers with the kinds of the elements that they become; `road_segment` becomes `road` or `intersection`."""
 
 
-def read_expansion(path: Path, on_problem: ProblemSink) -> tuple[MapFeature, ...]:
+def read_expansion(path: Path, on_problem: ProblemSink, *, left_hand: bool = False) -> tuple[MapFeature, ...]:
     """Read a map.
 
     Args:
         path: The file of a location.
         on_problem: Called with the token of an element that is left out and the reason.
+        left_hand: Whether traffic keeps to the left there, which the file does not say.
 
     Raises:
         DataError: `file-missing` or `file-invalid`.
     """
     try:
         content = fields.record(fields.parse_json(path.read_bytes()), "the map")
-        return tuple(_Expansion(content, on_problem).features())
+        expansion = _Expansion(content, on_problem)
+        return tuple(link_roads(list(expansion.features()), expansion.segments(), left_hand=left_hand))
     except OSError as error:
         raise DataError(Diagnostic("file-missing", f"map {path} cannot be read: {error.strerror}")) from error
     except InvalidError as error:
@@ -66,6 +70,8 @@ class _Expansion:
         self._polygons = dict(self._layer("polygon"))
         self._paths = fields.optional_record(content, "arcline_path_3")
         self._links = fields.optional_record(content, "connectivity")
+        segments = self._layer("road_segment", quiet=True)
+        self._roads = {token for token, entry in segments if not entry.get("is_intersection")}
         self._lanes = {token for layer in ("lane", "lane_connector") for token, _ in self._layer(layer, quiet=True)}
 
     def features(self) -> Iterator[MapFeature]:
@@ -73,7 +79,7 @@ class _Expansion:
             for token, entry in self._layer(layer):
                 shape = self._try(token, lambda entry=entry: self._area(entry))
                 if shape is not None:
-                    properties = self._lane(token, layer) if kind == "lane" else {}
+                    properties = self._lane(token, layer) if kind == "lane" else self._road(entry, layer)
                     yield MapFeature(token, kind, shape, {"layer": layer} | properties)
         for token, entry in self._layer("road_segment"):
             shape = self._try(token, lambda entry=entry: self._area(entry))
@@ -83,6 +89,12 @@ class _Expansion:
                 yield MapFeature(token, "intersection", shape, {"layer": "road_segment"})
             else:
                 yield MapFeature(token, "road", shape, {"layer": "road_segment"})
+
+    def segments(self) -> dict[str, str]:
+        """The road segment of each road block that names one."""
+        blocks = self._layer("road_block", quiet=True)
+        named = ((token, entry.get("road_segment_token")) for token, entry in blocks)
+        return {token: segment for token, segment in named if isinstance(segment, str)}
 
     def _layer(self, name: str, *, quiet: bool = False) -> Iterator[tuple[str, Record]]:
         for number, value in enumerate(fields.optional_items(self._content, name)):
@@ -121,6 +133,11 @@ class _Expansion:
         if len(tokens) < 3:
             raise InvalidError("a ring has fewer than three nodes")
         return [self._nodes[token] for token in tokens]
+
+    def _road(self, entry: Record, layer: str) -> dict[str, Any]:
+        """The road that a crossing belongs to; a block's is found with those of its lanes."""
+        road = entry.get("road_segment_token")
+        return {"road": road} if layer == "ped_crossing" and isinstance(road, str) and road in self._roads else {}
 
     def _lane(self, token: str, layer: str) -> dict[str, Any]:
         properties: dict[str, Any] = {}
@@ -162,7 +179,9 @@ def arcline_points(path: list[Mapping[str, Any]]) -> list[tuple[float, float]]:
                 raise InvalidError(f"`shape` has the letter {letter!r}")
             if curvature:
                 curvature /= fields.positive(entry, "radius") or math.inf
-            steps = max(1, math.ceil(abs(length) / _STEP_M)) if length else 0
+            if not 0 <= length <= _LONGEST_M or len(points) > _LONGEST_M / _STEP_M:
+                raise InvalidError(f"the path of the lane is longer than {_LONGEST_M:,.0f} m, or shorter than nothing")
+            steps = max(1, math.ceil(length / _STEP_M)) if length else 0
             for _ in range(steps):
                 x, y, direction = _advance(x, y, direction, curvature, length / steps)
                 points.append((x, y))

@@ -13,10 +13,17 @@ from __future__ import annotations
 
 import json
 import sys
+from itertools import pairwise
 from typing import Any
+from xml.etree import ElementTree
 
 import shapely
 from shapely.geometry import mapping
+
+try:
+    import resource
+except ImportError:  # not on Windows
+    resource = None
 
 try:
     from scenic.domains.driving.roads import Network
@@ -25,43 +32,51 @@ except ImportError:
 
 __all__: list[str] = []
 
+_MEMORY_BYTES = 8 << 30
+"""A map that claims a road of a million kilometres must not take the machine down."""
+
 
 def _main(source: str, target: str) -> int:
     if Network is None:
         return 3
+    if resource is not None:
+        _, most = resource.getrlimit(resource.RLIMIT_AS)
+        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, most))
     try:
         # Neither reads nor writes Scenic's own cache, which would lie beside the map.
         network: Any = Network.fromFile(source, useCache=False, writeCache=False)
     except Exception as error:  # noqa: BLE001 - whatever Scenic's parser stumbles over is the map's fault here
         sys.stderr.write(f"\n{type(error).__name__}: {error}".replace("\n", " ") + "\n")
         return 4
+    features = _features(network, _keeps_left(source))
     with open(target, "w", encoding="utf-8") as file:
-        json.dump({"type": "FeatureCollection", "features": _features(network)}, file)
+        json.dump({"type": "FeatureCollection", "features": features}, file)
     return 0
 
 
-def _features(network: Any) -> list[dict[str, Any]]:
+def _features(network: Any, left_hand: bool) -> list[dict[str, Any]]:
     crossing_of: dict[str, str] = {}
     after: dict[str, list[str]] = {}
     for lane in network.lanes:
         for maneuver in lane.maneuvers:
-            through = maneuver.connectingLane
-            after.setdefault(lane.uid, []).append((through or maneuver.endLane).uid)
-            if through is not None:
-                after.setdefault(through.uid, []).append(maneuver.endLane.uid)
+            way = [part.uid for part in (lane, maneuver.connectingLane, maneuver.endLane) if part is not None]
+            for here, there in pairwise(reversed(way) if left_hand else way):
+                after.setdefault(here, []).append(there)
     for crossing in network.intersections:
         for maneuver in crossing.maneuvers:
             if maneuver.connectingLane is not None:
                 crossing_of[maneuver.connectingLane.road.uid] = crossing.uid
-    found = [_lane(lane, after) for lane in network.lanes]
-    found += [_section(section) for section in network.laneSections]
+    found = [_lane(lane, after, left_hand) for lane in network.lanes]
+    found += [_section(section, left_hand) for section in network.laneSections]
     for group in network.laneGroups:
         links = {"road": group.road.uid, "opposite": _uid(group._opposite)}
         found.append(_feature(group.uid, "lane_group", group.polygon, links))
         if group.curb is not None:
             found.append(_feature(f"{group.uid}_curb", "curb", _line(group.curb), {}))
     for road in (*network.roads, *network.connectingRoads):
-        links = {"forward": _uid(road.forwardLanes), "backward": _uid(road.backwardLanes)}
+        directions = (_uid(road.forwardLanes), _uid(road.backwardLanes))
+        forward, backward = reversed(directions) if left_hand else directions
+        links = {"forward": forward, "backward": backward}
         links["intersection"] = crossing_of.get(road.uid)
         found.append(_feature(road.uid, "road", road.polygon, links))
     for crossing in network.intersections:
@@ -76,24 +91,37 @@ def _features(network: Any) -> list[dict[str, Any]]:
     return found
 
 
-def _lane(lane: Any, after: dict[str, list[str]]) -> dict[str, Any]:
+def _lane(lane: Any, after: dict[str, list[str]], left_hand: bool) -> dict[str, Any]:
     links = {
         "group": _uid(lane.group),
         "road": _uid(lane.road),
         "successors": list(dict.fromkeys(after.get(lane.uid, []))),
-        "centerline": _points(lane.centerline),
+        "traffic": "left" if left_hand else None,
+        "centerline": _points(lane.centerline, left_hand),
     }
     return _feature(lane.uid, "lane", lane.polygon, links)
 
 
-def _section(section: Any) -> dict[str, Any]:
+def _section(section: Any, left_hand: bool) -> dict[str, Any]:
+    sides = (section._laneToLeft, section._laneToRight)
+    left, right = reversed(sides) if left_hand else sides
     links = {
         "lane": section.lane.uid,
-        "left": _uid(section._laneToLeft),
-        "right": _uid(section._laneToRight),
-        "centerline": _points(section.centerline),
+        "left": _uid(left),
+        "right": _uid(right),
+        "traffic": "left" if left_hand else None,
+        "centerline": _points(section.centerline, left_hand),
     }
     return _feature(section.uid, "lane_section", section.polygon, links)
+
+
+def _keeps_left(source: str) -> bool:
+    """Whether the map says that traffic keeps to the left.
+
+    Scenic 3.1.1 does not read that, and takes all traffic to keep to the right: every lane runs the wrong way then.
+    """
+    roads = ElementTree.parse(source).iter("road")  # noqa: S314 - Scenic has read it the same way before
+    return any((road.get("rule") or "").upper() == "LHT" for road in roads)
 
 
 def _uid(element: Any) -> str | None:
@@ -104,8 +132,10 @@ def _line(region: Any) -> Any:
     return region.lineString
 
 
-def _points(region: Any) -> list[list[list[float]]]:
+def _points(region: Any, backwards: bool) -> list[list[list[float]]]:
     lines = shapely.get_parts(region.lineString)
+    if backwards:
+        lines = [shapely.reverse(line) for line in reversed(lines)]
     return [shapely.get_coordinates(line).tolist() for line in lines]
 
 

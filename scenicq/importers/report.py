@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.folders import readable
 from scenicq.store.manifest import LeftOut
 from scenicq.store.segment import Problem
 
@@ -106,6 +108,7 @@ class Report:
         return sum(count for (_, *key, _name), count in self._counts.items() if key == [what, code])
 
     def _add(self, problem: Problem) -> None:
+        problem = replace(problem, name=readable(problem.name), message=readable(problem.message))
         if self._strict:
             raise DataError(Diagnostic(problem.code, problem.message, hints=problem.hints))
         self._counts[_key(problem)] += 1

@@ -8,18 +8,8 @@ from __future__ import annotations
 import gc
 import hashlib
 import json
-import multiprocessing
-import os
-import signal
-import threading
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from multiprocessing.connection import wait
-from multiprocessing.queues import SimpleQueue
-from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import shapely
@@ -28,6 +18,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature
 from scenicq.importers.base import Entry, Labels, Reader
 from scenicq.importers.report import Report
+from scenicq.processes import Lost, Workers
 from scenicq.store.columns import columns_of
 from scenicq.store.labels import Recording
 from scenicq.store.placement import MapIndex
@@ -38,6 +29,8 @@ __all__ = ["Job", "World", "fingerprint", "maps_digest", "write_segments"]
 
 OnRecording = Callable[[str, int], None]
 """Called with a recording and its number of frames when it is written."""
+OnTold = Callable[[tuple[str, int]], None]
+"""The same for a worker, which tells what is then passed on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +56,14 @@ class Job:
         number: Of the segment.
         reader: Of its recordings.
         fingerprint: Of all that it depends on.
+        first: Its first recording.
         taken: Recording and frame of labels that are left out, because earlier recordings use the same name.
     """
 
     number: int
     reader: Reader = field(repr=False)
     fingerprint: str
+    first: str = ""
     taken: frozenset[tuple[str, str]] = frozenset()
 
 
@@ -108,7 +103,7 @@ def write_segments(world: World, jobs: Sequence[Job], processes: int, on_recordi
         The segments in order of the jobs.
 
     Raises:
-        DataError: A problem of the source where the ingest is strict, or a process died.
+        DataError: A problem of the source where the ingest is strict, or processes died again and again.
         OSError: The folder cannot be written.
     """
     if processes <= 1 or len(jobs) <= 1:
@@ -116,17 +111,23 @@ def write_segments(world: World, jobs: Sequence[Job], processes: int, on_recordi
         for job in jobs:
             yield _write(world, job, indexes, on_recording)
         return
-    with _pool(world, min(processes, len(jobs))) as (pool, told):
-        futures = [pool.submit(_work, job) for job in jobs]
-        try:
-            for future in futures:
-                while not _is_done(future):
-                    _tell(told, on_recording)
-                _tell(told, on_recording)
-                yield future.result()
-        except BrokenProcessPool as error:
-            message = "a process of the ingest was killed, perhaps for want of memory"
-            raise DataError(Diagnostic("budget-exceeded", message, hints=("use fewer `--jobs`",))) from error
+    workers: Workers[Job, Segment] = Workers(min(processes, len(jobs)), _start_worker, (world,))
+    known: set[tuple[str, int]] = set()
+
+    def told(said: tuple[str, int]) -> None:
+        if said not in known:  # a segment that is written again tells again
+            known.add(said)
+            on_recording(*said)
+
+    with workers:
+        for job, segment in workers.run(jobs, told):
+            if isinstance(segment, Lost):
+                message = (
+                    f"{segment.tries} processes that wrote the recordings from `{job.first}` on were killed, "
+                    "perhaps for want of memory"
+                )
+                raise DataError(Diagnostic("budget-exceeded", message, hints=("use fewer `--jobs`",)))
+            yield segment
 
 
 def _write(world: World, job: Job, indexes: dict[str, MapIndex], on_recording: OnRecording) -> Segment:
@@ -150,76 +151,10 @@ def _write(world: World, job: Job, indexes: dict[str, MapIndex], on_recording: O
         writer.abandon()
 
 
-def _is_done(future: Future[Segment]) -> bool:
-    try:
-        future.exception(timeout=0.05)
-    except TimeoutError:
-        return False
-    return True
+def _start_worker(world: World) -> Callable[[Job, OnTold], Segment]:
+    indexes: dict[str, MapIndex] = {}
 
+    def work(job: Job, tell: OnTold) -> Segment:
+        return _write(world, job, indexes, lambda recording, frames: tell((recording, frames)))
 
-def _tell(told: SimpleQueue[tuple[str, int]], on_recording: OnRecording) -> None:
-    while not told.empty():
-        on_recording(*told.get())
-
-
-@contextmanager
-def _pool(world: World, processes: int) -> Generator[tuple[ProcessPoolExecutor, SimpleQueue[tuple[str, int]]]]:
-    context = multiprocessing.get_context("spawn")
-    told: SimpleQueue[tuple[str, int]] = context.SimpleQueue()
-    stop = context.Event()
-    pool = ProcessPoolExecutor(processes, context, initializer=_start, initargs=(world, told, stop))
-    try:
-        yield pool, told
-    except BaseException:
-        stop.set()
-        # A worker may wait for room to tell: nobody listens any more.
-        threading.Thread(target=_drain, args=(told,), daemon=True).start()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _drain(told: SimpleQueue[tuple[str, int]]) -> None:
-    while True:
-        told.get()
-
-
-@dataclass(slots=True)
-class _Worker:
-    world: World
-    told: SimpleQueue[tuple[str, int]]
-    stop: Event
-    indexes: dict[str, MapIndex] = field(default_factory=dict[str, MapIndex])
-
-
-_worker: list[_Worker] = []
-
-
-class _StoppedError(Exception):
-    """The ingest has ended meanwhile."""
-
-
-def _start(world: World, told: SimpleQueue[tuple[str, int]], stop: Event) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal interrupts everybody; the parent says what to do
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    # A parent that is killed says nothing, and its folder may belong to somebody else then.
-    threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-    _worker[:] = [_Worker(world, told, stop)]
-
-
-def _end_with(sentinel: int) -> None:
-    wait([sentinel])
-    os._exit(1)
-
-
-def _work(job: Job) -> Segment:
-    (worker,) = _worker
-
-    def tell(recording: str, frames: int) -> None:
-        if worker.stop.is_set():
-            raise _StoppedError
-        worker.told.put((recording, frames))
-
-    return _write(worker.world, job, worker.indexes, tell)
+    return work

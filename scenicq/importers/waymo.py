@@ -162,7 +162,7 @@ def _object(name: str, source_class: str, is_ego: bool, at: Mapping[str, float],
     return LabelObject(
         id="ego" if is_ego else name,
         category="Car" if is_ego else classes.category(source_class),
-        source_class=source_class,
+        source_class="sdc" if is_ego else source_class,
         x=at["x"],
         y=at["y"],
         heading=heading_of_yaw(math.remainder(at["heading"], 2 * math.pi)),

@@ -10,12 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from scenicq.errors import DataError
+from scenicq.errors import DataError, Source
 from scenicq.geometry.network import Network
 from scenicq.importers.base import Options
 from scenicq.importers.commonroad import CommonRoad
 from scenicq.importers.ingest import ingest
 from scenicq.importers.report import Report
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.verdict import Match, NoMatch
+from scenicq.query.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label
 
@@ -56,7 +60,7 @@ def test_map() -> None:
     assert new.lanes[0].group.opposite is new.lanes[1].group
 
 
-@pytest.mark.parametrize(("ego", "track"), [("100", "100"), ("nearest", "101"), ("none", "101"), (None, "101")])
+@pytest.mark.parametrize(("ego", "track"), [("100", "100"), ("nearest", "101"), (None, "101")])
 def test_which_object_is_the_ego(file: Path, tmp_path: Path, ego: str | None, track: str) -> None:
     labels = labels_of(file.parent, tmp_path / "d", ego)
     assert {label.ego.track for label in labels} == {track}
@@ -66,9 +70,28 @@ def test_which_object_is_the_ego(file: Path, tmp_path: Path, ego: str | None, tr
     assert [entry.name for entry in manifest.left_out if entry.kept and entry.what == "recording"] == (
         ["no ego"] if ego is None else []
     )
-    assert manifest.provenance["facts"]["ego"].startswith(
-        {"100": "track", "none": "none"}.get(ego or "", "the vehicle")
-    )
+    assert manifest.provenance["facts"]["ego"].startswith({"100": "track"}.get(ego or "", "the vehicle"))
+
+
+def test_no_ego_is_no_ego(file: Path, tmp_path: Path) -> None:
+    labels = labels_of(file.parent, tmp_path / "d", "none")
+    assert not any(label.has_ego for label in labels)
+    assert {label.ego.heading for label in labels} == {None}
+    assert all({member.track for member in label.objects} == {"100", "101", "102"} for label in labels)
+    dataset = open_dataset(tmp_path / "d")
+    assert dataset.manifest.provenance["facts"]["ego"].startswith("none")
+    source = Source("p", "model scenic.domains.driving.model\nego = new Car\nother = new Car\n")
+    with pytest.raises(DataError, match="without an ego"):
+        list(Query(dataset, source).results())
+    found = list(Query(dataset, source, QueryOptions(MatchOptions(ego="any"))).results())
+    assert len(found) == len(labels)
+    for result in found:
+        assert isinstance(result.verdict, Match)
+        assert set(result.verdict.correspondence.values()) == {"100", "101"}
+    matcher = Matcher(Query(dataset, source).compile(labels[0].map)[0], MatchOptions())
+    verdict = matcher.match(labels[0])
+    assert isinstance(verdict, NoMatch)
+    assert (verdict.cause.what, verdict.cause.detail) == ("ego.class", "the source has no ego")
 
 
 def test_an_ego_that_is_not_there(file: Path, tmp_path: Path) -> None:
@@ -81,11 +104,11 @@ def test_an_ego_that_is_not_there(file: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "what", "objects"),
     [
-        ("<exact>2</exact>", "<exact>-2</exact>", "object", 10),
-        ("<x>40.0</x><y>-5.0</y>", "", "object", 11),
-        ("<width>1.9</width>", "<width>0</width>", "track", 6),
-        ("<width>1.9</width>", "", "track", 6),
-        ("<type>pedestrian</type>", "", "track", 6),
+        ("<exact>2</exact>", "<exact>-2</exact>", "object", 15),
+        ("<x>40.0</x><y>-5.0</y>", "", "object", 17),
+        ("<width>1.9</width>", "<width>0</width>", "track", 12),
+        ("<width>1.9</width>", "", "track", 12),
+        ("<type>pedestrian</type>", "", "track", 12),
     ],
 )
 def test_an_unsound_obstacle_is_left_out(

@@ -107,3 +107,28 @@ def test_real_maps(tmp_path: Path, name: str, counts: tuple[int, int, int]) -> N
 def test_ingest_with_a_map_of_opendrive(tmp_path: Path) -> None:
     ingest(SAMPLES / "crossroads", tmp_path / "d", maps=[f"crossroads={REAL / 'Town01.xodr'}"])
     assert len(open_dataset(tmp_path / "d").network("crossroads").lanes) == 124
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("scenic") is None, reason="Scenic is not installed")
+@pytest.mark.skipif(not REAL.exists(), reason="the maps are not on this machine")
+def test_left_hand_traffic_mirrors_what_scenic_reads(tmp_path: Path) -> None:
+    """Scenic 3.1.1 does not read the rule of a road, so all traffic keeps to the right in what it gives."""
+    text = (REAL / "Town01.xodr").read_text()
+    (tmp_path / "left.xodr").write_text(text.replace("<road ", '<road rule="LHT" '))
+    problems: list[str] = []
+    right, left = (
+        Network("town", read_geojson(convert_xodr(file, tmp_path), lambda _, problem: problems.append(problem)))
+        for file in (REAL / "Town01.xodr", tmp_path / "left.xodr")
+    )
+    assert not problems
+    for one, other in zip(right.lanes, left.lanes, strict=True):
+        assert one.centerline is not None
+        assert other.centerline is not None
+        (line,), (back,) = one.centerline.lines, other.centerline.lines
+        assert line.reverse().equals_exact(back, 1e-9)
+        assert {lane.id for lane in one.successors} == {lane.id for lane in other.predecessors}
+    for one, other in zip(right.laneSections, left.laneSections, strict=True):
+        sides = (one._laneToLeft, one._laneToRight), (other._laneToRight, other._laneToLeft)
+        assert [side and side.id for side in sides[0]] == [side and side.id for side in sides[1]]
+    assert sum(len(lane.maneuvers) for lane in left.lanes) == sum(len(lane.maneuvers) for lane in right.lanes) > 100

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from scenicq.errors import DataError
+from scenicq.importers.base import Labels
 from scenicq.importers.ingest import Progress, ingest
+from scenicq.importers.report import Report
+from scenicq.importers.segments import Job, World, write_segments
 from scenicq.store.dataset import open_dataset
+from scenicq.store.labels import Recording
 from scenicq.store.manifest import MANIFEST
 
 ROOT = Path(__file__).parents[2]
@@ -123,6 +130,44 @@ def kill_often(source: Path, tmp_path: Path, kills: int, jobs: int) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_three_kills(source: Path, tmp_path: Path) -> None:
     kill_often(source, tmp_path, 3, jobs=1)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.parametrize("kills", [1, pytest.param(20, marks=pytest.mark.slow)])
+def test_processes_that_are_killed_are_replaced(source: Path, tmp_path: Path, kills: int) -> None:
+    ingest(source, tmp_path / "undisturbed", segment_objects=SEGMENT)
+    killed: list[int] = []
+    reached: list[int] = []
+
+    def kill(progress: Progress) -> None:
+        reached.append(progress.frames)
+        children = [child.pid for child in multiprocessing.active_children() if child.pid not in killed]
+        if len(killed) < kills and children:
+            killed.append(random.choice(children))
+            os.kill(killed[-1], signal.SIGKILL)
+
+    ingest(source, tmp_path / "d", jobs=2, segment_objects=SEGMENT, progress=kill)
+    assert len(killed) == kills
+    assert contents(tmp_path / "d") == contents(tmp_path / "undisturbed")
+    assert reached == sorted(reached)
+    assert reached[-1] == RECORDINGS * FRAMES
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_recording_that_kills_is_named(tmp_path: Path) -> None:
+    jobs = [Job(number, Deadly(), str(number), first=f"r{number}") for number in range(2)]
+    (tmp_path / "d").mkdir()
+    world = World(tmp_path / "d", {})
+    with pytest.raises(DataError, match=r"3 processes .* from `r0` on .* killed"):
+        list(write_segments(world, jobs, 2, lambda _, __: None))
+
+
+class Deadly:
+    """A reader that ends its process."""
+
+    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording]:
+        os.kill(os.getpid(), signal.SIGKILL)
+        yield Recording("never", "", ())
 
 
 @pytest.mark.slow
