@@ -6,15 +6,20 @@ from pathlib import Path
 
 import click
 
-from scenicq.report.changes import changes, changes_page, changes_text, read_results
+from scenicq.report.changes import changes, changes_page, changes_text
+from scenicq.report.result_files import read_results
 
+from .manual import Manual
 from .output import destination, writing
+from .report import plain
 
 __all__ = ["report"]
 
 
 @click.command(
     name="report",
+    cls=Manual,
+    arguments={"A, B": "Result files of one dataset that `scenicq match -o` wrote: .jsonl, .csv or .parquet."},
     epilog="\b\nExamples:\n"
     "  scenicq report before.jsonl after.jsonl\n"
     "  scenicq report before.jsonl after.jsonl --all -o changes.html",
@@ -26,12 +31,11 @@ __all__ = ["report"]
 def report(before: Path, after: Path, *, every: bool, output: Path | None) -> None:
     """Say which matches came, went and stayed between two result files.
 
-    A and B are files of JSON lines that `scenicq match` wrote for one dataset. With `match --all` they also say why a
-    frame does not match.
+    This shows what a changed line of a program did. With `match --all` the files also say why a frame does not match.
     """
     found = changes(read_results(before), read_results(after))
     if output is None or str(output) == "-":
-        click.echo(changes_text(found, every=every))
+        click.echo(plain(changes_text(found, every=every)))
         return
     with destination(output) as sink, writing(output):
         sink.write(changes_page(found, (str(before), str(after))).encode())

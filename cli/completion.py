@@ -6,6 +6,7 @@ import click
 from click.shell_completion import get_completion_class
 
 from .main import cli
+from .manual import Manual
 
 __all__ = ["completion"]
 
@@ -13,14 +14,19 @@ _SHELLS = ("bash", "zsh", "fish")
 
 
 @click.command(
+    cls=Manual,
+    arguments={"SHELL": "bash, zsh or fish."},
     epilog="\b\nExamples:\n"
     "  scenicq completion bash > ~/.local/share/bash-completion/completions/scenicq\n"
     "  scenicq completion zsh > ~/.zfunc/_scenicq\n"
-    "  scenicq completion fish > ~/.config/fish/completions/scenicq.fish"
+    "  scenicq completion fish > ~/.config/fish/completions/scenicq.fish",
 )
-@click.argument("shell", type=click.Choice(_SHELLS))
+@click.argument("shell", metavar="SHELL", type=click.Choice(_SHELLS))
 def completion(shell: str) -> None:
-    """Print what makes a shell complete commands and options."""
+    """Print what makes a shell complete commands and options.
+
+    Put it where the shell looks for completions; a new shell then knows them.
+    """
     found = get_completion_class(shell)
     assert found is not None
     click.echo(found(cli, {}, "scenicq", "_SCENICQ_COMPLETE").source())

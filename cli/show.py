@@ -18,10 +18,12 @@ from scenicq.report.backdrop import Backdrop
 from scenicq.report.frames import frame_page
 from scenicq.report.picture import Shot, Style, draw
 from scenicq.report.png import can_make_png, png
+from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label
 
 from .explain import find_label
+from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
@@ -56,12 +58,18 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
 
 
 @click.command(
+    cls=Manual,
+    arguments={
+        "DATASET": "A folder that `scenicq ingest` made.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it.",
+    },
+    topics={"What counts as a match, with --scenario": SHARED},
     epilog="\b\nExamples:\n"
     "  scenicq show dataset 1a2b3c -o frame.svg\n"
     "  scenicq show dataset 1a2b3c --scenario crossing.scenic -o frame.html\n"
-    "  scenicq show dataset 1a2b3c --scenario crossing.scenic --half 30 -o frame.png"
+    "  scenicq show dataset 1a2b3c --scenario crossing.scenic --half 30 -o frame.png",
 )
-@click.argument("dataset", type=click.Path(path_type=Path))
+@click.argument("dataset", type=click.Path())
 @click.argument("frame")
 @click.option(
     "--scenario",
@@ -84,18 +92,26 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     help="Metres from the ego to the edges of the picture.  [default: so that every role is seen]",
 )
 @click.option("--width", metavar="PX", type=click.IntRange(50, 10_000), default=900, help="Width in pixels.")
-def show(dataset: Path, frame: str, *, scenario: Path | None, output: Path | None, half: float | None,
+def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None, half: float | None,
          width: int, **given: Any) -> None:  # fmt: skip
     """Draw one frame from above: map, boxes, and what a scenario says of it.
 
-    The options of `match` that say what a match is apply with `--scenario`.
+    The picture is drawn to scale with north up; the ego is in its middle.
     """
     file = None if output is None or str(output) == "-" else output
     kind = _kind(file)
     opened = open_dataset(dataset)
     shot, backdrop = _shot(opened, find_label(opened, frame), scenario, given)
-    picture = draw(shot, backdrop, half=half, pixels=width, style=_STYLES[kind])
-    data = png(picture) if kind == ".png" else (frame_page(shot, picture) if kind == ".html" else picture).encode()
+    picture = draw(shot, backdrop, half=half, pixels=width, style=_STYLES[kind], captioned=kind != ".html")
+    match kind:
+        case ".png":
+            data = png(picture)
+        case ".html":
+            beside = Path() if file is None else file.absolute().parent
+            files = SensorFiles(roots_of(opened), beside, beside, can_make_thumbnails(), inside=True)
+            data = frame_page(shot, picture, files.find(shot.label.sensors)).encode()
+        case _:
+            data = picture.encode()
     with destination(file) as sink, writing(file):
         sink.write(data)
     if file is None and sys.stdout.isatty():

@@ -20,7 +20,7 @@ def _command(name):
 def test_every_command_has_help_an_example_and_a_place_in_the_readme(name):
     command = _command(name)
     assert command.help
-    assert re.search(rf"Examples?:\n  scenicq {name} ", command.epilog)
+    assert re.search(rf"Examples?:\n  scenicq {name}\b", command.epilog)
     assert f"scenicq {name}" in README
 
 
@@ -43,6 +43,41 @@ def test_the_readme_names_only_options_that_there_are():
     for name in COMMANDS:
         known |= {o for parameter in _command(name).params for o in (*parameter.opts, *parameter.secondary_opts)}
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", README)) <= known
+
+
+def _reference():
+    """The help of every command as a reader unfolds it, 88 columns wide whatever terminal this runs in."""
+    parent = cli.make_context("scenicq", [], resilient_parsing=True)
+    parent.terminal_width = 88
+    parts = []
+    for name in COMMANDS:
+        text = _command(name).get_help(click.Context(_command(name), info_name=name, parent=parent))
+        title = f"<summary><code>scenicq {name}</code>: {COMMANDS[name][0].lower()}{COMMANDS[name][1:-1]}</summary>"
+        parts.append(f"<details>{title}\n\n```text\n{text.rstrip()}\n```\n\n</details>\n")
+    return "\n".join(parts)
+
+
+def test_the_reference_in_the_readme_is_what_help_says(request):
+    start, end = "<!-- commands: `make golden` writes this -->\n", "<!-- end of commands -->"
+    before, _, rest = README.partition(start)
+    shown, _, after = rest.partition(end)
+    if request.config.getoption("--update-golden"):
+        shown = _reference()
+        (ROOT / "README.md").write_text(f"{before}{start}{shown}{end}{after}", encoding="utf-8")
+    assert shown == _reference(), "`make golden` writes it again"
+
+
+def test_help_fits_a_page_and_has_every_section():
+    for name in COMMANDS:
+        command = _command(name)
+        text = command.get_help(click.Context(command, info_name=name, parent=click.Context(cli, info_name="scenicq")))
+        shown = [line.removesuffix(":") for line in text.splitlines() if line.endswith(":") and line[0] != " "]
+        assert shown[-2] == "Exit codes", name
+        assert shown[-1] in ("Example", "Examples"), name
+        named = {word for key in command.arguments for word in key.split(", ")}
+        assert named == {
+            p.make_metavar(click.Context(command)).strip("[]") for p in command.params if isinstance(p, click.Argument)
+        }, name
 
 
 def test_every_make_target_is_explained():

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from scenicq.match.verdict import Match, Unknown
 from scenicq.report.backdrop import Backdrop
-from scenicq.report.frames import frame_facts
+from scenicq.report.frames import badge, frame_facts
 from scenicq.report.picture import Shot, View, draw_shot, ground, plane_of, view_of
 from scenicq.report.runs import Run
 from scenicq.report.sensors import Sensor
@@ -26,6 +25,7 @@ class Card:
         shots: Its frames.
         sensors: The sensor files of each.
         backdrop: The map.
+        texts: What the program says at the place of each random variable.
         pictures: Addresses of the frames' pictures beside the report; None if they are drawn in it.
     """
 
@@ -34,6 +34,7 @@ class Card:
     shots: tuple[Shot, ...]
     sensors: tuple[Sequence[Sensor], ...]
     backdrop: Backdrop
+    texts: Mapping[str, str]
     pictures: tuple[str, ...] | None = None
 
     @property
@@ -84,7 +85,7 @@ def _beside(card: Card, pictures: tuple[str, ...]) -> str:
         for name, shot in zip(pictures, card.shots, strict=True)
     ]
     told = escape(_told(card.shots[0]))
-    image = f'<img class="picture" loading="lazy" width="900" height="1000" src="{escape(pictures[0])}" alt="{told}">'
+    image = f'<img class="picture" loading="lazy" width="900" height="900" src="{escape(pictures[0])}" alt="{told}">'
     return image + "".join(sources)
 
 
@@ -120,15 +121,8 @@ def draw_card(card: Card) -> str:
     Args:
         card: What it is made of.
     """
-    run, verdict = card.run, card.run.results[0].verdict
+    run = card.run
     count, title = len(card.shots), f"run-{card.number}-title"
-    match verdict:
-        case Match():
-            kind, shown = "match", "match"
-        case Unknown(reason):
-            kind, shown = "unknown", f"unknown: {reason}"
-        case _:
-            kind, shown = "near", "near miss"
     frames = f"frame {run.first}" if count == 1 else f"frames {run.first}\N{EN DASH}{run.first + count - 1}"
     head = element(
         "h3",
@@ -136,12 +130,12 @@ def draw_card(card: Card) -> str:
         " ",
         element("span", f"{frames} of {run.of}", class_="frames"),
         " ",
-        element("span", escape(shown), class_=f"badge {kind}"),
+        badge(run.results[0].verdict, "near miss"),
         id=title,
     )
     picture = _inline(card) if card.pictures is None else _beside(card, card.pictures)
     facts = [
-        element("div", frame_facts(shot, sensors), class_="frame", hidden=number > 0)
+        element("div", frame_facts(shot, sensors, card.texts), class_="frame", hidden=number > 0)
         for number, (shot, sensors) in enumerate(zip(card.shots, card.sensors, strict=True))
     ]
     body = element(
@@ -156,6 +150,7 @@ def draw_card(card: Card) -> str:
         tabindex=0,
         aria_labelledby=title,
         data_recording=run.recording,
+        data_kind=run.kind,
         data_time=run.results[0].timestamp_us,
         data_length=count,
         data_order=card.number,

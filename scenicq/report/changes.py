@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
-from scenicq.errors import DataError, Diagnostic
 from scenicq.report.frames import table
 from scenicq.report.page import page
+from scenicq.report.result_files import Record
 from scenicq.report.svg import element, escape
 
-__all__ = ["Change", "changes", "changes_page", "changes_text", "read_results"]
+__all__ = ["Change", "changes", "changes_page", "changes_text"]
 
 Kind = Literal["came", "went", "recast", "stayed"]
 _TOLD: dict[Kind, str] = {
@@ -24,7 +23,6 @@ _TOLD: dict[Kind, str] = {
     "stayed": "match in both, with the same objects",
 }
 _MARKS: dict[Kind, str] = {"came": "+", "went": "-", "recast": "~", "stayed": "="}
-Record = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,44 +42,6 @@ class Change:
     before: Mapping[str, str]
     after: Mapping[str, str]
     why: str = ""
-
-
-def read_results(path: Path) -> dict[str, Record]:
-    """The records of a file of JSON lines by frame; of several of one frame the first match counts.
-
-    Raises:
-        DataError: file-missing, or file-invalid.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror or error}")) from None
-    except UnicodeDecodeError:
-        raise _invalid(path, "it is not text in UTF-8") from None
-    found: dict[str, Record] = {}
-    for number, line in enumerate(text.split("\n"), 1):
-        if line.strip():
-            each = _record(path, number, line)
-            old = found.get(each["frame"])
-            if old is None or (each["verdict"] == "match" and old["verdict"] != "match"):
-                found[each["frame"]] = each
-    return found
-
-
-def _invalid(path: Path, why: str) -> DataError:
-    hint = "`scenicq match ... --format jsonl -o FILE` writes such a file"
-    return DataError(Diagnostic("file-invalid", f"{path} holds no results: {why}", hints=(hint,)))
-
-
-def _record(path: Path, number: int, line: str) -> Record:
-    try:
-        each: Any = json.loads(line)
-    except (ValueError, RecursionError):
-        raise _invalid(path, f"line {number} is not JSON") from None
-    texts = ("frame", "recording", "verdict")
-    if not isinstance(each, dict) or not all(isinstance(cast(Record, each).get(key), str) for key in texts):
-        raise _invalid(path, f"line {number} is no result")
-    return cast(Record, each)
 
 
 def _played(record: Record | None) -> dict[str, str] | None:
@@ -128,14 +88,15 @@ def _cast(roles: Mapping[str, str]) -> str:
     return " ".join(f"{role}={thing}" for role, thing in roles.items() if (role, thing) != ("ego", "ego"))
 
 
-def _detail(change: Change) -> str:
-    match change.kind:
-        case "came" | "went":
-            return "; ".join(filter(None, (_cast(change.after or change.before), change.why)))
-        case "recast":
-            return f"{_cast(change.before)} -> {_cast(change.after)}"
-        case "stayed":
-            return _cast(change.after)
+def _objects(change: Change) -> str:
+    if change.kind == "recast":
+        return f"{_cast(change.before)} -> {_cast(change.after)}"
+    return _cast(change.after or change.before)
+
+
+def _elsewhere(change: Change) -> str:
+    """What the file in which the frame does not match says of it."""
+    return change.why and f"in {'A' if change.kind == 'came' else 'B'} {change.why}"
 
 
 def _counts(found: Sequence[Change]) -> list[tuple[Kind, int]]:
@@ -153,8 +114,27 @@ def changes_text(found: Sequence[Change], *, every: bool = False) -> str:
     shown = [change for change in found if every or change.kind != "stayed"]
     for recording, group in groupby(shown, key=lambda change: change.recording):
         lines += ["", recording]
-        lines += [f"  {_MARKS[change.kind]} {change.frame}  {_detail(change)}".rstrip() for change in group]
+        for change in group:
+            told = "; ".join(filter(None, (_objects(change), _elsewhere(change))))
+            line = f"  {_MARKS[change.kind]} {change.frame}  {told}".rstrip()
+            # a name must not look like a line of its own
+            lines.append(line.replace("\n", "\\n"))
     return "\n".join(lines)
+
+
+def _section(kind: Kind, found: Sequence[Change]) -> str:
+    """What became of some frames in the same way: why, then which; those in a row alike share an item."""
+    causes = Counter(_elsewhere(change) for change in found if change.why)
+    told = [(escape(cause), f"{count:,}") for cause, count in causes.most_common()]
+    items: list[str] = []
+    for (recording, objects, why), group in groupby(found, key=lambda c: (c.recording, _objects(c), _elsewhere(c))):
+        frames = [element("span", escape(change.frame), class_="id") for change in group]
+        number = f"{len(frames):,} {'frame' if len(frames) == 1 else 'frames'}"
+        head = element("b", escape(recording)) + f", {number}: " + escape("; ".join(filter(None, (objects, why))))
+        items.append(element("li", head, element("div", " ".join(frames), class_="hint")))
+    title = element("summary", element("b", f"{_MARKS[kind]} {kind}"), f": {escape(_TOLD[kind])} ({len(found):,})")
+    reasons = table("Why they do not match in the other", ("cause", "frames"), told)
+    return element("details", title, reasons, element("ul", *items), open=kind != "stayed", class_="change")
 
 
 def changes_page(found: Sequence[Change], names: tuple[str, str]) -> str:
@@ -164,20 +144,11 @@ def changes_page(found: Sequence[Change], names: tuple[str, str]) -> str:
         found: As `changes` gives them.
         names: What the two files are called.
     """
-    counts = [(f"{_MARKS[kind]} {kind}", _TOLD[kind], f"{count:,}") for kind, count in _counts(found)]
-    parts = [
-        element("header", element("h1", "Two results compared"), element("p", escape(f"A: {names[0]}, B: {names[1]}"))),
-        table("Frames", ("change", "meaning", "frames"), counts),
-    ]
-    for kind, meaning in _TOLD.items():
-        rows = [
-            (escape(change.frame), escape(change.recording), escape(_detail(change)))
-            for change in found
-            if change.kind == kind
-        ]
-        if rows:
-            title = element("summary", element("b", f"{_MARKS[kind]} {kind}"), f": {escape(meaning)} ({len(rows):,})")
-            listed = table(kind, ("frame", "recording", "objects and cause"), rows)
-            parts.append(element("details", title, listed, open=kind != "stayed"))
-    head, *rest = parts
-    return page(f"{names[0]} and {names[1]} compared", [head, element("main", *rest)], script=False)
+    counts = [(f"{_MARKS[kind]}\N{NO-BREAK SPACE}{kind}", _TOLD[kind], f"{count:,}") for kind, count in _counts(found)]
+    files = [element("p", element("b", side), ": ", escape(name)) for side, name in zip("AB", names, strict=True)]
+    parts = [table("Frames", ("change", "meaning", "frames"), counts)]
+    for kind in _TOLD:
+        group = [change for change in found if change.kind == kind]
+        parts += [_section(kind, group)] if group else []
+    head = element("header", element("h1", "Two results compared"), *files)
+    return page(f"{names[0]} and {names[1]} compared", [head, element("main", *parts)], script=False)

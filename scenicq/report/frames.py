@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 
 from scenicq.errors import Source
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.walk import leaves
 from scenicq.geometry.angles import normalize, rotate
-from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
+from scenicq.report.legend import legend
 from scenicq.report.page import page
 from scenicq.report.picture import Shot
 from scenicq.report.sensors import Sensor
 from scenicq.report.svg import element, escape
 
-__all__ = ["frame_facts", "frame_page", "table", "when"]
+__all__ = ["badge", "frame_facts", "frame_page", "table", "variable_texts", "when"]
 
 _PLACE = re.compile(r":(\d+):(\d+)(#\d+)?$")
 
@@ -52,18 +55,16 @@ def _roles(shot: Shot) -> str:
     rows: list[tuple[str, ...]] = []
     for role in shot.roles:
         thing = role.thing
-        where = turn = ""
+        where: list[str] = []
         if ego is not None and thing is not ego and ego.heading is not None:
             right, ahead = rotate(thing.x - ego.x, thing.y - ego.y, -ego.heading)
-            where = "<br>".join(
-                element("span", escape(each), class_="where")
-                for each in (f"{ahead:+.1f} m ahead", f"{right:+.1f} m right")
-            )
+            where = [f"{ahead:+.1f} m ahead", f"{right:+.1f} m right"]
             if thing.heading is not None:
-                turn = f"{math.degrees(normalize(thing.heading - ego.heading)):+.0f}\N{DEGREE SIGN}"
+                where.append(f"{math.degrees(normalize(thing.heading - ego.heading)):+.0f}\N{DEGREE SIGN} turned")
         name = element("span", escape(role.name), class_=f"chip {role.colour}")
-        rows.append((name, element("span", escape(thing.id), class_="id"), escape(thing.category), where, turn))
-    return table("Roles", ("role", "object", "class", "from the ego", "turned"), rows)
+        played = element("span", escape(thing.id), class_="id") + element("div", escape(thing.category), class_="time")
+        rows.append((name, played, "<br>".join(element("span", escape(each), class_="where") for each in where)))
+    return table("Roles", ("role", "object and class", "from the ego"), rows)
 
 
 def _value(value: float | tuple[float, float]) -> str:
@@ -71,7 +72,19 @@ def _value(value: float | tuple[float, float]) -> str:
     return element("span", escape(shown), class_="where")
 
 
-def _witness(verdict: Match, source: Source) -> str:
+def variable_texts(scenario: Scenario) -> dict[str, str]:
+    """What the program says at the place of each random variable.
+
+    Args:
+        scenario: The scenario.
+    """
+    roots = [requirement.condition for requirement in scenario.requirements]
+    roots += [given.value for given in scenario.params.values()]
+    roots += [given.value for thing in scenario.objects for given in thing.properties.values()]
+    return {leaf.span.place: " ".join(leaf.span.text.split()) for leaf in leaves(*roots) if leaf.span is not None}
+
+
+def _witness(verdict: Match, source: Source, texts: Mapping[str, str]) -> str:
     rows: list[tuple[str, ...]] = []
     for place, value in verdict.witness.items():
         found = _PLACE.search(place)
@@ -79,7 +92,7 @@ def _witness(verdict: Match, source: Source) -> str:
             rows.append((escape(place), "", _value(value)))
             continue
         line, column = int(found[1]), int(found[2])
-        text = source.line(line)[column - 1 :].strip()
+        text = texts.get(place.removesuffix(found[3] or ""), "")
         link = element("a", f"{line}:{column}{found[3] or ''}", href=f"#line-{line}")
         shown = text if len(text) <= 48 else f"{text[:47]}\N{HORIZONTAL ELLIPSIS}"
         rows.append((link, element("code", escape(shown)), _value(value)))
@@ -102,27 +115,53 @@ def _cause(shot: Shot) -> str:
     return element("ul", *(element("li", escape(each)) for each in told), class_="cause") if told else ""
 
 
+def badge(verdict: Verdict, otherwise: str) -> str:
+    """A verdict as a mark, which its shape tells as well as its colour.
+
+    Args:
+        verdict: The verdict.
+        otherwise: What to say of a frame that does not match.
+    """
+    match verdict:
+        case Match():
+            kind, shown = "match", "match"
+        case Unknown(reason):
+            kind, shown = "unknown", f"unknown: {reason}"
+        case NoMatch():
+            kind, shown = ("near", otherwise) if otherwise == "near miss" else ("no", otherwise)
+    return element("span", escape(shown), class_=f"badge {kind}")
+
+
 def _sensors(sensors: Sequence[Sensor]) -> str:
-    items: list[str] = []
+    cameras: list[str] = []
+    files: list[str] = []
     for sensor in sensors:
         text = escape(sensor.path)
         if sensor.thumbnail is not None:
             image = element("img", src=sensor.thumbnail, alt=f"Thumbnail of {sensor.channel}", loading="lazy")
-            text = image.removesuffix("</img>") + element("span", text)
-        shown = text if sensor.link is None else element("a", text, href=sensor.link, target="_blank", rel="noopener")
-        items.append(element("li", element("b", escape(sensor.channel)), " ", shown))
-    if not items:
-        return ""
-    title = element("summary", f"Sensor files ({len(items)})")
-    return element("details", title, element("ul", *items, class_="sensors"), open=len(items) <= 3)
+            small = image.removesuffix("</img>") + element("span", escape(sensor.channel))
+            cameras.append(
+                element("li", element("a", small, href=sensor.link, title=sensor.path, target="_blank", rel="noopener"))
+            )
+            continue
+        shown = f"{text} (not found here)"
+        if sensor.link is not None:
+            shown = element("a", text, href=sensor.link, target="_blank", rel="noopener")
+        files.append(element("li", element("b", escape(sensor.channel)), " ", shown))
+    seen = element("ul", *cameras, class_="cameras", aria_label="Cameras") if cameras else ""
+    if not files:
+        return seen
+    title = element("summary", f"{'Other sensor' if cameras else 'Sensor'} files ({len(files)})")
+    return seen + element("details", title, element("ul", *files, class_="sensors"), open=len(files) <= 3)
 
 
-def frame_facts(shot: Shot, sensors: Sequence[Sensor]) -> str:
+def frame_facts(shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str]) -> str:
     """All that is said of a frame.
 
     Args:
         shot: The frame.
         sensors: Its sensor files.
+        texts: As `variable_texts` gives them.
     """
     label = shot.label
     parts = [
@@ -137,36 +176,55 @@ def frame_facts(shot: Shot, sensors: Sequence[Sensor]) -> str:
         _roles(shot),
     ]
     if isinstance(shot.verdict, Match) and shot.scenario is not None:
-        parts.append(_witness(shot.verdict, shot.scenario.source))
+        parts.append(_witness(shot.verdict, shot.scenario.source, texts))
     return "".join([*parts, _sensors(sensors)])
 
 
-def frame_page(shot: Shot, picture: str) -> str:
+def frame_page(shot: Shot, picture: str, sensors: Sequence[Sensor]) -> str:
     """A frame as a page that needs nothing but itself: its picture and what is said of it.
 
     Args:
         shot: The frame.
         picture: As `draw` gives it without a style.
+        sensors: Its sensor files.
     """
     label, program = shot.label, ""
+    texts = {} if shot.scenario is None else variable_texts(shot.scenario)
     told = f"recording {label.recording}, map {label.map}"
     if shot.scenario is not None:
         source = shot.scenario.source
         told = f"{told}, scenario {source.name}"
-        lines = range(1, len(source.line_starts) + 1)
-        rows = (
-            element(
-                "tr",
-                element("th", str(line), scope="row"),
-                element("td", element("code", escape(source.line(line)))),
-                id=f"line-{line}",
-            )
-            for line in lines
-        )
+        guilty = _guilty_lines(shot)
+        rows = (_program_row(source, line, guilty=line in guilty) for line in range(1, _last_line(source) + 1))
         code = element("div", element("table", element("tbody", *rows), class_="program"), class_="scroll")
         program = element("section", element("h2", "Program"), code)
-    sensors = [Sensor(channel, path) for channel, path in sorted(label.sensors.items())]
-    facts = element("div", frame_facts(shot, sensors), class_="frame")
+    facts = element("div", frame_facts(shot, sensors, texts), class_="frame")
     body = element("div", element("div", picture, class_="view-pane"), facts, class_="run-body")
-    head = element("header", element("h1", escape(label.frame)), element("p", escape(told)))
-    return page(label.frame, [head, element("main", body, program)], script=False)
+    verdict = "" if shot.verdict is None else badge(shot.verdict, "no match")
+    head = element("header", element("h1", escape(label.frame)), element("p", escape(told)), verdict)
+    return page(label.frame, [head, element("main", legend(), body, program)], script=False)
+
+
+def _guilty_lines(shot: Shot) -> frozenset[int]:
+    """Lines of the program that exclude a frame."""
+    if shot.scenario is None or shot.explanation is None:
+        return frozenset()
+    source = shot.scenario.source
+    spans = (each.span for each in shot.explanation.violations if each.span is not None)
+    return frozenset(source.position(span.start)[0] for span in spans if span.source is source)
+
+
+def _last_line(source: Source) -> int:
+    """The last line that says something."""
+    return max((line for line in range(1, len(source.line_starts) + 1) if source.line(line).strip()), default=0)
+
+
+def _program_row(source: Source, line: int, *, guilty: bool) -> str:
+    mark = element("span", "excludes", class_="badge no") if guilty else ""
+    return element(
+        "tr",
+        element("th", str(line), scope="row"),
+        element("td", element("code", escape(source.line(line))), " ", mark),
+        id=f"line-{line}",
+        class_="guilty" if guilty else None,
+    )

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import assert_never, cast
 
@@ -28,7 +27,6 @@ from scenicq.forest.nodes import (
     Constant,
     DiscAt,
     Identity,
-    Index,
     Node,
     PointIn,
     Range,
@@ -40,7 +38,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import children, features, leaves, postorder
+from scenicq.forest.walk import children, features, postorder
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction
 from scenicq.geometry.regions import (
@@ -59,10 +57,10 @@ from scenicq.geometry.regions import (
 )
 from scenicq.geometry.shapes import Bounds, Shape
 from scenicq.geometry.terms import rectangle_shape
+from scenicq.query.allowed import choices
 
 __all__ = ["Place", "allowed_headings", "allowed_place", "outline", "views"]
 
-_MOST_CHOICES = 16
 _MOST_RANGES = 6
 _THIN = 0.2
 """Metres around what has no area, so that it can be seen."""
@@ -141,16 +139,6 @@ def _visible(pieces: list[Shape]) -> tuple[Shape, ...]:
     )
 
 
-def _choices(root: Node) -> Iterator[Node]:
-    """The expression for each way to choose among options; nothing if there are too many."""
-    indices = [leaf for leaf in leaves(root) if isinstance(leaf, Index)]
-    if math.prod(len(leaf.weights) for leaf in indices) > _MOST_CHOICES:
-        return
-    for picked in itertools.product(*(range(len(leaf.weights)) for leaf in indices)):
-        chosen = {leaf.identity: float(number) for leaf, number in zip(indices, picked, strict=True)}
-        yield condition(root, {}, chosen)
-
-
 def _ranges(root: Node) -> list[Range] | None:
     """The random variables of an expression that is affine in each of them; None if it is not."""
     below: dict[int, frozenset[Identity]] = {}
@@ -221,7 +209,7 @@ def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds:
         root = condition(given.value, observed)
         if features(root):
             return None
-        options = list(_choices(root))
+        options = list(choices(root))
         for option in options:
             found = _reach(option, bounds)
             if found is None:
@@ -246,7 +234,7 @@ def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> t
         root = condition(given.value, observed)
         if features(root):
             return None
-        found = [scalar_bounds(option) for option in _choices(root)]
+        found = [scalar_bounds(option) for option in choices(root)]
     except CannotEvaluate:
         return None
     if not found or any(high - low >= math.tau for low, high in found):

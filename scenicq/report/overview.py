@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
@@ -16,7 +18,12 @@ from scenicq.report.svg import element, escape
 
 __all__ = ["funnel_section", "how_section", "program_section", "versions"]
 
-_PACKAGES = ("scenicq", "duckdb", "numpy", "pyarrow", "shapely", "highspy", "codac", "dreal")
+_PACKAGES = ("scenicq", "duckdb", "numpy", "pyarrow", "shapely", "highspy", "dreal")
+
+
+_NAMES = {"version": "scenic", "every": "all", "timeout_s": "timeout"}
+"""Options that the command line calls otherwise."""
+_UNITS = {"tolerance.x": "m", "tolerance.y": "m", "tolerance.position": "m", "radius": "m", "timeout_s": "s"}
 
 
 def _bar(share: float, told: str) -> str:
@@ -123,8 +130,25 @@ def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
             for each in fields(value)
             for row in _flat(getattr(value, each.name), f"{name}.{each.name}" if name else each.name)
         ]
-    shown = ", ".join(sorted(map(str, cast("frozenset[Any]", value)))) if type(value) is frozenset else str(value)
-    return [(name, shown)]
+    name = name.removeprefix("match.")
+    return [(_NAMES.get(name, name.replace("_", "-")), _shown(name, value))]
+
+
+def _shown(name: str, value: Any) -> str:
+    """An option's value as a person would give it."""
+    match value:
+        case None:
+            return "not given"
+        case bool():
+            return "yes" if value else "no"
+        case float() if name == "tolerance.heading":
+            return f"{math.degrees(value):.6g}\N{DEGREE SIGN}"
+        case float() if name in _UNITS:
+            return f"{value:g} {_UNITS[name]}"
+        case frozenset():
+            return ", ".join(sorted(map(str, cast("frozenset[Any]", value)))) or "none"
+        case _:
+            return str(value)
 
 
 def how_section(query: Query, command: str, elapsed_s: float) -> str:
@@ -136,7 +160,8 @@ def how_section(query: Query, command: str, elapsed_s: float) -> str:
         elapsed_s: Seconds that the query took.
     """
     manifest = query.dataset.manifest
-    about = [("path", str(query.dataset.path)), ("name", manifest.name), ("importer", manifest.importer)]
+    about = [("path", query.dataset.name), ("name", manifest.name), ("importer", manifest.importer)]
+    about.append(("dataset.json, SHA-256", hashlib.sha256(manifest.to_json().encode()).hexdigest()))
     about += [(key, str(value)) for key, value in manifest.provenance.items() if isinstance(value, str)]
     copy = element(
         "p",
@@ -146,7 +171,7 @@ def how_section(query: Query, command: str, elapsed_s: float) -> str:
         element("span", role="status", id="copied"),
         class_="command",
     )
-    rows = ((escape(name.removeprefix("match.")), escape(value)) for name, value in _flat(query.options))
+    rows = ((escape(name), escape(value)) for name, value in _flat(query.options))
     return element(
         "section",
         element("h2", "Run it again", id="how-title"),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from importlib import resources
 from importlib.metadata import version
 
+from scenicq.report.legend import legend
 from scenicq.report.picture import stylesheet
 from scenicq.report.svg import element, escape
 
@@ -15,6 +16,7 @@ __all__ = ["GENERATOR", "page", "runs_section"]
 
 GENERATOR = "scenicq report"
 """What marks a page as one of ours."""
+_KINDS = (("match", "matches"), ("unknown", "unknown"), ("near", "near misses"))
 
 
 def _asset(name: str) -> str:
@@ -57,10 +59,14 @@ def page(title: str, body: Sequence[str], *, script: bool = True) -> str:
     return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{"".join(body)}{end}</body></html>\n'
 
 
-def _toolbar(recordings: Sequence[str]) -> str:
+def _select(name: str, label: str, options: Sequence[tuple[str, str]]) -> str:
+    return element("label", label, element("select", *(element("option", t, value=v) for v, t in options), id=name))
+
+
+def _toolbar(recordings: Sequence[str], kinds: Sequence[str]) -> str:
     names = [element("option", "", value=name).removesuffix("</option>") for name in recordings]
-    orders = (("data-order", "in order of the dataset"), ("-data-length", "longest first"), ("data-time", "by time"))
-    options = [element("option", escape(text), value=value) for value, text in orders]
+    orders = (("data-order", "dataset order"), ("-data-length", "longest first"), ("data-time", "by time"))
+    verdicts = [("", "all"), *((kind, text) for kind, text in _KINDS if kind in kinds)]
     return element(
         "div",
         element(
@@ -69,7 +75,8 @@ def _toolbar(recordings: Sequence[str]) -> str:
             '<input type="search" id="filter" list="recordings" placeholder="all" autocomplete="off">',
         ),
         element("datalist", *names, id="recordings"),
-        element("label", "Sort ", element("select", *options, id="sort")),
+        _select("kind", "Verdict ", verdicts) if len(verdicts) > 2 else "",
+        _select("sort", "Sort ", orders),
         element("span", "", id="shown", role="status"),
         element(
             "span",
@@ -82,28 +89,23 @@ def _toolbar(recordings: Sequence[str]) -> str:
     )
 
 
-def runs_section(cards: Sequence[str], recordings: Sequence[str], note: str) -> str:
+def runs_section(cards: Sequence[str], recordings: Sequence[str], kinds: Sequence[str], note: str) -> str:
     """The runs, with what filters and sorts them.
 
     Args:
         cards: As `draw_card` gives them.
         recordings: Names of all their recordings.
+        kinds: Kinds of verdicts that there are: match, unknown, near.
         note: What the reader should know, or nothing.
     """
     empty = element("p", "No frame matches. The funnel says what excluded them.", class_="hint") if not cards else ""
-    legend = (
-        "<b>Solid box</b>: an object of the label, its line points to the front; <b>filled box</b>: the ego; "
-        "<b>dashed box</b>: a size that the label does not have. <b>Tinted area</b>: where a role may be; "
-        "<b>wedge</b>: which way it may face; <b>dashed yellow</b>: a view region; "
-        "<b>cross</b>: a hidden point of the witness."
-    )
     return element(
         "section",
         element("h2", "Frames", id="runs-title"),
         element("p", escape(note), class_="hint") if note else "",
         empty,
-        _toolbar(recordings) if cards else "",
-        element("p", legend, class_="hint legend") if cards else "",
+        _toolbar(recordings, kinds) if cards else "",
+        legend() if cards else "",
         element("div", *cards, id="runs"),
         aria_labelledby="runs-title",
     )

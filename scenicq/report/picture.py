@@ -134,7 +134,7 @@ def _furniture(plane: Plane, view: View) -> str:
     x, y, end = left + 4 * unit, top + 95 * unit, left + 4 * unit + 100 * metres
     bar = element("path", class_="scale", d=f"M{x:.0f} {y - unit:.0f}v{unit:.0f}H{end:.0f}v{-unit:.0f}")
     bar += element(
-        "text", f"{metres} m", class_="furniture", x=f"{x:.0f}", y=f"{y - 2 * unit:.0f}", font_size=round(2.4 * unit)
+        "text", f"{metres} m", class_="furniture", x=f"{x:.0f}", y=f"{y - 2 * unit:.0f}", font_size=round(3 * unit)
     )
     x, y, aside = left + 95 * unit, top + 4 * unit, 1.4 * unit
     north = element(
@@ -147,8 +147,8 @@ def _furniture(plane: Plane, view: View) -> str:
         "N",
         class_="furniture",
         x=f"{x:.0f}",
-        y=f"{y + 7.5 * unit:.0f}",
-        font_size=round(2.6 * unit),
+        y=f"{y + 8 * unit:.0f}",
+        font_size=round(3 * unit),
         text_anchor="middle",
     )
     return bar + north
@@ -177,7 +177,7 @@ def draw_shot(shot: Shot, plane: Plane, view: View) -> str:
     parts: list[str] = []
     if scenario is not None:
         parts.append(draw_overlay(scenario, broken, roles, plane, view.drawn))
-    for thing in (*label.objects, label.ego):
+    for thing in (*label.objects, *([label.ego] if label.has_ego else [])):
         reach = math.hypot(*box_of(thing)[:2])
         if abs(thing.x - view.center[0]) < view.half + reach and abs(thing.y - view.center[1]) < view.half + reach:
             role = by_id.get(thing.id)
@@ -188,7 +188,7 @@ def draw_shot(shot: Shot, plane: Plane, view: View) -> str:
             parts.append(element("circle", class_=f"ring {role.colour}", cx=x, cy=y, r=round(_SMALL * 50 * view.half)))
     if scenario is not None:
         parts += [draw_witness(shot.verdict, roles, plane, bounds), draw_blame(broken, roles, plane)]
-    parts += [draw_text(roles, plane, bounds, round(view.half * 5.5)), _furniture(plane, view)]
+    parts += [draw_text(roles, plane, bounds, round(view.half * 6)), _furniture(plane, view)]
     return "".join(parts)
 
 
@@ -204,7 +204,7 @@ def caption(shot: Shot) -> list[tuple[str, str]]:
             for each in shot.explanation.violations:
                 place = f" ({each.span.place})" if each.span else ""
                 told = "; ".join(filter(None, (f"{each.what} {each.value}".rstrip(), each.allowed)))
-                lines.append(("no", f"excluded by {told}{place}"))
+                lines.append(("no", f"excluded: {told}{place}"))
         case NoMatch(cause):
             place = f" ({cause.place})" if cause.place else ""
             lines.append(("no", f"no match: excluded by {cause.what}{place}"))
@@ -227,9 +227,15 @@ def stylesheet(*, dark: bool = True) -> str:
 
 
 def draw(
-    shot: Shot, backdrop: Backdrop, *, half: float | None = None, pixels: int = 900, style: Style = "adaptive"
+    shot: Shot,
+    backdrop: Backdrop,
+    *,
+    half: float | None = None,
+    pixels: int = 900,
+    style: Style = "adaptive",
+    captioned: bool = True,
 ) -> str:
-    """A frame as a file of SVG, with a caption below.
+    """A frame as a file of SVG.
 
     Args:
         shot: The frame.
@@ -238,14 +244,16 @@ def draw(
         pixels: Width of the picture.
         style: "adaptive" to dark surroundings, "light" for renderers that know no media queries, or "none" for a page
             that has the style.
+        captioned: Whether lines of text below say what it shows.
     """
     plane = plane_of(shot.label)
     view = view_of(shot.label, shot.roles, half)
     left, top, width, _ = view.box(plane)
     size = width / 50
+    told = caption(shot) if captioned else []
     longest = int(width / size / _LETTER)
-    lines = [(kind, part) for kind, text in caption(shot) for part in textwrap.wrap(text, longest) or [""]]
-    height = width + size * (1.5 * len(lines) + 1)
+    lines = [(kind, part) for kind, text in told for part in textwrap.wrap(text, longest) or [""]]
+    height = width + (size * (1.5 * len(lines) + 1) if lines else 0)
     texts = [
         element(
             "text",

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.results import Result
 from scenicq.store.dataset import Dataset
 
@@ -27,6 +28,17 @@ class Run:
     results: tuple[Result, ...]
     first: int
     of: int
+
+    @property
+    def kind(self) -> str:
+        """The kind of verdict: match, unknown, or near (a near miss)."""
+        match self.results[0].verdict:
+            case Match():
+                return "match"
+            case Unknown():
+                return "unknown"
+            case NoMatch():
+                return "near"
 
 
 def frame_numbers(dataset: Dataset, recordings: Iterable[str]) -> dict[str, tuple[int, int]]:

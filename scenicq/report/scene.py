@@ -12,7 +12,7 @@ from scenicq.forest.evaluate import Observation
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.angles import direction
 from scenicq.geometry.boxes import corners
-from scenicq.geometry.shapes import Bounds
+from scenicq.geometry.shapes import XY, Bounds
 from scenicq.match.observe import observe
 from scenicq.report.svg import Plane, element, escape, points_path
 from scenicq.store.classes import class_matches
@@ -25,6 +25,8 @@ COLOURS = 8
 _NOMINAL = (("Vehicle", 2.0, 4.5), ("Pedestrian", 0.7, 0.7))
 """Width and length in metres drawn where the label has none, by class."""
 _OTHER = (0.8, 0.8)
+_AHEAD = 1.0
+"""Metres ahead of a box around which no name should lie."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +51,7 @@ class Role:
 
 def find_roles(scenario: Scenario, label: Label, correspondence: Mapping[str, str]) -> tuple[Role, ...]:
     """The roles of a correspondence, in program order; the ego's is there also where the correspondence is empty."""
-    known = {thing.id: thing for thing in label.objects} | {"ego": label.ego}
+    known = {thing.id: thing for thing in label.objects} | ({"ego": label.ego} if label.has_ego else {})
     found: list[Role] = []
     for thing in scenario.objects:
         played = correspondence.get(thing.name, "ego" if thing.index == scenario.ego and not correspondence else "")
@@ -71,6 +73,11 @@ def box_of(thing: LabelObject) -> tuple[float, float, bool]:
         if class_matches(category, thing.category, "fine"):
             return width, length, False
     return (*_OTHER, False)
+
+
+def _point_ahead(thing: LabelObject, heading: float, metres: float) -> XY:
+    dx, dy = direction(heading)
+    return thing.x + metres * dx, thing.y + metres * dy
 
 
 def _told(thing: LabelObject, role: str) -> str:
@@ -101,8 +108,7 @@ def draw_object(thing: LabelObject, plane: Plane, *, role: Role | None = None, b
         shape = element("circle", cx=x, cy=y, r=round(50 * min(width, length)))
     else:
         outline = plane.to_picture(corners(thing.x, thing.y, thing.heading, width, length))
-        dx, dy = direction(thing.heading)
-        front = (thing.x + dx * length / 2, thing.y + dy * length / 2)
+        front = _point_ahead(thing, thing.heading, length / 2)
         nose = plane.to_picture(np.array([(thing.x, thing.y), front]))
         shape = element("path", class_="outline", d=points_path(outline.tolist(), closed=True))
         shape += element("path", class_="nose", d=points_path(nose.tolist(), closed=False))
@@ -119,6 +125,12 @@ def draw_text(roles: tuple[Role, ...], plane: Plane, bounds: Bounds, size: int) 
         size: Height of the letters in centimetres.
     """
     taken = [(*plane.at(role.thing.x, role.thing.y), 100 * box_of(role.thing)[1] / 2) for role in roles]
+    # the wedge of what each may face lies ahead of it
+    taken += [
+        (*plane.at(*_point_ahead(role.thing, role.thing.heading, box_of(role.thing)[1] / 2 + _AHEAD)), 100 * _AHEAD)
+        for role in roles
+        if role.thing.heading is not None
+    ]
     west, north = plane.at(bounds[0], bounds[3])
     east, south = plane.at(bounds[2], bounds[1])
     placed: list[tuple[float, float, float]] = []

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
+import io
 import os
+import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-__all__ = ["Sensor", "SensorFiles", "can_make_thumbnails"]
+from scenicq.store.dataset import Dataset
 
-_IMAGES = frozenset({".jpg", ".jpeg", ".png", ".webp"})
+__all__ = ["Sensor", "SensorFiles", "can_make_thumbnails", "roots_of"]
+
+_FORMATS = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG", ".webp": "WEBP"}
+"""Images by extension; Pillow must not try others, of which some run other programs."""
 _SIZE = (320, 200)
+_MOST_PIXELS = 50_000_000
+"""Pixels up to which an image is opened: four times the largest camera in use."""
+_INSIDE_BYTES = 10_000_000
+"""Bytes of thumbnails that are put into a page; others lie beside it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +36,7 @@ class Sensor:
         channel: Its channel.
         path: As the source gives it.
         link: The address of the file, relative to the report where that is possible; None if it was not found.
-        thumbnail: The same of a small image, if there is one.
+        thumbnail: The same of a small image, or the image itself as an address; None if there is none.
     """
 
     channel: str
@@ -35,12 +45,18 @@ class Sensor:
     thumbnail: str | None = None
 
 
+def roots_of(dataset: Dataset) -> tuple[Path, ...]:
+    """The folders on this machine that the sensor files of a dataset may lie in: its source's, and its own."""
+    source = dataset.manifest.provenance.get("source")
+    return tuple(filter(None, (Path(source) if isinstance(source, str) else None, dataset.folder)))
+
+
 def can_make_thumbnails() -> bool:
     """Whether Pillow is installed, which makes them."""
     return find_spec("PIL") is not None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, slots=True)
 class SensorFiles:
     """Finds sensor files.
 
@@ -49,23 +65,35 @@ class SensorFiles:
         report: The folder of the report as it will be, which links start from.
         folder: Where its files are written now.
         thumbnails: Whether small images are made.
+        inside: Whether they are put into the page as far as that is reasonable, so that it can be sent as one file.
+        most: Small images of one frame at most, those in front first.
     """
 
     roots: tuple[Path, ...]
     report: Path
     folder: Path
     thumbnails: bool = False
+    inside: bool = False
+    most: int = 12
+    _made: dict[Path, str | None] = field(default_factory=dict[Path, str | None], init=False, repr=False)
+    _bytes: int = field(default=0, init=False, repr=False)
 
     def find(self, sensors: Mapping[str, str]) -> list[Sensor]:
-        """The sensor files of a frame, cameras first."""
-        ordered = sorted(sensors.items(), key=lambda item: (not item[0].startswith("CAM"), item))
-        return [self._find(channel, path) for channel, path in ordered]
-
-    def _find(self, channel: str, path: str) -> Sensor:
-        file = next(filter(_is_file, _candidates(self.roots, path)), None)
-        if file is None:
-            return Sensor(channel, path)
-        return Sensor(channel, path, self._link(file.resolve()), self._thumbnail(file))
+        """The sensor files of a frame, cameras first, and of those the one in front."""
+        ordered = sorted(
+            sensors.items(), key=lambda item: (not item[0].startswith("CAM"), "FRONT" not in item[0], item)
+        )
+        found: list[Sensor] = []
+        seen = 0
+        for channel, path in ordered:
+            file = next(filter(_is_file, _candidates(self.roots, path)), None)
+            if file is None:
+                found.append(Sensor(channel, path))
+                continue
+            thumbnail = self._thumbnail(file) if seen < self.most else None
+            seen += thumbnail is not None
+            found.append(Sensor(channel, path, self._link(file), thumbnail))
+        return found
 
     def _link(self, file: Path) -> str:
         try:
@@ -77,29 +105,56 @@ class SensorFiles:
         return f"./{quote(relative.as_posix())}"
 
     def _thumbnail(self, file: Path) -> str | None:
-        if not self.thumbnails or file.suffix.lower() not in _IMAGES:
+        if not self.thumbnails or file.suffix.lower() not in _FORMATS:
             return None
-        name = hashlib.sha256(os.fsencode(file.resolve())).hexdigest()[:20] + ".jpg"
-        target = self.folder / "thumbnails" / name
-        if not target.exists():
-            target.parent.mkdir(exist_ok=True)
-            image: Any = import_module("PIL.Image")
-            try:
-                with image.open(file) as opened:
-                    small = opened.convert("RGB")
-                    small.thumbnail(_SIZE)
-                    small.save(target, quality=80)
-            except (OSError, ValueError, image.DecompressionBombError):
+        if file not in self._made:
+            small = _small(file)
+            self._made[file] = None if small is None else self._kept(file, small)
+        return self._made[file]
+
+    def _kept(self, file: Path, small: bytes) -> str:
+        """The address of a small image."""
+        if self.inside and self._bytes + len(small) <= _INSIDE_BYTES:
+            self._bytes += len(small)
+            return f"data:image/jpeg;base64,{base64.b64encode(small).decode()}"
+        name = f"thumbnails/{hashlib.sha256(os.fsencode(file)).hexdigest()[:20]}.jpg"
+        target = self.folder / name
+        target.parent.mkdir(exist_ok=True)
+        target.write_bytes(small)
+        return name
+
+
+def _small(file: Path) -> bytes | None:
+    """A small JPEG of an image; None of what is none, is broken, or is too large."""
+    images: Any = import_module("PIL.Image")
+    into = io.BytesIO()
+    try:
+        with warnings.catch_warnings():
+            # of images that are too large; what is done about them is said below
+            warnings.simplefilter("ignore")
+            image = images.open(file, formats=[_FORMATS[file.suffix.lower()]])
+        with image as opened:
+            if opened.width * opened.height > _MOST_PIXELS:
                 return None
-        return f"thumbnails/{name}"
+            # before anything is decoded: a JPEG is then read at a fraction of its size
+            opened.draft("RGB", _SIZE)
+            opened.thumbnail(_SIZE)
+            opened.convert("RGB").save(into, "JPEG", quality=75)
+    except (OSError, ValueError, SyntaxError, images.DecompressionBombError):
+        return None
+    return into.getvalue()
 
 
 def _candidates(roots: tuple[Path, ...], path: str) -> Iterable[Path]:
-    """Where a file may lie; a path that leaves its root is not followed."""
+    """Where a file may lie, without links; a path that leaves its root is not followed."""
     if "\0" in path or not path:
         return
     for root in roots:
-        file = (root / path).resolve()
+        try:
+            file = (root / path).resolve()
+        except (OSError, RuntimeError):
+            # a name too long for the file system, or a circle of links
+            continue
         if file.is_relative_to(root.resolve()):
             yield file
 

@@ -19,11 +19,12 @@ from scenicq.query.run import Query
 from scenicq.query.solving import LazySolver
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.cards import Card, draw_card
+from scenicq.report.frames import variable_texts
 from scenicq.report.overview import funnel_section, how_section, program_section
 from scenicq.report.page import GENERATOR, page, runs_section
 from scenicq.report.picture import Shot, draw
 from scenicq.report.runs import Run, find_runs, frame_numbers
-from scenicq.report.sensors import SensorFiles, can_make_thumbnails
+from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.report.shares import program_lines
 from scenicq.report.svg import element, escape
 
@@ -33,6 +34,8 @@ INLINE = 300
 """Frames up to which everything is in the page itself."""
 MOST = 2000
 """Frames that are shown at most."""
+THUMBNAILS = 1500
+"""Small camera images that are made at most, but one a frame; they take 5 ms each."""
 _OWN = ("pictures", "thumbnails", "index.html")
 
 
@@ -114,6 +117,7 @@ def _replace(work: Path, folder: Path) -> None:
 class _World:
     scenario: Scenario
     backdrop: Backdrop
+    texts: dict[str, str]
 
 
 class _Report:
@@ -122,9 +126,7 @@ class _Report:
     def __init__(self, query: Query, folder: Path, work: Path) -> None:
         self.query, self.work = query, work
         self.worlds: dict[str, _World | None] = {}
-        source = query.dataset.manifest.provenance.get("source")
-        roots = (Path(source),) if isinstance(source, str) else ()
-        self.files = SensorFiles((*roots, query.dataset.path), folder, work, can_make_thumbnails())
+        self.files = SensorFiles(roots_of(query.dataset), folder, work, can_make_thumbnails())
         self.pictured = 0
 
     def world(self, name: str) -> _World | None:
@@ -132,7 +134,7 @@ class _Report:
         if name not in self.worlds:
             try:
                 scenario, network = self.query.compile(name)
-                self.worlds[name] = _World(scenario, Backdrop(network))
+                self.worlds[name] = _World(scenario, Backdrop(network), variable_texts(scenario))
             except ScenarioError:
                 self.worlds[name] = None
         return self.worlds[name]
@@ -147,7 +149,9 @@ class _Report:
                 first.setdefault(each.frame, each)
         results = list(first.values())
         shown = results[: max(0, MOST - len(near))]
-        inline = len(shown) + len(near) <= INLINE
+        frames = len(shown) + len(near)
+        inline = self.files.inside = frames <= INLINE
+        self.files.most = max(1, THUMBNAILS // max(frames, 1))
         numbers = frame_numbers(dataset, {result.recording for result in (*shown, *near)})
         runs = [*find_runs(shown, numbers), *(Run(r.recording, (r,), *numbers[r.frame]) for r in near)]
         cards = list(self.cards(runs, inline=inline))
@@ -159,7 +163,7 @@ class _Report:
         name = Path(self.query.source.name).name
         told = (
             f"{funnel.matches:,} {'match' if funnel.matches == 1 else 'matches'}, {funnel.unknowns:,} unknown of "
-            f"{funnel.frames:,} frames in {dataset.manifest.name or dataset.path.name}"
+            f"{funnel.frames:,} frames in {dataset.manifest.name or dataset.name}"
         )
         head = element("header", element("h1", escape(name)), element("p", escape(told)))
         overview = element(
@@ -169,7 +173,10 @@ class _Report:
             class_="overview",
         )
         main = element(
-            "main", overview, runs_section(cards, recordings, note), how_section(self.query, command, elapsed_s)
+            "main",
+            overview,
+            runs_section(cards, recordings, [run.kind for run in runs], note),
+            how_section(self.query, command, elapsed_s),
         )
         skip = element("a", "Skip to the frames", href="#runs-title", class_="skip")
         return page(f"{name}: {told}", [skip, head, main])
@@ -191,7 +198,7 @@ class _Report:
                     shots.append(Shot(label, world.scenario, result.verdict, why))
                 sensors = tuple(self.files.find(shot.label.sensors) for shot in shots)
                 pictures = None if inline else tuple(self.picture(shot, world.backdrop) for shot in shots)
-                yield draw_card(Card(number, run, tuple(shots), sensors, world.backdrop, pictures))
+                yield draw_card(Card(number, run, tuple(shots), sensors, world.backdrop, world.texts, pictures))
 
     def picture(self, shot: Shot, backdrop: Backdrop) -> str:
         """Write a picture beside the page; its address."""
@@ -199,5 +206,5 @@ class _Report:
         name = f"pictures/{self.pictured:06}.svg"
         target = self.work / name
         target.parent.mkdir(exist_ok=True)
-        target.write_text(draw(shot, backdrop), encoding="utf-8", newline="\n")
+        target.write_text(draw(shot, backdrop, captioned=False), encoding="utf-8", newline="\n")
         return name

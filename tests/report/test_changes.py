@@ -5,7 +5,8 @@ import json
 import pytest
 
 from scenicq.errors import DataError
-from scenicq.report.changes import changes, changes_page, changes_text, read_results
+from scenicq.report.changes import changes, changes_page, changes_text
+from scenicq.report.result_files import read_results
 
 
 def _line(frame, verdict="match", recording="r", time=0, **more):
@@ -53,7 +54,7 @@ def test_what_came_went_and_stayed(files):
 def test_text_and_page(files):
     found = changes(*map(read_results, files))
     text = changes_text(found)
-    assert "  - go  car=a; no match: car.position, 2 m off" in text
+    assert "  - go  car=a; in B no match: car.position, 2 m off" in text
     assert "  ~ swap  car=a -> car=b" in text
     assert "stay  " not in text
     assert "  = stay  car=a" in changes_text(found, every=True)
@@ -69,6 +70,37 @@ def test_other_files_are_refused(tmp_path, text):
     file.write_text(text)
     with pytest.raises(DataError, match=r"line 1 is"):
         read_results(file)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_every_format_of_match_is_read(run, crossroads, scenarios, tmp_path, kind):
+    scenario = scenarios / "02_crossing_cars.scenic"
+    for name in ("lines.jsonl", f"cells.{kind}"):
+        assert run("match", scenario, crossroads, "--all", "-o", tmp_path / name).exit_code == 0
+    lines, cells = read_results(tmp_path / "lines.jsonl"), read_results(tmp_path / f"cells.{kind}")
+    assert lines.keys() == cells.keys()
+    for frame, record in lines.items():
+        for key in ("recording", "timestamp_us", "verdict", "correspondence"):
+            assert cells[frame][key] == record[key]
+    found = changes(lines, cells)
+    assert {each.kind for each in found} == {"stayed"}
+    assert [each.frame for each in found] == [each.frame for each in changes(lines, lines)]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.parquet", b"PAR1 nothing of the kind"),
+        ("a.csv", b"frame,recording\n1,2\n"),
+        ("a.csv", b'frame,recording,verdict,correspondence\na,b,match,"{"\n'),
+        ("a.csv", b'frame,recording\n"a\x00,'),
+        ("a.csv", b"\xff\xfe"),
+    ],
+)
+def test_broken_tables_are_refused(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DataError, match=r"file-invalid"):
+        read_results(tmp_path / name)
 
 
 def test_missing_files_are_told(tmp_path):

@@ -205,3 +205,19 @@ def test_pictures_beside_the_page_are_loaded_as_they_are_seen(chromium, report):
     while not chromium.run(loaded, f"{run} img.picture"):
         assert time.monotonic() - started < 10
     assert chromium.console() == []
+
+
+@pytest.mark.parametrize(("width", "phone"), [(1280, False), (390, True)])
+def test_pages_of_one_frame_and_of_changes(chromium, run, crossroads, scenarios, tmp_path, width, phone):
+    scenario = scenarios / "05_cut_in_from_right.scenic"
+    run("show", crossroads, "06-cut-in/10", "--scenario", scenario, "-o", tmp_path / "frame.html")
+    for name, tolerance in (("a", "heading=1deg"), ("b", "heading=20deg")):
+        run("match", scenario, crossroads, "--all", "--tolerance", tolerance, "-o", tmp_path / f"{name}.jsonl")
+    run("report", tmp_path / "a.jsonl", tmp_path / "b.jsonl", "-o", tmp_path / "changes.html")
+    chromium.console()
+    chromium.resize(width, 800, phone=phone)
+    for name, wanted in (("frame.html", "excludes"), ("changes.html", "match in B only")):
+        chromium.open(tmp_path / name)
+        assert wanted in chromium.run("return document.body.innerText")
+        assert chromium.run("return document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    assert chromium.console() == []

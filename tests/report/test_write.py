@@ -19,7 +19,6 @@ from scenicq.query.results import Result
 from scenicq.query.run import Query, QueryOptions, read_program
 from scenicq.report import write
 from scenicq.report.runs import find_runs, frame_numbers
-from scenicq.report.sensors import SensorFiles
 from scenicq.report.shares import program_lines
 from scenicq.report.write import check_target, write_report
 from scenicq.store.dataset import open_dataset
@@ -157,6 +156,7 @@ def test_near_misses_say_what_they_lack(query, tmp_path):
     near = near_results(found, 1)
     text = write_report(found, results, tmp_path / "r", near=near).read_text(encoding="utf-8")
     assert "near miss" in text
+    assert 'id="kind"' in text
     assert "would match with" in text
     assert "blamed" in text.split("</style>")[1]
 
@@ -208,39 +208,3 @@ def test_a_failed_report_leaves_the_old_one(query, tmp_path, monkeypatch):
         write_report(found, results, tmp_path / "r")
     assert [path.name for path in (tmp_path / "r").iterdir()] == ["index.html"]
     assert (tmp_path / "r" / "index.html").read_text(encoding="utf-8") == old
-
-
-def test_sensor_files_are_linked_where_they_are(tmp_path):
-    root, report = tmp_path / "data", tmp_path / "out" / "r"
-    (root / "cam").mkdir(parents=True)
-    (tmp_path / "secret.jpg").touch()
-    for name in ("a b.jpg", "javascript:x.jpg", "c#?%.jpg"):
-        (root / "cam" / name).touch()
-    report.mkdir(parents=True)
-    files = SensorFiles((root,), report, report)
-    paths = {"CAM": "cam/a b.jpg", "CAM_J": "cam/javascript:x.jpg", "CAM_C": "cam/c#?%.jpg"}
-    paths |= {"X": "../secret.jpg", "Y": str(tmp_path / "secret.jpg"), "Z": "\x00", "W": "nope.jpg", "V": ""}
-    found = {sensor.channel: sensor.link for sensor in files.find(paths)}
-    assert found == {
-        "CAM": "./../../data/cam/a%20b.jpg",
-        "CAM_J": "./../../data/cam/javascript%3Ax.jpg",
-        "CAM_C": "./../../data/cam/c%23%3F%25.jpg",
-        **dict.fromkeys("XYZWV"),
-    }
-
-
-def test_thumbnails_are_made_once_where_pillow_is(tmp_path):
-    image = pytest.importorskip("PIL.Image", reason="the extra scenicq[thumbnails] is not installed")
-    root, report = tmp_path / "data", tmp_path / "r"
-    root.mkdir()
-    report.mkdir()
-    image.new("RGB", (1600, 900)).save(root / "a.jpg")
-    (root / "broken.jpg").write_bytes(b"no image")
-    files = SensorFiles((root,), report, report, thumbnails=True)
-    first, broken = files.find({"CAM": "a.jpg", "CAM_B": "broken.jpg"})
-    assert broken.thumbnail is None
-    small = report / first.thumbnail
-    assert image.open(small).size == (320, 180)
-    written = small.stat().st_mtime_ns
-    assert files.find({"CAM": "a.jpg"})[0].thumbnail == first.thumbnail
-    assert small.stat().st_mtime_ns == written

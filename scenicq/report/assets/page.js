@@ -4,6 +4,7 @@
   const list = document.getElementById("runs");
   const filter = document.getElementById("filter");
   const sort = document.getElementById("sort");
+  const kind = document.getElementById("kind");
   const shown = document.getElementById("shown");
 
   // --- one run: its slider, its picture, its facts
@@ -47,7 +48,10 @@
   const visible = () => [...document.querySelectorAll(".run:not([hidden])")];
   const narrow = () => {
     const wanted = filter.value.trim().toLowerCase();
-    for (const run of runs) run.hidden = !run.dataset.recording.toLowerCase().includes(wanted);
+    for (const run of runs) {
+      run.hidden = !run.dataset.recording.toLowerCase().includes(wanted)
+        || (kind !== null && kind.value !== "" && kind.value !== run.dataset.kind);
+    }
     const left = visible();
     const frames = left.reduce((sum, run) => sum + Number(run.dataset.length), 0);
     shown.textContent = `${frames} ${frames === 1 ? "frame" : "frames"} in ${left.length} ${left.length === 1 ? "run" : "runs"}`;
@@ -62,6 +66,7 @@
   if (filter) {
     filter.addEventListener("input", narrow);
     sort.addEventListener("change", arrange);
+    kind?.addEventListener("change", narrow);
     arrange();
     narrow();
   }

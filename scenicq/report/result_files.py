@@ -1,0 +1,120 @@
+"""The files that `scenicq match -o` writes, read back: JSON lines, CSV or Parquet, by the extension."""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from scenicq.errors import DataError, Diagnostic
+
+__all__ = ["Record", "read_results"]
+
+Record = Mapping[str, Any]
+"""One result: frame, recording, verdict, and what else `scenicq.query.results.record` gives."""
+
+_TEXTS = ("frame", "recording", "verdict")
+_NEEDED = (*_TEXTS, "timestamp_us", "correspondence", "cause")
+_NESTED = ("correspondence", "cause")
+_LONGEST = 10_000_000
+"""Characters of a cell of CSV."""
+
+
+def read_results(path: Path) -> dict[str, Record]:
+    """The results in a file by frame; of several of one frame the first match counts.
+
+    Raises:
+        DataError: file-missing, or file-invalid.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror or error}")) from None
+    match path.suffix.lower():
+        case ".parquet":
+            records = _of_parquet(path, data)
+        case ".csv":
+            records = _of_csv(path, _text(path, data))
+        case _:
+            records = _of_lines(path, _text(path, data))
+    found: dict[str, Record] = {}
+    for each in records:
+        old = found.get(each["frame"])
+        if old is None or (each["verdict"] == "match" and old["verdict"] != "match"):
+            found[each["frame"]] = each
+    return found
+
+
+def _invalid(path: Path, why: str) -> DataError:
+    hint = "`scenicq match ... -o FILE` writes such a file: .jsonl, .csv or .parquet"
+    return DataError(Diagnostic("file-invalid", f"{path} holds no results: {why}", hints=(hint,)))
+
+
+def _text(path: Path, data: bytes) -> str:
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise _invalid(path, "it is not text in UTF-8") from None
+
+
+def _json(path: Path, where: str, text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise _invalid(path, f"{where} is not JSON") from None
+
+
+def _checked(path: Path, where: str, each: Any) -> Record:
+    if not isinstance(each, dict) or not all(isinstance(cast(Record, each).get(key), str) for key in _TEXTS):
+        raise _invalid(path, f"{where} is no result")
+    return cast(Record, each)
+
+
+def _of_lines(path: Path, text: str) -> Iterator[Record]:
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.strip():
+            where = f"line {number}"
+            yield _checked(path, where, _json(path, where, line))
+
+
+def _of_csv(path: Path, text: str) -> Iterator[Record]:
+    limit = csv.field_size_limit(_LONGEST)
+    try:
+        rows = csv.DictReader(io.StringIO(text, newline=""), strict=True)
+        for number, row in enumerate(rows, 1):
+            yield _row(path, f"row {number}", row)
+    except csv.Error as error:
+        raise _invalid(path, f"it is not CSV: {error}") from None
+    finally:
+        csv.field_size_limit(limit)
+
+
+def _of_parquet(path: Path, data: bytes) -> Iterator[Record]:
+    try:
+        table = pq.read_table(pa.BufferReader(data), columns=list(_NEEDED))
+    except (pa.ArrowException, OSError) as error:
+        raise _invalid(path, f"it is not Parquet with results: {str(error).partition(chr(10))[0]}") from None
+    for number, row in enumerate(table.to_pylist(), 1):
+        yield _row(path, f"row {number}", row)
+
+
+def _row(path: Path, where: str, row: Record) -> Record:
+    """A row of plain cells, of which some hold JSON."""
+    found = dict(row)
+    for name in _NESTED:
+        if isinstance(found.get(name), str):
+            found[name] = _json(path, f"{name} in {where}", found[name])
+    time = found.get("timestamp_us")
+    if isinstance(time, str) and time.removeprefix("-").isdecimal() and len(time) < 20:
+        found["timestamp_us"] = int(time)
+    return _checked(path, where, found)

@@ -1,0 +1,163 @@
+"""Reports as large as people make them, in a browser: real recordings, and five hundred matches."""
+
+import json
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+
+from scenicq.importers.ingest import ingest
+from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.query.near import near_results
+from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.report.write import write_report
+from scenicq.store.dataset import open_dataset
+
+from .browser import CHROMIUM, DRIVER, browser
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no Chromium with its driver"),
+]
+
+ROOT = Path(__file__).parents[2]
+BOSTON = ROOT.parent / "shared" / "data" / "boston"
+SEEN = """
+const look = () => {
+  const picture = document.querySelector('.run .picture');
+  const drawn = picture && picture.getBoundingClientRect().height > 0
+    && (picture.tagName !== 'IMG' || (picture.complete && picture.naturalWidth > 0));
+  if (drawn) window.firstPicture = performance.now(); else requestAnimationFrame(look);
+};
+requestAnimationFrame(look);
+"""
+"""Notes when the first picture is there, in milliseconds from the start of the navigation."""
+COMMAND = "scenicq match 'a b.scenic' town --report pages"
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as found:
+        found.command("Page.addScriptToEvaluateOnNewDocument", source=SEEN)
+        yield found
+
+
+@pytest.fixture(scope="module")
+def boston(tmp_path_factory):
+    """The first sample scenario on real recordings, with near misses."""
+    if not BOSTON.is_dir():
+        pytest.skip(f"{BOSTON} is not there")
+    folder = tmp_path_factory.mktemp("boston")
+    ingest(BOSTON, folder / "dataset")
+    match = MatchOptions(tolerance=parse_tolerance("x=0.25,y=0.25,heading=5deg"), classes="coarse", radius=50.0)
+    program = read_program(ROOT / "sample_data" / "scenarios" / "01_pedestrian_facing_ego.scenic")
+    query = Query(open_dataset(folder / "dataset"), program, QueryOptions(match=match))
+    results = list(query.results())
+    return write_report(query, results, folder / "pages", near=near_results(query, 3), command=COMMAND), len(results)
+
+
+@pytest.fixture(scope="module")
+def five_hundred(tmp_path_factory):
+    """The sample recordings several times, and a scenario that matches the first five hundred frames."""
+    folder = tmp_path_factory.mktemp("many")
+    shutil.copytree(ROOT / "sample_data" / "crossroads", folder / "source")
+    labels = [json.loads(line) for line in (folder / "source" / "labels.jsonl").read_text().splitlines()]
+    with (folder / "source" / "labels.jsonl").open("w") as file:
+        for number in range(4):
+            for label in labels:
+                again = {"id": f"{number}/{label['id']}", "recording": f"{number}-{label['recording']}"}
+                file.write(json.dumps({**label, **again}) + "\n")
+    ingest(folder / "source", folder / "dataset")
+    program = folder / "any.scenic"
+    program.write_text(
+        "model scenic.domains.driving.model\n"
+        "ego = new Car on road, facing Range(-180, 180) deg\n"
+        "other = new Object offset by (Range(-60, 60), Range(-60, 60)), facing Range(-180, 180) deg\n"
+    )
+    query = Query(open_dataset(folder / "dataset"), read_program(program), QueryOptions(limit=500))
+    results = list(query.results())
+    started = time.process_time()
+    page = write_report(query, results, folder / "pages", command=COMMAND)
+    return page, len(results), time.process_time() - started
+
+
+def _first_picture_ms(page, file):
+    """The best of a few navigations: what else runs here is not the page's fault."""
+    found = []
+    for _ in range(3):
+        page.open(file)
+        deadline = time.monotonic() + 10
+        while (at := page.run("return window.firstPicture || null")) is None:
+            assert time.monotonic() < deadline, "no picture"
+        found.append(at)
+    return min(found)
+
+
+def _drive(page, file, frames):
+    """Everything that a reader does, once."""
+    page.console()
+    page.resize(1280, 900)
+    assert _first_picture_ms(page, file) < 1000
+    assert f"{frames} " in page.run("return document.getElementById('shown').textContent")
+    # slider and keys on the longest run
+    page.run(
+        "const s = document.getElementById('sort'); s.value = '-data-length'; s.dispatchEvent(new Event('change'))"
+    )
+    page.run("document.activeElement.blur(); scrollTo(0, 0)")
+    page.press("j")
+    first = page.run("return document.activeElement.id")
+    shown = f"return document.querySelector('#{first} output').textContent"
+    before = page.run(shown)
+    page.press("\ue014")
+    assert page.run(shown) != before
+    page.press("\ue012")
+    assert page.run(shown) == before
+    page.click(f"#{first} .on")
+    assert page.run(shown).startswith("2 /")
+    # filter
+    name = page.run(f"return document.getElementById('{first}').dataset.recording")
+    page.press("/")
+    page.type("#filter", name)
+    left = page.run(
+        "return [...document.querySelectorAll('.run')].filter(e => e.checkVisibility()).map(e => e.dataset.recording)"
+    )
+    assert left
+    assert all(name in each for each in left)
+    page.press("\ue00c")
+    # the command line
+    page.command("Browser.grantPermissions", permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])
+    page.click("#copy")
+    deadline = time.monotonic() + 5
+    while page.run("return document.getElementById('copied').textContent") != "Copied":
+        assert time.monotonic() < deadline
+    assert page.run("return navigator.clipboard.readText()") == COMMAND
+    for width in (1280, 390):
+        page.resize(width, 800, phone=width < 500)
+        assert page.run("return document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    assert page.console() == []
+
+
+def test_real_recordings(chromium, boston):
+    file, matches = boston
+    assert sorted(path.name for path in file.parent.iterdir()) == ["index.html"]
+    _drive(chromium, file, matches + 3)
+    chromium.run("const k = document.getElementById('kind'); k.value = 'near'; k.dispatchEvent(new Event('change'))")
+    assert chromium.run("return document.getElementById('shown').textContent") == "3 frames in 3 runs"
+
+
+def test_five_hundred_matches(chromium, five_hundred):
+    file, matches, seconds = five_hundred
+    assert matches == 500
+    assert seconds < 15
+    assert len(list((file.parent / "pictures").iterdir())) == 500
+    chromium.resize(1280, 900)
+    assert _first_picture_ms(chromium, file) < 1000
+    loaded = "return [...document.querySelectorAll('img.picture')].map(e => e.complete && e.naturalWidth > 0)"
+    assert chromium.run(loaded)[0]
+    assert not all(chromium.run(loaded)), "pictures far below are loaded, too"
+    chromium.run("document.querySelector('.run:last-child').scrollIntoView()")
+    deadline = time.monotonic() + 5
+    while not chromium.run(loaded)[-1]:
+        assert time.monotonic() < deadline
+    _drive(chromium, file, matches)
