@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
@@ -13,7 +14,7 @@ from scenicq.geometry.regions import Nowhere, PolygonSet, Rectangle, Region, Uni
 from scenicq.geometry.shapes import Bounds, Shape
 from scenicq.geometry.terms import overlap, rectangle_shape, terms
 
-__all__ = ["convex_cells", "convex_parts", "triangles"]
+__all__ = ["convex_cells", "convex_parts", "joined_boxes", "triangles"]
 
 _STRAIGHT = 1e-12
 """Sine of a corner's turn down to which it still counts as straight."""
@@ -106,3 +107,20 @@ def _polygons(region: Region, bounds: Bounds) -> list[Shape]:
             if any(term.inside or term.outside or not shapes.polygonal_part(term.clip) for term in found):
                 raise ValueError("the region is not polygonal")
             return [part for term in found for part in shapes.polygonal_part(term.clip)]
+
+
+def joined_boxes(squares: Iterable[Bounds]) -> list[Bounds]:
+    """The same area in fewer boxes: runs from west to east first, then equal runs from south to north."""
+    runs: list[Bounds] = []
+    for west, south, east, north in sorted(squares, key=lambda box: (box[1], box[3], box[0])):
+        if runs and runs[-1][1:] == (south, west, north):
+            runs[-1] = (runs[-1][0], south, east, north)
+        else:
+            runs.append((west, south, east, north))
+    stacks: list[Bounds] = []
+    for west, south, east, north in sorted(runs, key=lambda box: (box[0], box[2], box[1])):
+        if stacks and (stacks[-1][0], stacks[-1][2], stacks[-1][3]) == (west, east, south):
+            stacks[-1] = (west, stacks[-1][1], east, north)
+        else:
+            stacks.append((west, south, east, north))
+    return stacks

@@ -1,6 +1,7 @@
 """Curbs of a map that names none: the outer edges of its roads, as Scenic takes them from its lane groups.
 
-A lane without a neighbour to its right ends at the curb: its right edge, in the direction of travel.
+A lane without a neighbour to its right ends at the curb: its right edge, in the direction of travel. Where traffic
+keeps to the left, everything is mirrored.
 """
 
 # shapely carries no type annotations
@@ -17,10 +18,10 @@ import shapely
 from shapely.geometry import LineString
 
 from scenicq.geometry import shapes
-from scenicq.geometry.elements import Lane
+from scenicq.geometry.elements import Lane, keeps_left
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["right_edges"]
+__all__ = ["right_edges", "side_edges"]
 
 _CORNER = np.cos(np.radians(60))
 """A boundary that turns away from the direction of travel by more than this is a lane's end, not its side."""
@@ -40,8 +41,10 @@ def right_edges(lanes: Sequence[Lane], intersections: Sequence[Shape]) -> tuple[
     found: list[LineString] = []
     for lane in lanes:
         for section in lane.sections:
-            if section._laneToRight is None and section.centerline is not None:  # pyright: ignore[reportPrivateUsage]
-                edges = _edges(cast(Shape, section.polygon), section.centerline.lines)
+            left = keeps_left(section)
+            outer = section._laneToLeft if left else section._laneToRight  # pyright: ignore[reportPrivateUsage]
+            if outer is None and section.centerline is not None:
+                edges = side_edges(cast(Shape, section.polygon), section.centerline.lines, left=left)
                 found += edges if crossing is None else [part for edge in edges for part in _outside(edge, crossing)]
     return tuple(found)
 
@@ -51,8 +54,8 @@ def _outside(edge: LineString, area: Shape) -> list[LineString]:
     return [cast(LineString, part) for part in shapes.simple_parts([rest]) if part.length > 0]
 
 
-def _edges(area: Shape, centerlines: Sequence[Shape]) -> list[LineString]:
-    """The parts of a lane's boundary that lie to the right of its centreline and run along with it."""
+def side_edges(area: Shape, centerlines: Sequence[Shape], *, left: bool = False) -> list[LineString]:
+    """The parts of a lane's boundary on the right of its centreline, or the left, in the direction of travel."""
     line = centerlines[0] if len(centerlines) == 1 else shapely.line_merge(shapely.union_all(list(centerlines)))
     if not isinstance(line, LineString):
         return []
@@ -67,10 +70,12 @@ def _edges(area: Shape, centerlines: Sequence[Shape]) -> list[LineString]:
     behind = shapely.get_coordinates(shapely.line_interpolate_point(line, np.maximum(along - 0.5, 0.0)))
     travel, side = ahead - behind, ends - starts
     lengths = np.hypot(*travel.T) * np.hypot(*side.T)
-    follows = (travel * side).sum(axis=1) > _CORNER * lengths
+    way = -1 if left else 1
+    follows = way * (travel * side).sum(axis=1) > _CORNER * lengths
     away = (starts + ends) / 2 - (ahead + behind) / 2
-    right = travel[:, 0] * away[:, 1] - travel[:, 1] * away[:, 0] < 0
-    return _runs(points, follows & right)
+    beside = way * (travel[:, 0] * away[:, 1] - travel[:, 1] * away[:, 0]) < 0
+    runs = _runs(points, follows & beside)
+    return [run.reverse() for run in runs] if left else runs
 
 
 def _runs(points: np.ndarray, kept: np.ndarray) -> list[LineString]:

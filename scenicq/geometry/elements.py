@@ -32,6 +32,7 @@ __all__ = [
     "Road",
     "Shoulder",
     "Sidewalk",
+    "keeps_left",
 ]
 
 
@@ -292,6 +293,11 @@ class Curb:
 
     id: str
     line: LineString
+
+
+def keeps_left(section: LaneSection) -> bool:
+    """Whether traffic keeps to the left there; the map says so of the section or of its lane."""
+    return "left" in (section.properties.get("traffic"), section.lane.properties.get("traffic"))
 
 
 def _present(element: _Element | None, owner: NetworkElement, what: str) -> _Element:

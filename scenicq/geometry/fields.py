@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.geometry.guards import Guard, narrowed
 from scenicq.geometry.shapes import Bounds
 
 __all__ = ["ConstantField", "FieldCell", "VectorField"]
@@ -21,11 +22,20 @@ class FieldCell:
         polygon: Corners in metres, counter-clockwise, shape (k, 2).
         heading: Radians.
         exact: Whether the field allows `heading` at every inner point; if not, the cell covers too much.
+        guards: Of a cell that is not exact, which of its points are meant, if that is known: those that satisfy all.
     """
 
     polygon: NDArray[np.float64]
     heading: float
     exact: bool
+    guards: tuple[Guard, ...] = ()
+
+    def part(self, bounds: Bounds) -> FieldCell | None:
+        """The same cell for points of a box only: fewer guards, exact if none is left; None if no point is meant."""
+        if self.exact or not self.guards:
+            return self
+        left = narrowed(self.guards, bounds)
+        return None if left is None else FieldCell(self.polygon, self.heading, not left, left)
 
 
 @runtime_checkable

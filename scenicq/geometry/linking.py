@@ -21,6 +21,7 @@ from scenicq.geometry.elements import (
     Road,
     Shoulder,
     Sidewalk,
+    keeps_left,
 )
 from scenicq.geometry.features import MapFeature, names
 from scenicq.geometry.fields import VectorField
@@ -222,9 +223,10 @@ def _link_neighbours(section: LaneSection, neighbour: Callable[[str], LaneSectio
     left, right = neighbour("left"), neighbour("right")
     _set(section, "_laneToLeft", left)
     _set(section, "_laneToRight", right)
-    # right-hand traffic: the faster lane is to the left
-    _set(section, "_fasterLane", left if left is not None and _same_way(section, left) else None)
-    _set(section, "_slowerLane", right if right is not None and _same_way(section, right) else None)
+    # towards the middle of the road, lanes get faster
+    faster, slower = (right, left) if keeps_left(section) else (left, right)
+    _set(section, "_fasterLane", faster if faster is not None and _same_way(section, faster) else None)
+    _set(section, "_slowerLane", slower if slower is not None and _same_way(section, slower) else None)
 
 
 def _same_way(a: LaneSection, b: LaneSection) -> bool:

@@ -2,13 +2,13 @@
 
 The distance to a segment is the distance to its line beside it, and to an end point before and behind it. Where the
 same kind of distance is compared for two segments, the border is straight; where a line is compared with a point that
-isn't on it (a parabola, which takes segments that don't touch) the cell keeps both sides and says that it is not exact.
+isn't on it (a parabola, which takes segments that don't touch) the cell keeps both sides and a guard tells them apart.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +17,16 @@ from numpy.typing import NDArray
 from scenicq.geometry import shapes
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
+from scenicq.geometry.guards import Guard, Nearer, segment_distances
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["lane_cells", "segment_distances"]
+__all__ = ["Contest", "lane_cells"]
 
 _SMALLEST = 1e-10
 """Square metres below which a cell is a rounding error."""
 _ON_LINE = 1e-9
+_OVERLAP = 1e-6
+"""Square metres that a cell must share with another lane to be contested."""
 _LOST = 1e-5
 """Square metres that joining cells may lose or gain by rounding coordinates."""
 
@@ -31,43 +34,70 @@ _Outline = list[tuple[float, float]]
 _HalfPlane = tuple[float, float, float]  # a x + b y >= c
 
 
-def segment_distances(xy: NDArray[np.float64], segments: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distances from points (..., 2) to segments (..., 4), broadcast together."""
-    start, along = segments[..., :2], segments[..., 2:] - segments[..., :2]
-    share = ((xy - start) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), np.finfo(float).tiny)
-    gap = xy - (start + np.clip(share, 0.0, 1.0)[..., None] * along)
-    return np.hypot(gap[..., 0], gap[..., 1])
+@dataclass(frozen=True, slots=True, eq=False)
+class Contest:
+    """Another lane that overlaps this one where the nearest segment of both decides.
+
+    Attributes:
+        shared: What lies in both.
+        segments: The other lane's centreline, (n, 4).
+        headings: Of these segments, (n,).
+    """
+
+    shared: Shape
+    segments: NDArray[np.float64]
+    headings: NDArray[np.float64]
 
 
-def lane_cells(area: Shape, segments: NDArray[np.float64], headings: NDArray[np.float64]) -> list[FieldCell]:
+def lane_cells(
+    area: Shape, segments: NDArray[np.float64], headings: NDArray[np.float64], contests: Sequence[Contest] = ()
+) -> list[FieldCell]:
     """Cells of a lane.
 
     Args:
         area: The lane's polygon.
         segments: Its centreline, (n, 4) rows x0, y0, x1, y1 of positive length.
         headings: Of the segments, (n,).
+        contests: The lanes that overlap it, outside of intersections.
     """
     cells: list[FieldCell] = []
     whole = [_outline(part) for piece in shapes.polygonal_part(area) for part in convex_parts(piece)]
     for index, segment in enumerate(segments):
         # near segments cut most
         order = sorted(range(len(segments)), key=lambda other: abs(other - index))
-        pieces = [_Piece(outline, exact=True) for outline in whole]
+        pieces = [_Piece(outline) for outline in whole]
         for other in order:
             if headings[other] != headings[index]:
-                pieces = [part for piece in pieces for part in _nearer(piece, segment, segments[other])]
+                pieces = [part for piece in pieces for part in _nearer(piece, segment, segments[other], other)]
+        rivals = sorted({rival for piece in pieces for rival in piece.rivals})
         for exact in (True, False):
-            outlines = [piece.outline for piece in pieces if piece.exact == exact]
-            cells += [FieldCell(part, float(headings[index]), exact) for part in _joined(outlines)]
+            outlines = [piece.outline for piece in pieces if (not piece.rivals) == exact]
+            guards = () if exact else (Nearer(segment[None], segments[rivals]),)
+            cells += [_contested(part, float(headings[index]), guards, segment, contests) for part in _joined(outlines)]
     return cells
+
+
+def _contested(
+    polygon: NDArray[np.float64],
+    heading: float,
+    guards: tuple[Guard, ...],
+    segment: NDArray[np.float64],
+    contests: Sequence[Contest],
+) -> FieldCell:
+    """A cell with guards against the segments of lanes that overlap it."""
+    for contest in contests:
+        rivals = contest.segments[contest.headings != heading]
+        if len(rivals) and shapes.intersection(shapes.polygon(polygon), contest.shared).area > _OVERLAP:
+            guards = (*guards, Nearer(segment[None], rivals, contest.shared))
+    return FieldCell(polygon, heading, not guards, guards)
 
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """A convex outline, and whether it holds nothing but what it should."""
+    """A convex outline, and the segments against which it covers too much."""
 
     outline: _Outline
-    exact: bool
+    rivals: frozenset[int] = frozenset()
 
 
 def _joined(outlines: list[_Outline]) -> list[NDArray[np.float64]]:
@@ -82,8 +112,8 @@ def _joined(outlines: list[_Outline]) -> list[NDArray[np.float64]]:
     return joined if abs(lost) < _LOST and len(joined) < len(plain) else plain
 
 
-def _nearer(piece: _Piece, segment: NDArray[np.float64], rival: NDArray[np.float64]) -> Iterator[_Piece]:
-    """The parts of a piece that are at least as near to the segment as to the rival."""
+def _nearer(piece: _Piece, segment: NDArray[np.float64], rival: NDArray[np.float64], number: int) -> Iterator[_Piece]:
+    """The parts of a piece that are at least as near to the segment as to the rival of a number."""
     corners = np.array(piece.outline)
     own, other = segment_distances(corners, segment), segment_distances(corners, rival)
     # the distance to a convex set is convex, with slope 1: greatest at a corner, and not much less than at a corner
@@ -96,7 +126,8 @@ def _nearer(piece: _Piece, segment: NDArray[np.float64], rival: NDArray[np.float
     for zone, near in _zones(piece.outline, segment):
         for part, far in _zones(zone, rival):
             found, sharp = _compared(part, near, far)
-            yield from (_Piece(cut, piece.exact and sharp) for cut in found if _area(cut) > _SMALLEST)
+            rivals = piece.rivals if sharp else piece.rivals | {number}
+            yield from (_Piece(cut, rivals) for cut in found if _area(cut) > _SMALLEST)
 
 
 def _zones(piece: _Outline, segment: NDArray[np.float64]) -> Iterator[tuple[_Outline, tuple[float, ...]]]:

@@ -8,7 +8,7 @@ What ties within a nanometre is all allowed.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -18,8 +18,10 @@ from shapely import LineString, STRtree
 
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import heading_of_array
+from scenicq.geometry.cells import joined_boxes
 from scenicq.geometry.fields import FieldCell
-from scenicq.geometry.road_cells import lane_cells, segment_distances
+from scenicq.geometry.guards import Guard, Nearer, Off, Within, segment_distances
+from scenicq.geometry.road_cells import Contest, lane_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
 __all__ = ["DirectedLane", "RoadDirection", "along_lines"]
@@ -30,6 +32,8 @@ _TIE = 1e-9
 _BESIDE = 0.01
 """Metres beside a polyline that count as on it."""
 _CHUNK = 20_000
+_MARGIN = 0.01
+"""Metres by which a box of cells is grown."""
 _LARGEST, _SMALLEST = 16.0, 2.0
 """Metres: sides of the squares that cover the surroundings of lanes, at first and where they are no longer split."""
 
@@ -45,6 +49,21 @@ class DirectedLane:
 
     area: Shape
     centerline: tuple[Coordinates, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A lane that may be nearest to some point of a square.
+
+    Attributes:
+        lane: Its number.
+        segments: Those of its segments that may then be nearest, by heading.
+        sure: Whether all of the square is near enough to some lane to have a heading.
+    """
+
+    lane: int
+    segments: dict[float, list[int]]
+    sure: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,93 +176,106 @@ class RoadDirection:
         if found is None:
             _, headings, starts = self._all
             area, segments = self._directed[lane]
-            found = lane_cells(area, segments, headings[starts[lane] : starts[lane + 1]])
-            shared = self._contested(lane)
-            if shared is not None:
-                # where lanes overlap outside of intersections, another lane's segment may be nearer
-                found = [
-                    FieldCell(c.polygon, c.heading, c.exact and not _overlap(shapes.polygon(c.polygon), shared))
-                    for c in found
-                ]
-            self._cells_of[lane] = found
+            own = headings[starts[lane] : starts[lane + 1]]
+            self._cells_of[lane] = found = lane_cells(area, segments, own, list(self._contests(lane)))
         return found
 
-    def _contested(self, lane: int) -> Shape | None:
-        """The part of a lane that lies in others too, outside of intersections."""
+    def _contests(self, lane: int) -> Iterator[Contest]:
+        """The lanes that overlap a lane outside of intersections: there, another lane's segment may be nearer."""
+        _, headings, starts = self._all
         area = self._directed[lane][0]
         touching: list[int] = shapes.tree_within(self._tree, area, 0.0).tolist()
-        others = [self._directed[i][0] for i in touching if i != lane]
-        rivals = [other for other in others if _overlap(other, area)]
-        if not rivals:
-            return None
-        shared = shapes.intersection(area, shapes.union_all(rivals))
         crossing: list[int] = shapes.tree_query(self._crossroads, area).tolist()
-        for index in crossing:
-            shared = shapes.difference(shared, self.intersections[index])
-        return shared if shared.area > 0 else None
+        for other in touching:
+            rival, segments = self._directed[other]
+            if other == lane or not _overlap(rival, area):
+                continue
+            shared = shapes.intersection(area, rival)
+            for index in crossing:
+                shared = shapes.difference(shared, self.intersections[index])
+            if shared.area > 0:
+                yield Contest(shared, segments, headings[starts[other] : starts[other + 1]])
 
     def _surroundings(self, bounds: Bounds) -> list[FieldCell]:
         """Squares over what lies off the lanes, split until one heading is left or they are small."""
-        west, south, east, north = bounds
+        # a box without width would count as covered by the lanes that it touches
+        west, south, east, north = bounds[0] - _MARGIN, bounds[1] - _MARGIN, bounds[2] + _MARGIN, bounds[3] + _MARGIN
         columns, rows = (max(1, int(np.ceil(span / _LARGEST))) for span in (east - west, north - south))
         xs, ys = np.linspace(west, east, columns + 1).tolist(), np.linspace(south, north, rows + 1).tolist()
         todo = [(xs[i], ys[j], xs[i + 1], ys[j + 1]) for i in range(columns) for j in range(rows)]
-        found_in: dict[tuple[float, bool], list[Bounds]] = {}
+        found_in: dict[float, list[Bounds]] = {}
+        guarded: list[FieldCell] = []
         while todo:
             square = todo.pop()
             west, south, east, north = square
-            found, within = self._headings_in(square)
-            if len(found) > 1 and max(east - west, north - south) > _SMALLEST:
+            near = self._near(square)
+            headings = {heading for each in near for heading in each.segments}
+            if len(headings) > 1 and max(east - west, north - south) > _SMALLEST:
                 x, y = (west + east) / 2, (south + north) / 2
                 todo += [(west, south, x, y), (x, south, east, y), (x, y, east, north), (west, y, x, north)]
-                continue
-            for heading in found:
-                found_in.setdefault((heading, within and len(found) == 1), []).append(square)
-        return [
-            FieldCell(np.array([(west, south), (east, south), (east, north), (west, north)]), heading, exact)
-            for (heading, exact), squares in found_in.items()
-            for west, south, east, north in _rows_joined(squares)
-        ]
+            elif len(headings) == 1 and all(each.sure for each in near):
+                found_in.setdefault(headings.pop(), []).append(square)
+            else:
+                guarded += self._guarded(square, near)
+        plain = [(heading, box) for heading, squares in found_in.items() for box in joined_boxes(squares)]
+        return [FieldCell(_corners(box), heading, exact=True) for heading, box in plain] + guarded
 
-    def _headings_in(self, square: Bounds) -> tuple[list[float], bool]:
-        """The headings that points of a square off the lanes may have, and whether all are near enough to have one."""
+    def _near(self, square: Bounds) -> list[_Candidate]:
+        """The lanes that may be nearest to a point of a square off the lanes."""
         west, south, east, north = square
         x, y = (west + east) / 2, (south + north) / 2
         center, radius = shapes.point(x, y), float(np.hypot(east - west, north - south)) / 2
         lanes = shapes.tree_within(self._tree, center, REACH + radius)
         if not len(lanes):
-            return [], False
+            return []
         away = shapes.distances(self._areas[lanes], center)
         near = lanes[away <= away.min() + 2 * radius + _TIE]
         if away.min() <= radius:
             touching: list[int] = lanes[away <= radius].tolist()
-            box = shapes.box(*square)
-            if shapes.difference(box, shapes.union_all([self._directed[i][0] for i in touching])).area <= 0:
-                return [], False
+            if shapes.difference(shapes.box(*square), self._union(touching)).area <= 0:
+                return []
+        sure = bool(away.min() + radius <= REACH)
         segments, headings, starts = self._all
-        found: dict[float, None] = {}
+        found: list[_Candidate] = []
         for lane in near.tolist():
             own = slice(starts[lane], starts[lane + 1])
             gaps = segment_distances(np.array((x, y)), segments[own])
-            found.update(dict.fromkeys(headings[own][gaps <= gaps.min() + 2 * radius + _TIE].tolist()))
-        return sorted(found), bool(away.min() + radius <= REACH)
+            by_heading: dict[float, list[int]] = {}
+            for index in np.nonzero(gaps <= gaps.min() + 2 * radius + _TIE)[0].tolist():
+                by_heading.setdefault(float(headings[own][index]), []).append(index)
+            found.append(_Candidate(lane, by_heading, sure))
+        return found
+
+    def _union(self, lanes: Sequence[int]) -> Shape:
+        return shapes.union_all([self._directed[lane][0] for lane in lanes])
+
+    def _guarded(self, square: Bounds, near: Sequence[_Candidate]) -> list[FieldCell]:
+        """A square where several headings are possible, once for each lane and heading, with what decides."""
+        corners, box = _corners(square), shapes.box(*square)
+        edges = {each.lane: shapes.edges(self._directed[each.lane][0]) for each in near}
+        off = [Off(area) for lane in edges if shapes.distance(area := self._directed[lane][0], box) <= 0]
+        cells: list[FieldCell] = []
+        for each in near:
+            lane, by_heading = each.lane, each.segments
+            rivals = [edges[other] for other in edges if other != lane]
+            common: list[Guard] = [*off]
+            if rivals:
+                common.append(Nearer(edges[lane], np.concatenate(rivals)))
+            if not each.sure:
+                common.append(Within(edges[lane], REACH))
+            segments = self._directed[lane][1]
+            for heading, own in by_heading.items():
+                others = [index for key, indices in by_heading.items() if key != heading for index in indices]
+                guards = [*common, *([Nearer(segments[own], segments[others])] if others else [])]
+                cell = FieldCell(corners, heading, not guards, tuple(guards)).part(square)
+                if cell is not None:
+                    cells.append(cell)
+        return cells
 
 
-def _rows_joined(squares: list[Bounds]) -> list[Bounds]:
-    """The same area in fewer boxes: runs from west to east first, then equal runs from south to north."""
-    runs: list[Bounds] = []
-    for west, south, east, north in sorted(squares, key=lambda box: (box[1], box[3], box[0])):
-        if runs and runs[-1][1:] == (south, west, north):
-            runs[-1] = (runs[-1][0], south, east, north)
-        else:
-            runs.append((west, south, east, north))
-    stacks: list[Bounds] = []
-    for west, south, east, north in sorted(runs, key=lambda box: (box[0], box[2], box[1])):
-        if stacks and (stacks[-1][0], stacks[-1][2], stacks[-1][3]) == (west, east, south):
-            stacks[-1] = (west, stacks[-1][1], east, north)
-        else:
-            stacks.append((west, south, east, north))
-    return stacks
+def _corners(box: Bounds) -> NDArray[np.float64]:
+    west, south, east, north = box
+    return np.array([(west, south), (east, south), (east, north), (west, north)])
 
 
 def _overlap(a: Shape, b: Shape) -> bool:

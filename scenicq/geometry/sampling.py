@@ -8,7 +8,7 @@ from bisect import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import assert_never
+from typing import assert_never, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +33,11 @@ from scenicq.geometry.regions import (
 )
 from scenicq.geometry.shapes import XY
 
-__all__ = ["sample"]
+__all__ = ["sample", "sampler"]
 
 _TRIES = 100_000
+_FEW = 32
+"""Tries in a disc or sector before the polygons that it is intersected with are cut to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +56,47 @@ def sample(region: Region, rng: random.Random) -> XY:
         ValueError: "empty", when the region is empty or too small in its parts to be hit; "unbounded", when it has no
             uniform distribution.
     """
+    return sampler(region)(rng)
+
+
+def sampler(region: Region) -> Callable[[random.Random], XY]:
+    """What draws from a region again and again, prepared once; see `sample`.
+
+    Raises:
+        ValueError: As `sample`. A drawing may raise "empty", too.
+    """
     proposal = _proposal(region)
     if proposal is None:
         raise ValueError("empty")
-    for _ in range(_TRIES):
-        point = proposal.draw(rng)
-        if point is not None:
-            return point
-    raise ValueError("empty")
+
+    def draw(rng: random.Random) -> XY:
+        point = _tried(proposal, rng, _FEW)
+        if point is None:
+            cut = _cut_to_window(region)
+            closer = proposal if cut is None else _filtered(cut, region)
+            point = None if closer is None else _tried(closer, rng, _TRIES)
+        if point is None:
+            raise ValueError("empty")
+        return point
+
+    return draw
+
+
+def _tried(proposal: _Proposal, rng: random.Random, tries: int) -> XY | None:
+    return next((point for _ in range(tries) if (point := proposal.draw(rng)) is not None), None)
+
+
+def _cut_to_window(region: Region) -> Region | None:
+    """The polygons of an intersection, cut to a disc or sector that is smaller: it may miss most of them, or all."""
+    if not isinstance(region, IntersectionOf):
+        return None
+    smallest = min(region.parts, key=_size)
+    sets = [part for part in region.parts if isinstance(part, PolygonSet)]
+    if not sets or not isinstance(smallest, Disc | Sector):
+        return None
+    base = min(sets, key=_size)
+    near = cast("list[Polygon]", base.near(bounds(smallest)))
+    return _clipped(PolygonSet(tuple(near), base.name), region.parts)
 
 
 def _proposal(region: Region) -> _Proposal | None:
@@ -194,22 +229,29 @@ def _polygons(region: PolygonSet) -> _Proposal | None:
     if not region.pieces:
         return None
     sums = _running(shapes.areas(region.pieces))
+    triangles: dict[int, tuple[list[float], list[list[list[float]]]]] = {}
 
     def draw(rng: random.Random) -> XY | None:
         index = _chosen(sums, rng)
-        corners = shapes.triangulate(region.pieces[index])
-        ahead, aside = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        shares = _running(np.abs(ahead[:, 0] * aside[:, 1] - ahead[:, 1] * aside[:, 0]))
-        chosen = _chosen(shares, rng)
+        if index not in triangles:
+            triangles[index] = _triangles(region.pieces[index])
+        shares, corners = triangles[index]
+        (ax, ay), (bx, by), (cx, cy) = corners[_chosen(shares, rng)]
         u, v = rng.random(), rng.random()
         if u + v > 1.0:
             u, v = 1.0 - u, 1.0 - v
-        place = corners[chosen, 0] + u * ahead[chosen] + v * aside[chosen]
-        x, y = float(place[0]), float(place[1])
-        several = len(shapes.tree_within(region.tree, shapes.point(x, y), 0.0))
+        x, y = ax + u * (bx - ax) + v * (cx - ax), ay + u * (by - ay) + v * (cy - ay)
+        several = len(shapes.tree_within(region.tree, shapes.point(x, y), 0.0)) if len(sums) > 1 else 1
         return (x, y) if rng.random() * several < 1.0 else None
 
     return _Proposal(2, sums[-1], draw)
+
+
+def _triangles(piece: shapes.Shape) -> tuple[list[float], list[list[list[float]]]]:
+    """Triangles that tile a polygon, with the running sums of their areas (doubled)."""
+    corners = shapes.triangulate(piece)
+    ahead, aside = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return _running(np.abs(ahead[:, 0] * aside[:, 1] - ahead[:, 1] * aside[:, 0])), corners.tolist()
 
 
 def _polylines(region: PolylineSet) -> _Proposal | None:

@@ -26,6 +26,8 @@ Coordinates: TypeAlias = NDArray[np.float64]
 """Points, shape (n, 2)."""
 _GRID = 1e-9
 """Metres to which coordinates are rounded where an overlay of nearly coinciding edges fails without."""
+_SLIT = 1e-3
+"""Metres on either side by which slits between polygons are closed."""
 
 
 def point(x: float, y: float) -> Point:
@@ -128,6 +130,11 @@ def intersection(a: Shape, b: Shape) -> Shape:
         return shapely.intersection(a, b, grid_size=_GRID)
 
 
+def intersections(geometries: Sequence[Shape], window: Shape) -> list[Shape]:
+    """What each geometry shares with another one."""
+    return [intersection(each, window) for each in geometries]
+
+
 def difference(a: Shape, b: Shape) -> Shape:
     """The closure of what lies in a and not in b."""
     try:
@@ -179,6 +186,20 @@ def disc_polygon(x: float, y: float, radius: float, quarter: int = 16) -> Shape:
 def band(shape: Shape, width: float) -> Shape:
     """The polygon of what lies within `width` metres of a line."""
     return cast(Shape, shapely.buffer(shape, width, quad_segs=2))
+
+
+def divided(shape: Shape, others: Sequence[Shape]) -> tuple[Shape, ...]:
+    """A polygon cut along the borders of others: its parts, each inside or outside of any of them."""
+    if not others:
+        return (shape,)
+    lines = shapely.union_all(shapely.boundary(array([shape, *others])))
+    faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(lines)))
+    return tuple(face for face in faces if shapely.contains_xy(shape, *inner_point(face)))
+
+
+def eroded(shape: Shape, by: float) -> Shape:
+    """A polygon without what lies within `by` metres of its boundary; slits narrower than 2 mm count as closed."""
+    return shapely.buffer(shapely.buffer(shape, _SLIT, quad_segs=4), -by - _SLIT, quad_segs=4)
 
 
 def coordinates(shape: Shape) -> Coordinates:
@@ -235,8 +256,11 @@ def corner_count(shape: Shape) -> int:
 
 
 def from_geojson(geometry: dict[str, Any]) -> Shape:
-    """A geometry from its GeoJSON object, without third coordinates; raises what shapely raises for a malformed one."""
-    return shapely.force_2d(shape_of(geometry))
+    """A geometry from its GeoJSON object, without third coordinates; a malformed one raises no error of GEOS."""
+    try:
+        return shapely.force_2d(shape_of(geometry))
+    except shapely.errors.ShapelyError as error:
+        raise ValueError(str(error)) from error
 
 
 def is_finite(shape: Shape) -> bool:

@@ -5,8 +5,10 @@ Every problem gets a process of its own, in a process group of its own, which is
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 import subprocess
+import sys
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -20,6 +22,9 @@ from scenicq.smt.formula import Problem
 from scenicq.smt.pool import end_group
 from scenicq.smt.smtlib import read_reply, to_smtlib
 
+if sys.platform == "linux":
+    import resource
+
 __all__ = ["SmtlibSolver"]
 
 REPLY_BYTES = 4 * 2**20
@@ -29,14 +34,20 @@ REPLY_BYTES = 4 * 2**20
 class SmtlibSolver:
     """A solver behind a command line; threads may share it."""
 
-    def __init__(self, command: str, *, jobs: int = 1) -> None:
+    def __init__(self, command: str, *, jobs: int = 1, memory_mb: int | None = None) -> None:
         """Take a command line, in the quoting of a POSIX shell, that runs without a shell.
+
+        Args:
+            command: The command line.
+            jobs: Processes at a time at most.
+            memory_mb: Address space of each process (Linux).
 
         Raises:
             SolverError: The command is not there or cannot be started.
         """
         self._command = command
         self._jobs = max(1, jobs)
+        self._memory_mb = memory_mb
         try:
             self._words = shlex.split(command)
         except ValueError as error:
@@ -88,7 +99,7 @@ class SmtlibSolver:
 
     def _spawn(self) -> subprocess.Popen[bytes]:
         try:
-            return subprocess.Popen(  # noqa: S603 - the user chooses the command
+            process = subprocess.Popen(  # noqa: S603 - the user chooses the command
                 self._words,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
@@ -102,6 +113,18 @@ class SmtlibSolver:
                 "solver-missing", f"solver command `{self._command}` cannot be started: {reason}", hints=(hint,)
             )
             raise SolverError(diagnostic) from None
+        if self._memory_mb is not None:
+            _limit_memory(process.pid, self._memory_mb)
+        return process
+
+
+def _limit_memory(pid: int, memory_mb: int) -> None:
+    """Limit the address space of a process and of all that it starts."""
+    if sys.platform == "linux":
+        size = memory_mb * 2**20
+        with contextlib.suppress(OSError, ValueError):
+            # it has ended, or its own limit is lower
+            resource.prlimit(pid, resource.RLIMIT_AS, (size, size))
 
 
 def _converse(process: subprocess.Popen[bytes], script: bytes, timeout_s: float) -> tuple[bytes, bool]:

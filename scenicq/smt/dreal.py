@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import functools
 import importlib
-import itertools
 import math
 import operator
 import time
@@ -76,15 +75,17 @@ Symbolic = Any
 
 NEAR = 1000.0
 """Distance at which unbounded ranges are cut off in the search for a witness that holds."""
-CASES = 1000
-"""Conjunctions that a problem is split into at most."""
+CASES = 1_000_000
+"""Conjunctions that a problem is split into at most; most of them are never looked at."""
+COARSE = 1e-2
+"""Precision at which some alternatives together are tried before the rest is chosen."""
 
 
 def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
     """Decide a problem; see `Solver.check`.
 
     dReal takes a conjunction in less than a millisecond, but can take seconds for a disjunction of twenty together with
-    equalities: hence the disjunctions are split here, as long as that makes few cases.
+    equalities: hence the disjunctions are split here, one after the other.
     """
     deadline = time.monotonic() + timeout_s
     related = without_inverses(problem)
@@ -98,12 +99,22 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         # constants outside of a function's domain
         return Unknown(f"unsupported: {error}")
     doubtful: Sat | None = None
-    for case in itertools.product(*options):
+    waiting: list[list[Symbolic]] = [[]]
+    while waiting:
+        chosen = waiting.pop()
+        if time.monotonic() > deadline:
+            return Unknown("timeout")
+        if len(chosen) < len(options):
+            # most alternatives contradict those that were chosen before, which a coarse look tells
+            if chosen and dreal.CheckSatisfiability(_all([given, common, *chosen]), max(precision, COARSE)) is None:
+                continue
+            waiting += [[*chosen, option] for option in reversed(options[len(chosen)])]
+            continue
         # the box of an answer can be so wide that its middle is no solution: then finer, and close to the origin
         for bounds, delta in ((given, precision), (near, precision), (near, precision / 100)):
             if time.monotonic() > deadline:
                 return Unknown("timeout")
-            box = dreal.CheckSatisfiability(_all([bounds, common, *case]), delta)
+            box = dreal.CheckSatisfiability(_all([bounds, common, *chosen]), delta)
             if box is None:
                 break
             witness = {variable.name: _value(box, variables[variable.name]) for variable in problem.variables}

@@ -19,6 +19,7 @@ from scenicq.forest.nodes import (
     RegionUnion,
     SectorAt,
     Select,
+    Undefined,
 )
 from scenicq.geometry import shapes
 from scenicq.geometry.cells import convex_cells
@@ -189,6 +190,8 @@ def inside_region(region: Node, point: Vector, around: Box, code: Callable[[Node
         UnsupportedError: The region is a sector of random angle.
     """
     match region:
+        case Constant(value=Undefined()):
+            return FALSE
         case Constant():
             return _known_region(cast(Region, region.value), point, around)
         case DiscAt():

@@ -9,7 +9,7 @@ be taken along an edge of one of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from scenicq.geometry.regions import Disc, PointSet, PolygonSet, PolylineSet, Re
 from scenicq.smt.formula import Formula, Num, Operator, Term, apply, compare, conjunction, disjunction
 from scenicq.smt.inside import UnsupportedError, Vector, convex_cell, disc
 
-__all__ = ["Frame", "box_holds", "box_meets", "boxes_meet", "distance_term"]
+__all__ = ["Frame", "box_meets", "boxes_meet", "distance_term", "dot", "minus", "squared_distance"]
 
 _MOST_SEGMENTS = 200
 
@@ -60,21 +60,27 @@ class Frame:
         """Half of the box's extent along a unit vector."""
         return apply(
             Operator.ADD,
-            apply(Operator.MUL, self.half_width, apply(Operator.ABS, _dot(self.right, axis))),
-            apply(Operator.MUL, self.half_length, apply(Operator.ABS, _dot(self.ahead, axis))),
+            apply(Operator.MUL, self.half_width, apply(Operator.ABS, dot(self.right, axis))),
+            apply(Operator.MUL, self.half_length, apply(Operator.ABS, dot(self.ahead, axis))),
         )
 
 
-def _dot(a: Vector, b: Vector) -> Term:
+def dot(a: Vector, b: Vector) -> Term:
+    """The scalar product."""
     return apply(Operator.ADD, apply(Operator.MUL, a[0], b[0]), apply(Operator.MUL, a[1], b[1]))
 
 
-def _minus(a: Vector, b: Vector) -> Vector:
+def minus(a: Vector, b: Vector) -> Vector:
+    """The difference."""
     return apply(Operator.SUB, a[0], b[0]), apply(Operator.SUB, a[1], b[1])
 
 
+def _square_length(a: Vector) -> Term:
+    return apply(Operator.ADD, apply(Operator.POW, a[0], 2.0), apply(Operator.POW, a[1], 2.0))
+
+
 def _length(a: Vector) -> Term:
-    return apply(Operator.SQRT, apply(Operator.ADD, apply(Operator.POW, a[0], 2.0), apply(Operator.POW, a[1], 2.0)))
+    return apply(Operator.SQRT, _square_length(a))
 
 
 def _points(region: Region) -> np.ndarray:
@@ -107,7 +113,7 @@ def distance_term(region: Region, point: Vector, around: Box) -> tuple[Term, lis
         UnsupportedError: The region has no segments, or too many of them.
     """
     if isinstance(region, Disc):
-        away = _length(_minus(point, (Num(region.center[0]), Num(region.center[1]))))
+        away = _length(minus(point, (Num(region.center[0]), Num(region.center[1]))))
         return apply(Operator.MAX, apply(Operator.SUB, away, region.radius), 0.0), []
     segments = _nearest_only(_points(region), around)
     if not len(segments) or len(segments) > _MOST_SEGMENTS:
@@ -132,24 +138,27 @@ def _nearest_only(segments: np.ndarray, around: Box) -> np.ndarray:
 
 
 def _to_segment(point: Vector, segment: Sequence[float]) -> Term:
+    return apply(Operator.SQRT, squared_distance(point, segment))
+
+
+def squared_distance(point: Vector, segment: Sequence[float]) -> Term:
+    """The square of the distance from a point to a segment x0, y0, x1, y1."""
     x0, y0, x1, y1 = segment
     dx, dy = x1 - x0, y1 - y0
     squared = dx * dx + dy * dy
-    offset = _minus(point, (Num(x0), Num(y0)))
-    if squared == 0.0:
-        return _length(offset)
-    share = apply(Operator.DIV, _dot(offset, (Num(dx), Num(dy))), squared)
-    share = apply(Operator.MIN, apply(Operator.MAX, share, 0.0), 1.0)
-    return _length(_minus(offset, (apply(Operator.MUL, share, dx), apply(Operator.MUL, share, dy))))
+    offset = minus(point, (Num(x0), Num(y0)))
+    if squared > 0.0:
+        share = apply(Operator.DIV, dot(offset, (Num(dx), Num(dy))), squared)
+        share = apply(Operator.MIN, apply(Operator.MAX, share, 0.0), 1.0)
+        offset = minus(offset, (apply(Operator.MUL, share, dx), apply(Operator.MUL, share, dy)))
+    return _square_length(offset)
 
 
 def boxes_meet(one: Frame, other: Frame) -> Formula:
     """Whether two boxes have a point in common: none of their four axes separates them."""
-    offset = _minus(one.center, other.center)
+    offset = minus(one.center, other.center)
     return conjunction(
-        compare(
-            "<=", apply(Operator.ABS, _dot(offset, axis)), apply(Operator.ADD, one.extent(axis), other.extent(axis))
-        )
+        compare("<=", apply(Operator.ABS, dot(offset, axis)), apply(Operator.ADD, one.extent(axis), other.extent(axis)))
         for axis in (one.right, one.ahead, other.right, other.ahead)
     )
 
@@ -169,9 +178,9 @@ def box_meets(box: Frame, region: Region) -> Formula:
             sizes = Num(region.heading), Num(region.width), Num(region.length)
             return boxes_meet(box, Frame.of((Num(region.center[0]), Num(region.center[1])), *sizes))
         case Disc():
-            offset = _minus((Num(region.center[0]), Num(region.center[1])), box.center)
+            offset = minus((Num(region.center[0]), Num(region.center[1])), box.center)
             gaps = [
-                apply(Operator.MAX, apply(Operator.SUB, apply(Operator.ABS, _dot(offset, axis)), half), 0.0)
+                apply(Operator.MAX, apply(Operator.SUB, apply(Operator.ABS, dot(offset, axis)), half), 0.0)
                 for axis, half in ((box.right, box.half_width), (box.ahead, box.half_length))
             ]
             return disc(gaps[0], gaps[1], region.radius)
@@ -192,30 +201,11 @@ def _box_meets_cell(box: Frame, cell: np.ndarray) -> Formula:
         size = math.hypot(bx - ax, by - ay)
         if size > 0:
             outward = (Num((by - ay) / size), Num((ax - bx) / size))
-            nearest = apply(Operator.SUB, _dot(box.center, outward), box.extent(outward))
+            nearest = apply(Operator.SUB, dot(box.center, outward), box.extent(outward))
             parts.append(compare("<=", nearest, outward[0].value * ax + outward[1].value * ay))
     for axis, half in ((box.right, box.half_width), (box.ahead, box.half_length)):
-        places = [_dot((Num(x), Num(y)), axis) for x, y in cell.tolist()]
-        middle = _dot(box.center, axis)
+        places = [dot((Num(x), Num(y)), axis) for x, y in cell.tolist()]
+        middle = dot(box.center, axis)
         parts.append(compare("<=", apply(Operator.MIN, *places), apply(Operator.ADD, middle, half)))
         parts.append(compare("<=", apply(Operator.SUB, middle, half), apply(Operator.MAX, *places)))
     return conjunction(parts)
-
-
-def box_holds(corners: Iterable[Vector], region: Region) -> Formula:
-    """Whether a known convex region holds all corners of a box, and so the box.
-
-    Raises:
-        UnsupportedError: The region is not convex, or not known to be.
-    """
-    match region:
-        case Disc():
-            center = (Num(region.center[0]), Num(region.center[1]))
-            return conjunction(disc(*_minus(corner, center), region.radius) for corner in corners)
-        case Rectangle() | PolygonSet():
-            cells = convex_cells(region, region_bounds(region))
-            if len(cells) == 1:
-                return conjunction(convex_cell(corner, cells[0]) for corner in corners)
-        case _:
-            pass
-    raise UnsupportedError("whether a random box lies in a region that is not convex")

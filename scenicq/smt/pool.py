@@ -37,6 +37,8 @@ GRACE_S = 0.5
 """Seconds that a worker has to answer after its timeout before it is killed."""
 START_S = 60.0
 """Seconds that a worker has to start."""
+_STARTS = 3
+"""How often a process that ends before it is ready is started anew."""
 ANSWER_BYTES = 16 * 2**20
 """Length of an answer at most."""
 
@@ -140,13 +142,32 @@ class _Worker:
         self._name = name
         self._process: subprocess.Popen[bytes] | None = None
         self._version = ""
+        self._loads = False
 
     def start(self) -> str:
-        """Start the process unless it runs; the version of what it loaded."""
+        """Start the process unless it runs; the version of what it loaded.
+
+        Raises:
+            SolverError: The solver cannot be loaded.
+        """
         if self._process is not None:
             if self._process.poll() is None:
                 return self._version
             self.stop()
+        greeting: dict[str, str] = {}
+        for _ in range(_STARTS):
+            greeting = self._spawn()
+            if "ready" in greeting:
+                self._version, self._loads = greeting["ready"], True
+                return self._version
+            self.stop()
+            if "failed" in greeting:
+                break
+        reason = greeting.get("failed", "the process ended while it loaded the solver")
+        raise SolverError(Diagnostic("solver-missing", f"solver `{self._name}` does not load", label=reason))
+
+    def _spawn(self) -> dict[str, str]:
+        """Start the process; what it says of its start, nothing if it ends before."""
         package = str(Path(__file__).parents[2])
         path = [package, *(entry or str(Path.cwd()) for entry in sys.path)]
         self._process = subprocess.Popen(  # noqa: S603
@@ -159,20 +180,22 @@ class _Worker:
         )
         line, _ = self._exchange(pickle.dumps(path) + pickle.dumps(self._setup), START_S)
         try:
-            greeting = json.loads(line)
+            return json.loads(line)
         except ValueError:
-            greeting = {"failed": "the process ended while it loaded the solver"}
-        if "ready" not in greeting:
-            self.stop()
-            raise SolverError(
-                Diagnostic("solver-missing", f"solver `{self._name}` does not load", label=greeting["failed"])
-            )
-        self._version = greeting["ready"]
-        return self._version
+            return {}
 
     def ask(self, problem: Problem, precision: float, timeout_s: float) -> Answer:
-        """Have a problem decided."""
-        self.start()
+        """Have a problem decided.
+
+        Raises:
+            SolverError: The solver cannot be loaded, and never could.
+        """
+        try:
+            self.start()
+        except SolverError:
+            if self._loads:
+                return Unknown("crash")
+            raise
         request = Request(problem, precision, timeout_s, timeout_s + 2 * GRACE_S)
         line, expired = self._exchange(pickle.dumps(request), timeout_s + GRACE_S)
         if not line.endswith(b"\n"):

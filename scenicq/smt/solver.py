@@ -22,15 +22,18 @@ __all__ = [
     "open_solver",
 ]
 
+MEMORY_MB = 4096
+"""Address space of a solver process by default: what needs more is unknown, instead of taking the machine down."""
 
-def open_solver(name: str = "auto", *, jobs: int = 1, memory_mb: int | None = None) -> SolverSession:
+
+def open_solver(name: str = "auto", *, jobs: int = 1, memory_mb: int | None = MEMORY_MB) -> SolverSession:
     """Open a solver, to be used in a `with` statement.
 
     Args:
         name: "auto" (dReal where it loads, else the portable solver), "dreal", "portable", or a command line that reads
             SMT-LIB 2 from its standard input, such as `z3 -in`.
         jobs: Worker processes at most; they start when needed.
-        memory_mb: Address space of each worker process (Linux).
+        memory_mb: Address space of each solver process (Linux); None for no limit.
 
     Raises:
         SolverError: The solver cannot be loaded or started.
@@ -38,7 +41,7 @@ def open_solver(name: str = "auto", *, jobs: int = 1, memory_mb: int | None = No
     if name == "portable":
         return WorkerSolver(PORTABLE, jobs=jobs, memory_mb=memory_mb)
     if name not in ("auto", "dreal"):
-        return SmtlibSolver(name, jobs=jobs)
+        return SmtlibSolver(name, jobs=jobs, memory_mb=memory_mb)
     solver = WorkerSolver(DREAL, jobs=jobs, memory_mb=memory_mb)
     try:
         solver.start()

@@ -6,8 +6,11 @@ A solver may always say that it does not know, except where the table insists; i
 from __future__ import annotations
 
 import math
+import os
 import shutil
+import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from scenicq.errors import SolverError
-from scenicq.smt.answer import Sat, SolverSession, Unknown, Unsat
+from scenicq.smt.answer import Answer, Sat, SolverSession, Unknown, Unsat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import (
     FALSE,
@@ -344,3 +347,25 @@ def test_many(solver: SolverSession) -> None:
     examples = [example for example in EXAMPLES if example.polynomial and example.answers in ("sat", "unsat")][:10]
     answers = solver.check_many([example.problem for example in examples], precision=PRECISION, timeout_s=20.0)
     assert [type(answer).__name__.lower() for answer in answers] == [example.answers for example in examples]
+
+
+def test_a_killed_process_costs_one_problem(solver: SolverSession) -> None:
+    """Whatever runs the solver is killed at work: that problem is unknown, the next is decided."""
+    children = Path(f"/proc/self/task/{os.getpid()}/children")
+    if not children.exists():
+        pytest.skip("processes are found in /proc")
+    answers: list[Answer] = []
+    work = threading.Thread(
+        target=lambda: answers.append(solver.check(KANGAROO, precision=1e-9, timeout_s=20.0)), daemon=True
+    )
+    work.start()
+    time.sleep(0.5)
+    for thread in Path("/proc/self/task").iterdir():
+        for pid in (thread / "children").read_text().split():
+            os.kill(int(pid), signal.SIGKILL)
+    work.join(15.0)
+    assert not work.is_alive()
+    if "z3" not in solver.name:
+        # z3 may have given up before
+        assert answers == [Unknown("crash")]
+    assert isinstance(solver.check(Problem((), TRUE), precision=1e-3, timeout_s=10.0), Sat)

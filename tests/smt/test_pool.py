@@ -17,7 +17,7 @@ import pytest
 from scenicq.errors import SolverError
 from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
 from scenicq.smt.formula import TRUE, Problem, Variable
-from scenicq.smt.pool import PORTABLE, WorkerSolver
+from scenicq.smt.pool import PORTABLE, WorkerSolver, _Worker
 from scenicq.smt.worker import read_answer, write_answer
 
 HERE = str(Path(__file__).parent)
@@ -202,3 +202,32 @@ def test_answers_cross_the_pipe(answer: Answer) -> None:
 @pytest.mark.parametrize("line", [b"", b"[]", b"7", b'{"sat": 3}', b'{"sat": {"x": "1"}}', b'{"unknown": 3}', b"\xff"])
 def test_garbage_is_recognised(line: bytes) -> None:
     assert read_answer(line) == Unknown("garbage")
+
+
+def test_a_worker_killed_at_its_start_is_started_anew(solver: WorkerSolver, monkeypatch: pytest.MonkeyPatch) -> None:
+    spawned: list[int] = []
+    spawn = _Worker._spawn
+
+    def unlucky(worker: _Worker) -> dict[str, str]:
+        greeting = spawn(worker)
+        spawned.append(1)
+        if len(spawned) in (1, 4, 5, 6):
+            # as if it had been killed before it was ready
+            return {}
+        return greeting
+
+    monkeypatch.setattr(_Worker, "_spawn", unlucky)
+    assert _check(solver, "fine") == Unsat()
+    assert len(spawned) == 2
+    assert _check(solver, "exit") == Unknown("crash")
+    assert _check(solver, "fine") == Unsat()
+    assert _check(solver, "exit") == Unknown("crash")
+    # it has loaded before: what keeps it from starting is no fault of the solver's installation
+    assert _check(solver, "fine") == Unknown("crash")
+    assert _check(solver, "fine") == Unsat()
+
+
+def test_a_solver_that_never_starts_is_missing(solver: WorkerSolver, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_Worker, "_spawn", lambda worker: {})
+    with pytest.raises(SolverError):
+        _check(solver, "fine")

@@ -202,3 +202,11 @@ def test_text_means_what_evaluation_says(formula: Formula, point: dict[str, floa
 def _is_close(formula: Formula, point: dict[str, float]) -> bool:
     """Whether rounding decides."""
     return evaluate(formula, point, slack=1e-9) is not evaluate(formula, point) and not math.isnan(0.0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit exists on Linux")
+def test_commands_have_a_memory_limit(tmp_path: Path) -> None:
+    body = "import time; time.sleep(0.2); x = bytearray(900 * 2**20); print('unsat')"
+    for memory_mb, answer in ((400, Unknown("crash")), (4000, Unsat())):
+        with SmtlibSolver(_stub(tmp_path, body), memory_mb=memory_mb) as solver:
+            assert solver.check(ONE, precision=1e-3, timeout_s=20.0) == answer

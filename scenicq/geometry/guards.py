@@ -1,0 +1,134 @@
+"""Conditions under which a vector field has the heading of a cell that covers too much.
+
+Which centreline segment is nearest is decided along parabolas, which no convex cell follows. A cell that such a border
+crosses keeps both sides and says by guards which points are meant: so the matcher can cut the cell down to the side it
+wants, and a formula can state the border as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias, assert_never
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.geometry import shapes
+from scenicq.geometry.shapes import Bounds, Shape
+
+__all__ = ["Guard", "Nearer", "Off", "Within", "narrowed", "segment_distances"]
+
+_ROUNDING = 1e-7
+"""Metres that a comparison of distances may be off before it excludes a point."""
+
+Segments: TypeAlias = NDArray[np.float64]
+"""Rows x0, y0, x1, y1 in metres, shape (n, 4)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearer:
+    """One of a cell's own segments is at least as near as every rival.
+
+    Attributes:
+        own: Segments, at least one.
+        rivals: Segments, at least one.
+        inside: Where this is demanded; everywhere if None.
+    """
+
+    own: Segments
+    rivals: Segments
+    inside: Shape | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Off:
+    """The point lies outside of a polygon, or on its border."""
+
+    area: Shape
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Within:
+    """One of some segments is no farther away than a distance in metres."""
+
+    own: Segments
+    reach: float
+
+
+Guard: TypeAlias = Nearer | Off | Within
+
+
+def segment_distances(xy: NDArray[np.float64], segments: Segments) -> NDArray[np.float64]:
+    """Distances from points (..., 2) to segments (..., 4), broadcast together."""
+    start, along = segments[..., :2], segments[..., 2:] - segments[..., :2]
+    share = ((xy - start) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), np.finfo(float).tiny)
+    gap = xy - (start + np.clip(share, 0.0, 1.0)[..., None] * along)
+    return np.hypot(gap[..., 0], gap[..., 1])
+
+
+def narrowed(guards: Sequence[Guard], bounds: Bounds) -> tuple[Guard, ...] | None:
+    """What guards still demand of the points of a box.
+
+    Args:
+        guards: Conditions that hold together.
+        bounds: The box.
+
+    Returns:
+        The guards that not all of the box satisfies, cut down to the segments that matter there; None where no point of
+        the box satisfies all of them.
+    """
+    west, south, east, north = bounds
+    middle = np.array([(west + east) / 2, (south + north) / 2])
+    reach = math.hypot(east - west, north - south) / 2
+    left: list[Guard] = []
+    for guard in guards:
+        found = _narrowed(guard, bounds, middle, reach)
+        if found is False:
+            return None
+        if found is not True:
+            left.append(found)
+    return tuple(left)
+
+
+def _box(bounds: Bounds) -> Shape:
+    west, south, east, north = bounds
+    return shapes.box(*bounds) if west < east and south < north else shapes.line([(west, south), (east, north)])
+
+
+def _narrowed(guard: Guard, bounds: Bounds, middle: NDArray[np.float64], reach: float) -> Guard | bool:
+    """What is left of a guard for points within a reach of the middle; whether it holds if that is decided."""
+    match guard:
+        case Nearer():
+            return _nearer(guard, bounds, middle, reach)
+        case Off():
+            box = _box(bounds)
+            if shapes.distance(guard.area, box) > _ROUNDING:
+                return True
+            return False if shapes.covers(guard.area, box) else guard
+        case Within():
+            away = segment_distances(middle, guard.own)
+            if away.min() + reach <= guard.reach:
+                return True
+            near = away <= guard.reach + reach + _ROUNDING
+            return Within(guard.own[near], guard.reach) if near.any() else False
+        case _:
+            assert_never(guard)
+
+
+def _nearer(guard: Nearer, bounds: Bounds, middle: NDArray[np.float64], reach: float) -> Guard | bool:
+    everywhere = guard.inside is None
+    if guard.inside is not None:
+        box = _box(bounds)
+        if shapes.distance(guard.inside, box) > _ROUNDING:
+            return True
+        everywhere = shapes.covers(guard.inside, box)
+    own, rivals = segment_distances(middle, guard.own), segment_distances(middle, guard.rivals)
+    # distances change by no more than the way: what is farther than this can be nearest nowhere in the box
+    limit = 2 * reach + _ROUNDING
+    if everywhere and own.min() > rivals.min() + limit:
+        return False
+    if own.min() + 2 * reach <= rivals.min():
+        return True
+    return Nearer(guard.own[own <= own.min() + limit], guard.rivals[rivals <= rivals.min() + limit], guard.inside)

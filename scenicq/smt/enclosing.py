@@ -1,0 +1,101 @@
+"""Whether a box whose place is random lies in a known region (`regionContainedIn`, the workspace).
+
+A convex region holds a box if it holds its corners. Another one does if it holds the box's centre and no part of its
+border runs through the box: a segment and a box miss each other if a line along one of them separates them.
+"""
+
+from __future__ import annotations
+
+import math
+
+from scenicq.forest.bounds import Box
+from scenicq.geometry import shapes
+from scenicq.geometry.cells import convex_parts
+from scenicq.geometry.membership import bounds as region_bounds
+from scenicq.geometry.regions import Disc, Everywhere, IntersectionOf, Nowhere, PolygonSet, Rectangle, Region, UnionOf
+from scenicq.geometry.shapes import Shape
+from scenicq.geometry.terms import overlap, rectangle_shape
+from scenicq.smt.formula import FALSE, TRUE, Formula, Num, Operator, apply, compare, conjunction, disjunction
+from scenicq.smt.inside import UnsupportedError, convex_cell, disc
+from scenicq.smt.measure import Frame, dot, minus
+
+__all__ = ["box_holds"]
+
+_MOST_EDGES = 400
+
+
+def box_holds(box: Frame, region: Region, around: Box) -> Formula:
+    """Whether a known region holds all of a box.
+
+    Args:
+        box: The box.
+        region: Polygons, a rectangle, a disc, or unions of polygons and intersections of these.
+        around: Where the box's corners can be; the region's border elsewhere is left out.
+
+    Raises:
+        UnsupportedError: The region is of another kind, or its border has too many edges there.
+    """
+    match region:
+        case Everywhere():
+            return TRUE
+        case Nowhere():
+            return FALSE
+        case Disc():
+            center = (Num(region.center[0]), Num(region.center[1]))
+            return conjunction(disc(*minus(corner, center), region.radius) for corner in box.corners())
+        case Rectangle():
+            return _area_holds(box, rectangle_shape(region), around)
+        case PolygonSet():
+            return _area_holds(box, _near([region], around), around)
+        case UnionOf() if all(isinstance(part, PolygonSet) for part in region.parts):
+            return _area_holds(
+                box, _near([part for part in region.parts if isinstance(part, PolygonSet)], around), around
+            )
+        case IntersectionOf():
+            return conjunction(box_holds(box, part, around) for part in region.parts)
+        case _:
+            raise UnsupportedError(f"whether a random box lies in a {type(region).__name__}")
+
+
+def _near(regions: list[PolygonSet], around: Box) -> Shape:
+    """The polygons that a box can touch, as one shape: where they meet, there is no border."""
+    found: list[Shape] = []
+    (x0, x1), (y0, y1) = around
+    for region in regions:
+        limits = overlap((x0, y0, x1, y1), region_bounds(region))
+        if limits[0] <= limits[2] and limits[1] <= limits[3]:
+            found += region.near(limits)
+    return shapes.union_all(found)
+
+
+def _area_holds(box: Frame, area: Shape, around: Box) -> Formula:
+    cells = [cell for piece in shapes.polygonal_part(area) for cell in convex_parts(piece)]
+    if len(cells) == 1:
+        return conjunction(convex_cell(corner, cells[0]) for corner in box.corners())
+    (x0, x1), (y0, y1) = around
+    border = [edge for piece in shapes.polygonal_part(area) for edge in shapes.edges(piece).tolist()]
+    close = [
+        (ax, ay, bx, by)
+        for ax, ay, bx, by in border
+        if min(ax, bx) <= x1 and max(ax, bx) >= x0 and min(ay, by) <= y1 and max(ay, by) >= y0
+    ]
+    if len(close) > _MOST_EDGES:
+        raise UnsupportedError("whether a random box lies in a region of so many edges")
+    inside = disjunction(convex_cell(box.center, cell) for cell in cells)
+    return conjunction([inside, *(_missed(box, *edge) for edge in close)])
+
+
+def _missed(box: Frame, ax: float, ay: float, bx: float, by: float) -> Formula:
+    """That a segment has no point inside a box."""
+    length = math.hypot(bx - ax, by - ay)
+    if length == 0.0:
+        return TRUE
+    ends = [minus((Num(x), Num(y)), box.center) for x, y in ((ax, ay), (bx, by))]
+    sides: list[Formula] = []
+    for axis, half in ((box.right, box.half_width), (box.ahead, box.half_length)):
+        places = [dot(end, axis) for end in ends]
+        sides.append(compare(">=", apply(Operator.MIN, *places), half))
+        sides.append(compare("<=", apply(Operator.MAX, *places), apply(Operator.NEG, half)))
+    across = (Num((by - ay) / length), Num((ax - bx) / length))
+    sides.append(compare(">=", apply(Operator.ABS, dot(ends[0], across)), box.extent(across)))
+    return disjunction(sides)

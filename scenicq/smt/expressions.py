@@ -1,0 +1,312 @@
+"""Nodes of the forest as terms and formulas over the variables of a problem (query paper, appendix A.2).
+
+Where a node has cases (a pick from a list, the direction of a road, an angle that wraps) an auxiliary variable takes
+the value and a disjunction says which. Regions become disjunctions of convex cells, those near the point only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import cast
+
+from scenicq.forest.bounds import Box, scalar_bounds, vector_bounds
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Bearing,
+    Compare,
+    Constant,
+    Contains,
+    Coordinate,
+    DirectionAt,
+    DiscAt,
+    DiscreteRange,
+    Distance,
+    Encloses,
+    Feature,
+    Identity,
+    Index,
+    Intersects,
+    Logic,
+    Node,
+    Norm,
+    Normal,
+    PointIn,
+    Range,
+    RectangleAt,
+    RegionDifference,
+    RegionIntersection,
+    RegionUnion,
+    Rotate,
+    Scale,
+    SectorAt,
+    Select,
+    TruncatedNormal,
+    Undefined,
+    VectorOf,
+    VectorSum,
+)
+from scenicq.forest.walk import children, postorder
+from scenicq.geometry.fields import VectorField
+from scenicq.geometry.membership import bounds as region_bounds
+from scenicq.geometry.regions import Rectangle
+from scenicq.smt.codes import (
+    Choice,
+    cases,
+    compare_codes,
+    connect,
+    constant_code,
+    equal,
+    is_box,
+    known_region,
+    rotated,
+)
+from scenicq.smt.enclosing import box_holds
+from scenicq.smt.field import field_cells
+from scenicq.smt.formula import (
+    FALSE,
+    Formula,
+    Num,
+    Operator,
+    Term,
+    Var,
+    apply,
+    compare,
+    conjunction,
+    disjunction,
+    negation,
+)
+from scenicq.smt.inside import UnsupportedError, Vector, inside_region, picked
+from scenicq.smt.measure import Frame, box_meets, boxes_meet, distance_term
+from scenicq.smt.unknowns import Unknowns
+
+__all__ = ["Expressions"]
+
+_SCALAR: dict[ArithmeticOp, Operator] = {
+    ArithmeticOp.ADD: Operator.ADD,
+    ArithmeticOp.SUB: Operator.SUB,
+    ArithmeticOp.MUL: Operator.MUL,
+    ArithmeticOp.DIV: Operator.DIV,
+    ArithmeticOp.NEG: Operator.NEG,
+    ArithmeticOp.ABS: Operator.ABS,
+    ArithmeticOp.MIN: Operator.MIN,
+    ArithmeticOp.MAX: Operator.MAX,
+    ArithmeticOp.SQRT: Operator.SQRT,
+    ArithmeticOp.SIN: Operator.SIN,
+    ArithmeticOp.COS: Operator.COS,
+    ArithmeticOp.TAN: Operator.TAN,
+    ArithmeticOp.ASIN: Operator.ASIN,
+    ArithmeticOp.ACOS: Operator.ACOS,
+    ArithmeticOp.ATAN: Operator.ATAN,
+    ArithmeticOp.ATAN2: Operator.ATAN2,
+    ArithmeticOp.EXP: Operator.EXP,
+    ArithmeticOp.LOG: Operator.LOG,
+}
+
+
+EVERYWHERE: Box = ((-math.inf, math.inf), (-math.inf, math.inf))
+
+
+class Expressions:
+    """Makes the code (see `codes`) of each node once."""
+
+    def __init__(self, unknowns: Unknowns, boxes: Mapping[Identity, Box], *, borders: bool) -> None:
+        """Take the variables of the problem, where each random point can lie, and whether to encode curved borders."""
+        self._borders = borders
+        self.unknowns = unknowns
+        self._boxes = boxes
+        self._terms: dict[int, object] = {}
+        self._keep: list[Node] = []
+
+    def code(self, root: Node) -> object:
+        """The code of a node.
+
+        Raises:
+            UnsupportedError: A construct has no formula.
+        """
+        self._keep.append(root)
+        for node in postorder((root,)):
+            if id(node) not in self._terms:
+                args = [self._terms[id(child)] for child in children(node)]
+                lost = next((arg for arg in args if isinstance(arg, Undefined)), None)
+                decided = isinstance(node, Logic | Select)
+                self._terms[id(node)] = lost if lost is not None and not decided else self._of(node, args)
+        return self._terms[id(root)]
+
+    def _of(self, node: Node, args: list[object]) -> object:
+        terms = cast("list[Term]", args)
+        match node:
+            case Constant():
+                return constant_code(node.value)
+            case Feature():
+                raise UnsupportedError("a feature that was not conditioned")
+            case Range() | Normal() | TruncatedNormal() | DiscreteRange() | Index():
+                return self.unknowns.number(node, terms)
+            case PointIn():
+                return self._point(node)
+            case Select():
+                return self._select(node, args)
+            case Arithmetic():
+                return self._arithmetic(node, terms)
+            case Coordinate():
+                return cast(Vector, args[0])[node.axis]
+            case VectorOf():
+                return (terms[0], terms[1])
+            case VectorSum():
+                (a, b), (c, d) = cast("list[Vector]", args)
+                return (apply(Operator.ADD, a, c), apply(Operator.ADD, b, d))
+            case Scale():
+                x, y = cast(Vector, args[0])
+                return (apply(Operator.MUL, x, terms[1]), apply(Operator.MUL, y, terms[1]))
+            case Rotate():
+                return rotated(cast(Vector, args[0]), terms[1])
+            case Norm():
+                x, y = cast(Vector, args[0])
+                return apply(
+                    Operator.SQRT, apply(Operator.ADD, apply(Operator.POW, x, 2.0), apply(Operator.POW, y, 2.0))
+                )
+            case Bearing():
+                x, y = cast(Vector, args[0])
+                return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
+            case DirectionAt():
+                return self._direction(node, cast(Vector, args[1]))
+            case Compare():
+                return compare_codes(node.op, args[0], args[1])
+            case Logic():
+                return connect(node.op, args)
+            case Contains():
+                return inside_region(node.region, cast(Vector, args[1]), self._around(node.point), self.code)
+            case DiscAt() | SectorAt() | RectangleAt() | RegionUnion() | RegionIntersection() | RegionDifference():
+                return None
+            case Distance():
+                return self._distance(node, cast(Vector, args[1]))
+            case Intersects():
+                return self._meeting(node)
+            case Encloses():
+                return box_holds(self._frame(node.inner), known_region(node.outer), self._extent(node.inner))
+
+    def _around(self, point: Node) -> Box:
+        return vector_bounds(point, self._boxes)
+
+    def _extent(self, box: Node) -> Box:
+        """Where the corners of a box can be."""
+        match box:
+            case RectangleAt():
+                sizes = [scalar_bounds(part, self._boxes) for part in (box.width, box.length)]
+                reach = math.hypot(*(max(abs(low), abs(high)) for low, high in sizes)) / 2
+                (x0, x1), (y0, y1) = self._around(box.center)
+                return (x0 - reach, x1 + reach), (y0 - reach, y1 + reach)
+            case Constant(value=Rectangle() as known):
+                west, south, east, north = region_bounds(known)
+                return (west, east), (south, north)
+            case _:
+                return EVERYWHERE
+
+    def _point(self, node: PointIn) -> Vector:
+        if node.identity in self.unknowns.names:
+            x, y = self.unknowns.names[node.identity]
+            return (Var(x), Var(y))
+        (x0, x1), (y0, y1) = around = self._around(node)
+        if x0 > x1 or y0 > y1:
+            self.unknowns.side.append(FALSE)
+            (x0, x1), (y0, y1) = around = ((0.0, 0.0), (0.0, 0.0))
+        point = (self.unknowns.fresh("x", x0, x1), self.unknowns.fresh("y", y0, y1))
+        self.unknowns.names[node.identity] = (point[0].name, point[1].name)
+        self.unknowns.side.append(inside_region(node.region, point, around, self.code))
+        return point
+
+    def _select(self, node: Select, args: list[object]) -> object:
+        index, options = args[0], args[1:]
+        if not isinstance(index, Term):
+            return index
+        defined = [option for option in options if not isinstance(option, Undefined)]
+        if not defined:
+            return options[0]
+        if all(isinstance(option, Term) for option in defined):
+            chosen = self.unknowns.fresh("pick")
+            self.unknowns.side.append(cases(index, [equal(chosen, option) for option in options]))
+            return chosen
+        if all(isinstance(option, tuple) for option in defined):
+            pair = (self.unknowns.fresh("pick"), self.unknowns.fresh("pick"))
+            both = [
+                FALSE
+                if isinstance(option, Undefined)
+                else conjunction([equal(mine, theirs) for mine, theirs in zip(pair, cast(Vector, option), strict=True)])
+                for option in options
+            ]
+            self.unknowns.side.append(cases(index, both))
+            return pair
+        if all(isinstance(option, Formula) for option in defined):
+            return cases(index, [option if isinstance(option, Formula) else FALSE for option in options])
+        return Choice(tuple((picked(index, n), option) for n, option in enumerate(options)))
+
+    def _distance(self, node: Distance, point: Vector) -> Term:
+        outside, inner = distance_term(known_region(node.region), point, self._around(node.point))
+        if not inner:
+            return outside
+        result = self.unknowns.fresh("distance", 0.0)
+        inside = [conjunction([where, compare("==", result, term)]) for where, term in inner]
+        away = conjunction([*(negation(where) for where, _ in inner), compare("==", result, outside)])
+        self.unknowns.side.append(disjunction([*inside, away]))
+        return result
+
+    def _meeting(self, node: Intersects) -> Formula:
+        boxes = [side for side in (node.left, node.right) if is_box(side)]
+        if len(boxes) == 2:
+            return boxes_meet(self._frame(boxes[0]), self._frame(boxes[1]))
+        if not boxes:
+            raise UnsupportedError("whether two random regions meet")
+        other = node.right if boxes[0] is node.left else node.left
+        return box_meets(self._frame(boxes[0]), known_region(other))
+
+    def _frame(self, node: Node) -> Frame:
+        """A box whose place may be random."""
+        match node:
+            case RectangleAt():
+                center = cast(Vector, self.code(node.center))
+                sizes = [cast(Term, self.code(part)) for part in (node.heading, node.width, node.length)]
+                return Frame.of(center, *sizes)
+            case Constant(value=Rectangle() as box):
+                return Frame.of(
+                    (Num(box.center[0]), Num(box.center[1])), Num(box.heading), Num(box.width), Num(box.length)
+                )
+            case _:
+                raise UnsupportedError("whether a random region lies in another")
+
+    def _arithmetic(self, node: Arithmetic, args: list[Term]) -> Term:
+        op = node.op
+        if op in _SCALAR:
+            return apply(_SCALAR[op], *args)
+        if op is ArithmeticOp.POW and isinstance(args[1], Num):
+            exponent = args[1].value
+            if exponent == 0.5:
+                return apply(Operator.SQRT, args[0])
+            if exponent == int(exponent):
+                return apply(Operator.POW, args[0], exponent)
+        if op is ArithmeticOp.WRAP:
+            return self._wrapped(args[0], scalar_bounds(node.args[0], self._boxes))
+        raise UnsupportedError(f"`{op.value}` of random values")
+
+    def _wrapped(self, angle: Term, limits: tuple[float, float]) -> Term:
+        low, high = limits
+        if not (math.isfinite(low) and math.isfinite(high)):
+            return apply(Operator.ATAN2, apply(Operator.SIN, angle), apply(Operator.COS, angle))
+        turns = range(math.ceil((low - math.pi) / math.tau), math.floor((high + math.pi) / math.tau) + 1)
+        result = self.unknowns.fresh("angle", -math.pi, math.pi)
+        self.unknowns.side.append(disjunction(equal(result, apply(Operator.SUB, angle, math.tau * k)) for k in turns))
+        return result
+
+    def _direction(self, node: DirectionAt, point: Vector) -> Term:
+        """The direction of a field at a random point: one case per cell near it."""
+        if not isinstance(node.field, Constant):
+            raise UnsupportedError("a random vector field at a random point")
+        (x0, x1), (y0, y1) = self._around(node.point)
+        if not all(map(math.isfinite, (x0, x1, y0, y1))):
+            raise UnsupportedError("the direction of a field at an unbounded point")
+        heading = self.unknowns.fresh("heading", -math.pi, math.pi)
+        cells = field_cells(cast(VectorField, node.field.value), point, (x0, y0, x1, y1), borders=self._borders)
+        self.unknowns.side.append(
+            disjunction(conjunction([compare("==", heading, value), where]) for value, where in cells)
+        )
+        return heading

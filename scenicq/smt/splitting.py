@@ -1,0 +1,58 @@
+"""A second look at what a solver did not decide in its time: the same question cell by cell.
+
+A solver that gets lost among the cells of a map, or the directions at a point, often decides each of them at once.
+"""
+
+from __future__ import annotations
+
+import time
+
+from scenicq.smt.answer import Answer, Sat, Solver, Unknown, Unsat
+from scenicq.smt.formula import And, Or, Problem, conjunction
+
+__all__ = ["cases", "check_by_cases"]
+
+_MOST_CASES = 64
+
+
+def cases(problem: Problem) -> list[Problem]:
+    """The problem split by its widest disjunction, so that it has a solution if one of these has; empty without one."""
+    root = problem.constraint
+    parts = root.args if isinstance(root, And) else (root,)
+    choices = [part for part in parts if isinstance(part, Or) and 1 < len(part.args) <= _MOST_CASES]
+    if not choices:
+        return []
+    chosen = max(choices, key=lambda part: len(part.args))
+    rest = [part for part in parts if part is not chosen]
+    return [Problem(problem.variables, conjunction([*rest, option])) for option in chosen.args]
+
+
+def check_by_cases(solver: Solver, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
+    """Decide a problem, case by case where the solver uses up its time or its budget on the whole.
+
+    Takes no more than twice the time, however many cases there are.
+
+    Args:
+        solver: The solver.
+        problem: See `Solver.check`.
+        precision: See `Solver.check`.
+        timeout_s: See `Solver.check`; for the whole, and once more for all cases together.
+    """
+    answer = solver.check(problem, precision=precision, timeout_s=timeout_s)
+    if not isinstance(answer, Unknown) or answer.reason not in ("timeout", "budget"):
+        return answer
+    waiting = cases(problem)
+    if not waiting:
+        return answer
+    deadline = time.monotonic() + timeout_s
+    decided = True
+    while waiting:
+        left_s = deadline - time.monotonic()
+        if left_s <= 0:
+            return answer
+        case = waiting.pop(0)
+        found = solver.check(case, precision=precision, timeout_s=left_s / (len(waiting) + 1))
+        if isinstance(found, Sat):
+            return found
+        decided = decided and isinstance(found, Unsat)
+    return Unsat() if decided else answer

@@ -1,0 +1,71 @@
+"""The variables of a problem that is being made, and what each random variable of the forest becomes among them."""
+
+from __future__ import annotations
+
+import math
+
+from scenicq.forest.bounds import scalar_bounds
+from scenicq.forest.nodes import DiscreteRange, Identity, Index, Normal, Range, TruncatedNormal
+from scenicq.smt.formula import Formula, Num, Operator, Term, Var, Variable, apply, compare, disjunction
+from scenicq.smt.inside import UnsupportedError
+
+__all__ = ["ScalarLeaf", "Unknowns"]
+
+ScalarLeaf = Range | Normal | TruncatedNormal | DiscreteRange | Index
+
+_MOST_INTEGERS = 1000
+
+
+class Unknowns:
+    """The variables of one problem.
+
+    Attributes:
+        variables: All of them, in order of their making.
+        side: What holds of them besides the constraints.
+        names: The names of the variables of each random variable: one, or two for a point.
+        whole: The random variables that are whole numbers.
+    """
+
+    def __init__(self) -> None:
+        """Begin without variables."""
+        self.variables: list[Variable] = []
+        self.side: list[Formula] = []
+        self.names: dict[Identity, tuple[str, ...]] = {}
+        self.whole: set[Identity] = set()
+
+    def fresh(self, prefix: str, low: float = -math.inf, high: float = math.inf) -> Var:
+        """A new variable with a closed range."""
+        name = f"{prefix}{len(self.variables)}"
+        self.variables.append(Variable(name, low, high))
+        return Var(name)
+
+    def number(self, node: ScalarLeaf, args: list[Term]) -> Term:
+        """The variable of a random number (figure 18).
+
+        Args:
+            node: The random number.
+            args: Codes of the parameters of its distribution.
+
+        Raises:
+            UnsupportedError: It is a whole number out of too many, or out of a random range.
+        """
+        if node.identity in self.names:
+            return Var(self.names[node.identity][0])
+        low, high = scalar_bounds(node)
+        variable = self.fresh(type(node).__name__.lower(), low, high)
+        self.names[node.identity] = (variable.name,)
+        match node:
+            case Range() if not all(isinstance(arg, Num) for arg in args):
+                ends = apply(Operator.MIN, *args), apply(Operator.MAX, *args)
+                self.side += [compare("<=", ends[0], variable), compare("<=", variable, ends[1])]
+            case TruncatedNormal() if not all(isinstance(arg, Num) for arg in args):
+                self.side += [compare("<=", args[2], variable), compare("<=", variable, args[3])]
+            case DiscreteRange() | Index():
+                if not math.isfinite(high - low) or high - low > _MOST_INTEGERS:
+                    raise UnsupportedError("an integer from a random or very long range")
+                numbers = range(math.ceil(low), math.floor(high) + 1)
+                self.whole.add(node.identity)
+                self.side.append(disjunction(compare("==", variable, float(n)) for n in numbers))
+            case _:
+                pass
+        return variable
