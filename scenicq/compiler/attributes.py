@@ -12,10 +12,11 @@ from typing import Any, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_random
-from scenicq.compiler.choices import make_choice
+from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import property_node, to_heading, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING, names_of, of_element, of_network
 from scenicq.compiler.environment import Runner
+from scenicq.compiler.lookups import look_up
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
@@ -73,25 +74,24 @@ def attribute(run: Runner, value: ModelValue, name: str, span: Span) -> ModelVal
     if name.startswith("__"):
         raise fail("unsupported-construct", f"`{name}` is not available to scenarios", span, "Python's own attribute",
                    ("scenarios are data: they never reach the Python interpreter",))  # fmt: skip
+    if name in _OF_LINES:
+        value = regions_apart(value)
     if isinstance(value, Choice):
         return _of_choice(run, value, name, span)
-    found = _lookup(value, name, span)
+    found = _lookup(run, value, name, span)
     if found is MISSING:
         raise _unknown(value, name, span)
     return found
 
 
-_ROAD_PLACES = frozenset(
-    "lane laneSection laneGroup oppositeLaneGroup road intersection crossing element".split()
-)  # fmt: skip
+_OF_LINES = frozenset({"start", "end", "points", "length", "orientation"})
+"""Attributes of a region that depend on which region it is."""
 
 
 def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
-    if isinstance(value, Instance) and name.lstrip("_") in _ROAD_PLACES:
-        return fail("unsupported-construct", f"`{name}` of an object is not supported", span,
-                    "depends on where the object is",
-                    ("choose the element first, as in `lane = Uniform(*network.lanes)`, and place the object on it",
-                     "to relate an object to an element, use `in`, as in `require car in lane`"))  # fmt: skip
+    if isinstance(value, Instance) and name.lstrip("_") in _PLACES:
+        return fail("unknown-attribute", f"{describe(value)} has no attribute `{name}`", span, "not found",
+                    (f"`network.{_PLACES[name.lstrip('_')]}(...)` says what lies at any point",))  # fmt: skip
     close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
     hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
     shown = f"a {kind_of(cast(Node, value))}" if is_node(value) else describe(value)
@@ -99,22 +99,8 @@ def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
 
 
 def _of_choice(run: Runner, value: Choice, name: str, span: Span) -> ModelValue:
-    """The attribute of each option; where the map has none, that option has no scene, as in Scenic."""
-    found: dict[int, ModelValue] = {}
-    missing: ScenarioError | None = None
-    for number, option in enumerate(value.options):
-        try:
-            found[number] = attribute(run, option, name, span)
-        except ScenarioError as error:
-            if error.diagnostics[0].code != "map-lacks":
-                raise
-            missing = error
-    if not found:
-        assert missing is not None
-        raise missing
-    run.exclude(value.index, [number for number in range(len(value.options)) if number not in found], span)
-    spare = next(iter(found.values()))
-    return make_choice(value.index, [found.get(number, spare) for number in range(len(value.options))], span)
+    """The attribute of each option; where there is none (in the map, or of None), that option has no scene."""
+    return each_existing(run, value, lambda option: attribute(run, option, name, span), span)
 
 
 def _names(value: ModelValue) -> set[str]:
@@ -129,21 +115,21 @@ def _names(value: ModelValue) -> set[str]:
             return set(_PLAIN.get(type(value), ()))
 
 
-def _lookup(value: ModelValue, name: str, span: Span) -> ModelValue:
+def _lookup(run: Runner, value: ModelValue, name: str, span: Span) -> ModelValue:
     match value:
         case Instance():
-            return _of_instance(value, name, span)
+            return _of_instance(run, value, name, span)
         case Module():
             return None if value.dynamic else value.names.get(name, MISSING)
         case ScenicClass():
             return next((cls.attributes[name] for cls in value.ancestry() if name in cls.attributes), MISSING)
         case Network():
-            return of_network(value, name, span)
+            return of_network(run, value, name, span)
         case NetworkElement():
             region = _of_region(build.constant(value.region, span), name, span)
-            return of_element(value, name, span) if region is MISSING else region
+            return of_element(run, value, name, span) if region is MISSING else region
         case Maneuver():
-            return of_element(value, name, span)
+            return of_element(run, value, name, span)
         case _ if is_node(value):
             return _of_node(value, name, span)
         case _ if name in _PLAIN.get(type(value), ()):
@@ -188,11 +174,27 @@ def _check_length(length: int, span: Span) -> None:
         raise fail("budget-exceeded", f"a value grows beyond {LARGEST:,} items", span, "grows here")
 
 
-def _of_instance(value: Instance, name: str, span: Span) -> ModelValue:
+_PLACES = {
+    "lane": "laneAt",
+    "laneSection": "laneSectionAt",
+    "laneGroup": "laneGroupAt",
+    "road": "roadAt",
+    "intersection": "intersectionAt",
+    "crossing": "crossingAt",
+    "element": "elementAt",
+}
+
+
+def _of_instance(run: Runner, value: Instance, name: str, span: Span) -> ModelValue:
     if name in value.properties:
         return property_node(value, name, span)
     if name in _PART_NAMES and value.index is not None:
         return part_of(_PART_NAMES[name], value, span)
+    if value.cls.derives_from("DrivingObject"):
+        place = "laneGroup" if name == "oppositeLaneGroup" else name
+        if place.lstrip("_") in _PLACES:
+            found = look_up(run, run.network, _PLACES[place.lstrip("_")], value, not place.startswith("_"), span)
+            return attribute(run, found, "opposite", span) if place is not name else found
     if name == "visibleRegion":
         return operators.visible_region(value, span)
     if name == "distanceTo":

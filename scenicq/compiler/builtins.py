@@ -139,7 +139,7 @@ def _plain(name: str, function: Callable[..., Any]) -> Builtin:
         except (ValueError, OverflowError, KeyError):
             raise fail("runtime-error", f"`{name}` cannot be applied to this", span, "failed here") from None
 
-    return Builtin(name, call)
+    return Builtin(name, call, known=True)
 
 
 def _text(value: ModelValue = "") -> str:
@@ -220,6 +220,10 @@ def _ignore(span: Span, *_: ModelValue, **__: ModelValue) -> ModelValue:
     return None
 
 
+_KNOWN = frozenset({"bool", "range"})
+"""Functions on whose result the program's course usually depends."""
+
+
 def language_names() -> dict[str, ModelValue]:
     """The names that every program sees, whatever its model."""
     own: dict[str, Callable[..., ModelValue]] = {
@@ -241,7 +245,7 @@ def language_names() -> dict[str, ModelValue]:
         "cos": _scalar_function(*_OPS["cos"]),
         "hypot": _hypot,
     }
-    names: dict[str, ModelValue] = {name: Builtin(name, call) for name, call in own.items()}
+    names: dict[str, ModelValue] = {name: Builtin(name, call, known=name in _KNOWN) for name, call in own.items()}
     python: dict[str, Callable[..., Any]] = {
         "len": _length, "int": _whole, "float": _real, "str": _text, "round": _rounded,
     }  # fmt: skip

@@ -6,21 +6,25 @@ option, and the results become one random choice again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import cast
 
 from scenicq.compiler.coerce import kind_of_model, to_node
+from scenicq.compiler.environment import Runner
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
-from scenicq.errors import Span
-from scenicq.forest.nodes import Identity, Index, Select
+from scenicq.errors import ScenarioError, Span
+from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
 
-__all__ = ["distribute", "holds_instances", "is_choice", "make_choice", "map_choice"]
+__all__ = ["distribute", "each_existing", "holds_instances", "is_choice", "make_choice", "map_choice", "regions_apart"]
 
 _MOST_OPTIONS = 20_000
 """Options of a choice, those of nested choices included."""
+_LACKING = frozenset({"map-lacks", "runtime-error"})
+"""Errors that only say that something is not there: a part of the map, an item of a list."""
 
 
-def make_choice(index: Index, options: list[ModelValue], span: Span | None) -> ModelValue:
+def make_choice(index: Node, options: list[ModelValue], span: Span | None) -> ModelValue:
     """A random choice, as an expression where all options are numbers, vectors or regions of one kind.
 
     Raises:
@@ -46,6 +50,44 @@ def map_choice(value: ModelValue, function: Callable[[ModelValue], ModelValue], 
     return make_choice(value.index, [function(option) for option in value.options], span)
 
 
+def each_existing(run: Runner, choice: Choice, function: Callable[[ModelValue], ModelValue], span: Span) -> ModelValue:
+    """Apply a function to each option for which it has a result; the others have no scene, as in Scenic.
+
+    Raises:
+        ScenarioError: What the function says of the first option, if it has no result for any.
+    """
+    found: dict[int, ModelValue] = {}
+    missing: ScenarioError | None = None
+    for number, option in enumerate(choice.options):
+        try:
+            found[number] = function(option)
+        except ScenarioError as error:
+            if option is not None and error.diagnostics[0].code not in _LACKING:
+                raise
+            missing = missing or error
+    if not found:
+        assert missing is not None
+        raise missing
+    count = len(choice.options)
+    run.exclude(choice.index, [number for number in range(count) if number not in found], count, span)
+    spare = next(iter(found.values()))
+    return make_choice(choice.index, [found.get(number, spare) for number in range(count)], span)
+
+
+def regions_apart(value: ModelValue) -> ModelValue:
+    """A random choice of regions as one of values that are taken by themselves; anything else as it is.
+
+    What is no region, because there is no such element, becomes None.
+    """
+    if not (isinstance(value, Select) and kind_of_model(value) == "region"):
+        return value
+    options = tuple(
+        None if isinstance(option, Constant) and isinstance(option.value, Undefined) else option
+        for option in value.options
+    )
+    return Choice(value.index, options, len(options))
+
+
 def is_choice(value: ModelValue) -> bool:
     """Whether a value is a random choice between values that are not expressions."""
     return isinstance(value, Choice)
@@ -58,11 +100,18 @@ def holds_instances(value: ModelValue) -> bool:
     return any(isinstance(option, Instance) or holds_instances(option) for option in value.options)
 
 
+def _check_outcomes(choices: list[Choice], span: Span) -> None:
+    outcomes = math.prod({choice.key: len(choice.options) for choice in choices}.values())
+    if outcomes > _MOST_OPTIONS:
+        raise fail("budget-exceeded", f"this has more than {_MOST_OPTIONS:,} outcomes", span, "of random choices",
+                   ("choose between fewer", "compare numbers that are made from the choices"))  # fmt: skip
+
+
 def distribute(
     function: Callable[..., ModelValue],
     values: tuple[ModelValue, ...],
     span: Span,
-    picked: Mapping[Identity, int] | None = None,
+    picked: Mapping[Identity | int, int] | None = None,
     *,
     spread: Callable[[ModelValue], bool] = holds_instances,
 ) -> ModelValue:
@@ -77,20 +126,21 @@ def distribute(
         picked: Options that are already settled.
         spread: Which arguments to take apart; choices of objects if not given.
     """
-    picked = picked or {}
+    if picked is None:
+        picked = {}
+        _check_outcomes([cast(Choice, value) for value in values if spread(value)], span)
     for number, value in enumerate(values):
         if not spread(value):
             continue
         choice = cast(Choice, value)
-        identity = choice.index.identity
 
         def given(option: int, number: int = number, choice: Choice = choice) -> tuple[ModelValue, ...]:
             return (*values[:number], choice.options[option], *values[number + 1 :])
 
-        if identity in picked:
-            return distribute(function, given(picked[identity]), span, picked, spread=spread)
+        if choice.key in picked:
+            return distribute(function, given(picked[choice.key]), span, picked, spread=spread)
         results = [
-            distribute(function, given(option), span, {**picked, identity: option}, spread=spread)
+            distribute(function, given(option), span, {**picked, choice.key: option}, spread=spread)
             for option in range(len(choice.options))
         ]
         return make_choice(choice.index, results, span)

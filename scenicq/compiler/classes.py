@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol, cast
 
+from scenicq.compiler.deviations import DEVIATIONS
 from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.values import Function, ModelValue, PropertyDefinition, ScenicClass, describe, fail
@@ -87,7 +88,8 @@ def _property_name(version: int, line: ast.PropertyDefault, scope: Environment) 
                    "labels are matched in 2D", ("state the heading",))  # fmt: skip
     if line.name == "heading" and version == 3:
         return "parentOrientation"
-    return line.name if scope.library else _first_names(version, line.name)
+    name = line.name if scope.library else _first_names(version, line.name)
+    return DEVIATIONS.get(name, name)
 
 
 def _needs(value: ast.Expression) -> frozenset[str]:

@@ -13,7 +13,7 @@ from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, descr
 from scenicq.errors import Span
 from scenicq.forest.build import constant, vector
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Constant, Feature, Kind, Node, Select
+from scenicq.forest.nodes import Constant, Feature, Kind, Node, Select, Undefined
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
 
@@ -163,8 +163,15 @@ def to_region(value: ModelValue, span: Span | None) -> Node:
     if is_node(value) and kind_of(value) == "region":
         return cast(Node, value)
     if isinstance(value, Choice):
-        return Select(value.index, tuple(to_region(option, span) for option in value.options), span=span)
+        return Select(value.index, tuple(_option_region(option, value, span) for option in value.options), span=span)
     raise _need(value, "a region", span)
+
+
+def _option_region(option: ModelValue, choice: Choice, span: Span | None) -> Node:
+    """The region of one option; where others are elements of the map, None is a place in none and has no region."""
+    if option is None and any(isinstance(other, NetworkElement) for other in choice.options):
+        return constant(Undefined("there is no such element here"), span)
+    return to_region(option, span)
 
 
 def to_field(value: ModelValue, span: Span | None) -> Node:

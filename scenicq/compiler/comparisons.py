@@ -14,6 +14,9 @@ from scenicq.compiler.choices import distribute, is_choice
 from scenicq.compiler.coerce import kind_of_model
 from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.nodes import CompareOp, Index, Node, Select
+from scenicq.geometry.elements import Maneuver, NetworkElement
 
 __all__ = ["binary", "compare", "iterate", "symbolic"]
 
@@ -46,7 +49,44 @@ def compare(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelVa
     """
     if op in ("in", "not in"):
         return _membership(op, left, right, span)
+    if op in _SAMENESS:
+        same = _same_choice(left, right, span)
+        if same is not None:
+            return operators.combine("not", [same], span) if _SAMENESS[op] else same
     return distribute(lambda a, b: _compare_known(op, a, b, span), (left, right), span, spread=is_choice)
+
+
+_SAMENESS = {"==": False, "is": False, "!=": True, "is not": True}
+"""Whether an operator asks if two values differ."""
+
+
+def _same_choice(left: ModelValue, right: ModelValue, span: Span) -> Node | None:
+    """Whether a random choice of elements comes out as another or as one element, without going through all pairs."""
+    if not isinstance(left, Choice):
+        left, right = right, left
+    if not _of_atoms(left) or not (_of_atoms(right) or _is_atom(right)):
+        return None
+    codes: dict[ModelValue, int] = {}
+    first = _numbered(cast(Choice, left), codes, span)
+    if isinstance(right, Choice):
+        return build.compare(CompareOp.EQ, first, _numbered(right, codes, span), span)
+    return build.compare(CompareOp.EQ, first, build.constant(float(codes.get(right, -1)), span), span)
+
+
+def _is_atom(value: ModelValue) -> bool:
+    return value is None or isinstance(value, NetworkElement | Maneuver)
+
+
+def _of_atoms(value: ModelValue) -> bool:
+    return isinstance(value, Choice) and not isinstance(value.index, Index) and all(map(_is_atom, value.options))
+
+
+def _numbered(choice: Choice, codes: dict[ModelValue, int], span: Span) -> Node:
+    """The number of the option that a choice comes out as, where equal options have equal numbers."""
+    numbers = [codes.setdefault(option, len(codes)) for option in choice.options]
+    if numbers == list(range(len(numbers))):
+        return choice.index
+    return Select(choice.index, tuple(build.constant(float(number), span) for number in numbers), span=span)
 
 
 def _compare_known(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:

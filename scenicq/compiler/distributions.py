@@ -150,11 +150,11 @@ def _resample(span: Span, value: ModelValue) -> ModelValue:
     match value:
         case Range() | Normal() | TruncatedNormal() | DiscreteRange() | PointIn():
             return replace(value, identity=Identity(), span=span)
-        case Choice():
-            return Choice(replace(value.index, identity=Identity(), span=span), value.options, value.size)
+        case Choice(index=Index() as index):
+            return Choice(replace(index, identity=Identity(), span=span), value.options, value.size)
         case Select(index=Index() as index):
             return Select(replace(index, identity=Identity(), span=span), value.options, span=span)
-        case _ if is_node(value) and not isinstance(value, Constant):
+        case _ if isinstance(value, Choice) or (is_node(value) and not isinstance(value, Constant)):
             raise fail("wrong-type", "`resample` needs a distribution, not what is computed from one", span,
                        "computed", ("resample the distributions that it is computed from",))  # fmt: skip
         case _:

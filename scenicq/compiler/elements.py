@@ -6,15 +6,18 @@ The names are those of Scenic's driving domain.
 from __future__ import annotations
 
 import math
-from typing import Any, cast
+from typing import Any
 
 import shapely
 
-from scenicq.compiler.coerce import to_vector
+from scenicq.compiler.element_methods import METHODS, find_among, method_of, nominal_directions
+from scenicq.compiler.environment import Runner
+from scenicq.compiler.lookups import look_up
+from scenicq.compiler.places import LOOKUPS
+from scenicq.compiler.road_attributes import names_worked_out, worked_out
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import Constant
 from scenicq.geometry.angles import heading_of, normalize
 from scenicq.geometry.elements import Lane, Maneuver, MissingElementError, NetworkElement
 from scenicq.geometry.fields import VectorField
@@ -37,41 +40,43 @@ _NETWORK = frozenset(
     "laneRegion roadRegion intersectionRegion crossingRegion sidewalkRegion shoulderRegion drivableRegion "
     "walkableRegion curbRegion roadDirection".split()
 )
-_LOOKUPS = frozenset("laneAt laneSectionAt laneGroupAt roadAt intersectionAt crossingAt sidewalkAt elementAt".split())
 _MANEUVER = frozenset({"type", "conflictingManeuvers", "reverseManeuvers"})
 
 
 def names_of(value: Network | NetworkElement | Maneuver) -> set[str]:
     """The attributes that a value may have."""
     if isinstance(value, Network):
-        return set(_NETWORK | _LOOKUPS | {"nominalDirectionsAt"})
+        return set(_NETWORK | LOOKUPS.keys() | METHODS | {"findPointIn"}) | names_worked_out(value)
     own = {name for name in dir(value) if not name.startswith("__")} - _HIDDEN
-    return own | _MANEUVER if isinstance(value, Maneuver) else own
+    return own | (_MANEUVER if isinstance(value, Maneuver) else METHODS | names_worked_out(value))
 
 
-def of_network(network: Network, name: str, span: Span) -> ModelValue:
+def of_network(run: Runner, network: Network, name: str, span: Span) -> ModelValue:
     """An attribute of the network, or `MISSING`."""
-    if name in _LOOKUPS or name == "nominalDirectionsAt":
+    if name in LOOKUPS:
 
-        def look_up(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
-            where = to_vector(point, span)
-            if not isinstance(where, Constant):
-                raise fail("unsupported-construct", f"`network.{name}` of a random point is not supported", span,
-                           "a random point", ("state the relation with `in` and a region",))  # fmt: skip
-            found = getattr(network, name)(*cast("tuple[float, float]", where.value))
-            if found is None and reject:
-                raise fail("impossible-requirement", f"there is nothing for `network.{name}` at this point", span,
-                           "no scene is left", ("without `reject`, the result is None",))  # fmt: skip
-            return found
+        def find(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
+            return look_up(run, network, name, point, reject, span)
 
-        return Builtin(name, look_up)
+        return Builtin(name, find)
+    if name == "nominalDirectionsAt":
+        return nominal_directions(run, network)
+    if name == "findPointIn":
+
+        def find_in(span: Span, point: ModelValue, elems: ModelValue, reject: ModelValue = None) -> ModelValue:
+            return find_among(run, point, elems, reject, span)
+
+        return Builtin(name, find_in)
+    worked = worked_out(run, network, name, span)
+    if worked is not None:
+        return worked[0]
     if name not in _NETWORK:
         return MISSING
     found = getattr(network, name)
     return build.constant(found, span) if name.endswith("Region") or name == "roadDirection" else found
 
 
-def of_element(value: NetworkElement | Maneuver, name: str, span: Span) -> ModelValue:
+def of_element(run: Runner, value: NetworkElement | Maneuver, name: str, span: Span) -> ModelValue:
     """An attribute of an element or maneuver, or `MISSING`.
 
     Raises:
@@ -79,6 +84,13 @@ def of_element(value: NetworkElement | Maneuver, name: str, span: Span) -> Model
     """
     if isinstance(value, Maneuver) and name in _MANEUVER:
         return _of_maneuver(value, name)
+    if isinstance(value, NetworkElement):
+        worked = worked_out(run, value, name, span)
+        if worked is not None:
+            return worked[0]
+        method = method_of(run, value, name)
+        if method is not None:
+            return method
     if name in _HIDDEN or not (hasattr(type(value), name) or name in getattr(value, "__dict__", ())):
         return MISSING
     try:

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Protocol
 
+from scenicq.compiler.places import Lookups
 from scenicq.compiler.values import Function, Instance, ModelValue, fail
 from scenicq.errors import Span
-from scenicq.forest.nodes import Index
+from scenicq.forest.nodes import Node
+from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 
 __all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Environment", "Runner"]
@@ -125,11 +127,17 @@ class Runner(Protocol):
         version: The version of Scenic that the program is read as.
         budget: What the program may still use.
         params: Global parameters: value, place, whether a library sets it.
+        objects: The objects made so far.
+        network: The road network that the program is compiled against.
+        lookups: What the program asks about places of the map.
     """
 
     version: int
     budget: Budget
     params: dict[str, tuple[ModelValue, Span, bool]]
+    objects: list[Instance]
+    network: Network
+    lookups: Lookups
 
     def ego(self, span: Span) -> Instance:
         """The ego.
@@ -164,6 +172,6 @@ class Runner(Protocol):
         """Make a point, oriented point or object."""
         ...
 
-    def exclude(self, index: Index, options: list[int], span: Span) -> None:
-        """Require that a random choice does not come out as one of some options, because they have no value."""
+    def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:
+        """Require that a choice between `count` options does not come out as one of some: they have no value."""
         ...

@@ -16,12 +16,13 @@ from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import LARGEST, hashed, is_random, plain_unary
 from scenicq.compiler.attributes import attribute, corner
 from scenicq.compiler.builtins import truth
-from scenicq.compiler.choices import make_choice, map_choice
+from scenicq.compiler.choices import each_existing, map_choice, regions_apart
 from scenicq.compiler.coerce import kind_of_model, to_vector
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
 from scenicq.compiler.constructs import construct
 from scenicq.compiler.distributions import interval
 from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
+from scenicq.compiler.settled import decided, settled
 from scenicq.compiler.values import (
     Builtin,
     Choice,
@@ -83,6 +84,8 @@ def call(
     if isinstance(function, Builtin):
         run.budget.pay(sum(_length(value) for value in (function.owner, *args, *named.values())), span)
         run.budget.step(span, function.cost)
+        if function.known:
+            args = [settled(run, value) for value in args]
 
         def now(*values: ModelValue) -> ModelValue:
             given = dict(zip(named, values[len(args) :], strict=True))
@@ -94,7 +97,9 @@ def call(
 
         return lift(now, *args, *named.values()) if function.lifted else now(*args, *named.values())
     if isinstance(function, Choice):
-        return map_choice(function, lambda option: call(run, option, args, named, span), span)
+        return each_existing(run, function, lambda option: call(run, option, args, named, span), span)
+    if isinstance(function, Module) and function.call is not None:
+        return call(run, function.call, args, named, span)
     if isinstance(function, ScenicClass):
         spelled = f"new {function.name} at (1, 2)" if run.version == 3 else f"{function.name} at 1 @ 2"
         raise fail("wrong-type", f"`{function.name}` is a class of objects, not a function", span, "called here",
@@ -112,28 +117,27 @@ def _call(run: Runner, node: ast.Call, scope: Environment) -> ModelValue:
 
 def _call_each(run: Runner, function: ModelValue, choice: Choice, span: Span) -> ModelValue:
     """`f(*list)` of a random list: an empty list has no scene, as in Scenic, where it is rejected."""
-    lists = [option if isinstance(option, Choice) else iterate(option, span) for option in choice.options]
-    full = [number for number, items in enumerate(lists) if isinstance(items, Choice) or items]
-    if not full:
-        return call(run, function, [], {}, span)
-    results = {
-        number: _call_each(run, function, items, span)
-        if isinstance(items, Choice)
-        else call(run, function, items, {}, span)
-        for number, items in enumerate(lists)
-        if number in set(full)
-    }
-    run.exclude(choice.index, [number for number in range(len(lists)) if number not in results], span)
-    return make_choice(choice.index, [results.get(number, results[full[0]]) for number in range(len(lists))], span)
+
+    def now(items: ModelValue) -> ModelValue:
+        if isinstance(items, Choice):
+            return _call_each(run, function, items, span)
+        given = iterate(items, span)
+        if not given:
+            raise fail("map-lacks", "there is nothing to choose from", span, "an empty list",
+                       ("if the list comes from the map, the map has no such element",))  # fmt: skip
+        return call(run, function, given, {}, span)
+
+    return each_existing(run, choice, now, span)
 
 
 def _length(value: ModelValue) -> int:
     return len(cast("list[ModelValue]", value)) if isinstance(value, str | list | tuple | dict | set | range) else 0
 
 
-def _subscript(value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
+def _subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
+    value = regions_apart(value)
     if isinstance(value, Choice):
-        return map_choice(value, lambda option: _subscript(option, index, span), span)
+        return each_existing(run, value, lambda option: _subscript(run, option, index, span), span)
     if is_random(index) and isinstance(value, list | tuple):
         raise fail("unsupported-construct", "a random index is not supported", span, "random here",
                    ("use `Uniform(*list)` to pick one of the items",))  # fmt: skip
@@ -162,7 +166,7 @@ def _comprehension(
         run.budget.step(clause.span)
         inner = Environment({}, scope)
         assign(run, clause.target, item, inner)
-        if all(truth(evaluate(run, test, inner), test.span) for test in clause.conditions):
+        if all(decided(run, evaluate(run, test, inner), test.span) for test in clause.conditions):
             _comprehension(run, clauses[1:], inner, visit)
 
 
@@ -214,7 +218,8 @@ def _formatted(run: Runner, node: ast.FormattedString, scope: Environment) -> st
         if isinstance(part, ast.Constant):
             text.append(str(part.value))
             continue
-        value = evaluate(run, part.value, scope)
+        value = settled(run, evaluate(run, part.value, scope))
+        value = value.value if isinstance(value, Constant) else value
         if not isinstance(value, str | int | float | bool) or part.format is not None:
             raise fail("unsupported-construct", "only known numbers and strings can be put in a string", part.span,
                        f"this is {describe(value)}" if part.format is None else "a format")  # fmt: skip
@@ -316,7 +321,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
         case ast.BoolOp():
             return _boolean(run, node, scope)
         case ast.IfElse():
-            chosen = node.then if truth(evaluate(run, node.test, scope), node.test.span) else node.otherwise
+            chosen = node.then if decided(run, evaluate(run, node.test, scope), node.test.span) else node.otherwise
             return evaluate(run, chosen, scope)
         case ast.Tuple():
             return _tuple(run, node, scope)
@@ -331,8 +336,8 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             if isinstance(node.index, ast.Slice):
                 parts = (node.index.lower, node.index.upper, node.index.step)
                 ends = [None if part is None else evaluate(run, part, scope) for part in parts]
-                return _subscript(value, slice(*ends), span)
-            return _subscript(value, evaluate(run, node.index, scope), span)
+                return _subscript(run, value, slice(*ends), span)
+            return _subscript(run, value, evaluate(run, node.index, scope), span)
         case ast.Lambda():
             return run.make_function("<lambda>", node.parameters, node.body, scope, span)
         case ast.Comprehension():

@@ -15,14 +15,17 @@ from typing import Any, assert_never, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import plain_binary
-from scenicq.compiler.builtins import truth
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_boolean, to_region, to_scalar
 from scenicq.compiler.comparisons import iterate
+from scenicq.compiler.deviations import deviation
 from scenicq.compiler.environment import Budget, Environment
+from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.expressions import assign, evaluate
 from scenicq.compiler.imports import import_into
+from scenicq.compiler.places import Lookups
 from scenicq.compiler.placing import Surroundings, bind
+from scenicq.compiler.settled import decided
 from scenicq.compiler.specifiers import construct
 from scenicq.compiler.values import (
     Choice,
@@ -40,7 +43,8 @@ from scenicq.compiler.values import (
 )
 from scenicq.errors import Diagnostic, ScenarioError, Span
 from scenicq.forest import build
-from scenicq.forest.nodes import Identity, Index, Node, Select
+from scenicq.forest.nodes import Node
+from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
 from scenicq.syntax import ast
 
@@ -71,6 +75,7 @@ class Requirement:
 
     condition: Callable[[], Node]
     span: Span
+    probability: float = 1.0
 
 
 @dataclass(eq=False)
@@ -81,18 +86,19 @@ class Interpreter:
         version: The version of Scenic.
         initial: Whether dynamic parts are ignored rather than refused.
         load: Resolves an import or model: its dotted name and place to a module.
-        object_class: The root class of objects.
+        network: The road network.
     """
 
     version: int
     initial: bool
     load: Callable[[str, int, Span], Module]
+    network: Network
     budget: Budget = field(default_factory=Budget)
     objects: list[Instance] = field(default_factory=list[Instance])
     requirements: list[Requirement] = field(default_factory=list[Requirement])
-    soft: list[Span] = field(default_factory=list[Span])
     params: dict[str, tuple[ModelValue, Span, bool]] = field(default_factory=dict[str, Any])
-    excluded: dict[Identity, tuple[Index, set[int], Span]] = field(default_factory=dict[Identity, Any])
+    excluded: Exclusions = field(default_factory=Exclusions)
+    lookups: Lookups = field(default_factory=Lookups)
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
     workspace: Node = field(default_factory=lambda: build.constant(Everywhere()))
@@ -128,17 +134,9 @@ class Interpreter:
                        (f"write `ego = new {value.name}`",) if bare else ())  # fmt: skip
         self.current_ego = value
 
-    def exclude(self, index: Index, options: list[int], span: Span) -> None:
-        """Require that a random choice does not come out as one of some options; see `Runner`."""
-        if options:
-            self.excluded.setdefault(index.identity, (index, set(), span))[1].update(options)
-
-    def exclusions(self) -> list[tuple[Node, Span]]:
-        """The conditions that `exclude` asks for."""
-        return [
-            (Select(index, tuple(build.constant(n not in options) for n in range(len(index.weights))), span=span), span)
-            for index, options, span in self.excluded.values()
-        ]
+    def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:
+        """Require that a choice does not come out as one of some options; see `Runner`."""
+        self.excluded.add(index, options, count, span)
 
     def demand(self, condition: Callable[[], Node], span: Span) -> None:
         """Require a condition; see `specifiers.Evaluator`."""
@@ -213,7 +211,8 @@ class Interpreter:
         value = evaluate(self, definition.default, scope)
         while isinstance(value, Delayed):
             value = value.evaluate(instance)
-        return value
+        spelled = "orientationStdDev" if definition.name == "headingStdDev" else definition.name
+        return deviation(spelled, value, definition.span)
 
     # --- statements
 
@@ -242,7 +241,7 @@ class Interpreter:
                 self._loop(node, ((item,) for item in iterate(evaluate(self, node.iterable, scope), node.span)), scope)
             case ast.While():
                 test = node.test
-                self._loop(node, iter(lambda: truth(evaluate(self, test, scope), test.span), False), scope)
+                self._loop(node, iter(lambda: decided(self, evaluate(self, test, scope), test.span), False), scope)
             case ast.Break():
                 raise _Break
             case ast.Continue():
@@ -266,7 +265,7 @@ class Interpreter:
             case ast.Mutate():
                 self._mutate(node, scope)
             case ast.Assert():
-                if not truth(evaluate(self, node.test, scope), node.test.span):
+                if not decided(self, evaluate(self, node.test, scope), node.test.span):
                     raise fail("runtime-error", "the assertion does not hold", node.span)
             case ast.Global() | ast.Nonlocal():
                 self._share(node, scope)
@@ -326,7 +325,7 @@ class Interpreter:
 
     def _branch(self, node: ast.If, scope: Environment) -> None:
         for branch in node.branches:
-            if truth(evaluate(self, branch.test, scope), branch.test.span):
+            if decided(self, evaluate(self, branch.test, scope), branch.test.span):
                 self.run(branch.body, scope)
                 return
         self.run(node.orelse, scope)
@@ -361,9 +360,8 @@ class Interpreter:
             probability = evaluate(self, node.probability, scope)
             if isinstance(probability, bool) or not isinstance(probability, int | float) or not 0 <= probability <= 1:
                 raise fail("wrong-value", "a probability must be a known number from 0 to 1", node.probability.span)
-            if probability < 1:
-                self.soft.append(node.span)
-                return
+        else:
+            probability = 1.0
         wanted = node.condition
         if isinstance(wanted, ast.Temporal | ast.Until):
             self.dynamic(f"require {wanted.span.text.split()[0]}", wanted.span)
@@ -388,7 +386,7 @@ class Interpreter:
                            "no object here", ("write `F at V`",))  # fmt: skip
             return to_boolean(value, wanted.span)
 
-        self.requirements.append(Requirement(condition, node.span))
+        self.requirements.append(Requirement(condition, node.span, float(probability)))
 
     def _mutate(self, node: ast.Mutate, scope: Environment) -> None:
         scale = 1 if node.scale is None else evaluate(self, node.scale, scope)

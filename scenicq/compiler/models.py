@@ -35,18 +35,18 @@ from scenicq.syntax.parser import parse
 __all__ = ["default_library", "is_dynamic", "libraries_of", "library_text", "network_names", "plain_module"]
 
 _LIBRARIES: dict[str, tuple[str, ...]] = {
-    "scenic.domains.driving.model": ("driving", "traffic"),
-    "scenic.simulators.carla.model": ("driving", "traffic", "carla"),
-    "scenic.simulators.lgsvl.model": ("driving", "traffic", "lgsvl"),
-    "scenic.simulators.metadrive.model": ("driving", "traffic"),
-    "scenic.simulators.newtonian.model": ("driving", "traffic", "newtonian"),
-    "scenic.simulators.newtonian.driving_model": ("driving", "traffic", "newtonian"),
-    "scenic.simulators.gta.model": ("gta",),
-    "scenic.simulators.webots.road.model": ("webots_road",),
+    "scenic.domains.driving.model": ("colors", "driving", "traffic"),
+    "scenic.simulators.carla.model": ("colors", "driving", "traffic", "carla"),
+    "scenic.simulators.lgsvl.model": ("colors", "driving", "traffic", "lgsvl"),
+    "scenic.simulators.metadrive.model": ("colors", "driving", "traffic"),
+    "scenic.simulators.newtonian.model": ("colors", "driving", "traffic", "newtonian"),
+    "scenic.simulators.newtonian.driving_model": ("colors", "driving", "traffic", "newtonian"),
+    "scenic.simulators.gta.model": ("colors", "gta"),
+    "scenic.simulators.webots.road.model": ("colors", "webots_road"),
     "scenic.simulators.webots.mars.model": ("mars",),
-    "carla": ("driving", "traffic", "carla"),
-    "gta": ("gta",),
-    "gtaLib": ("gta",),
+    "carla": ("colors", "driving", "traffic", "carla"),
+    "gta": ("colors", "gta"),
+    "gtaLib": ("colors", "gta"),
     "mars": ("mars",),
 }
 _NO_MAP = frozenset({"mars"})
@@ -56,6 +56,9 @@ _ELEMENTS = (
     Intersection, Lane, LaneGroup, LaneSection, Maneuver, Network, NetworkElement, PedestrianCrossing, Road, Shoulder,
     Sidewalk,
 )  # fmt: skip
+
+
+_ROAD_TYPES: dict[str, ModelValue] = {"ManeuverType": MANEUVER_TYPES, **{cls.__name__: cls for cls in _ELEMENTS}}
 
 
 @cache
@@ -106,7 +109,7 @@ def network_names(network: Network, library: str) -> dict[str, ModelValue]:
     if library == "webots_road":
         regions |= {"nonIntersection": network.roadRegion, "walkway": walkable}
     names: dict[str, ModelValue] = {name: build.constant(value) for name, value in regions.items()}
-    return names | {"network": network}
+    return names | _ROAD_TYPES | {"network": network}
 
 
 def _ignored(span: Span, *_: ModelValue, **__: ModelValue) -> ModelValue:
@@ -123,7 +126,7 @@ def plain_module(name: str, span: Span) -> Module:
         case "math":
             return Module("math", mathematics())
         case "scenic.domains.driving.roads":
-            return Module(name, {"ManeuverType": MANEUVER_TYPES, **{cls.__name__: cls for cls in _ELEMENTS}})
+            return Module(name, _ROAD_TYPES)
         case "scenic.simulators.gta.map" | "scenic.simulators.carla.map" | "scenic.simulators.webots.road.world":
             # the map comes from the dataset
             return Module(name, {each: Builtin(each, _ignored) for each in _MAP_FILES})

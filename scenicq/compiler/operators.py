@@ -7,7 +7,6 @@ it.
 from __future__ import annotations
 
 import math
-from typing import cast
 
 from scenicq.compiler.coerce import (
     kind_of_model,
@@ -48,9 +47,7 @@ from scenicq.geometry.regions import (
     IntersectionOf,
     PolygonSet,
     PolylineSet,
-    Region,
     UnionOf,
-    orientation_of,
 )
 
 __all__ = [
@@ -72,7 +69,6 @@ __all__ = [
     "negate",
     "object_box",
     "offset",
-    "orientation",
     "oriented",
     "region_difference",
     "region_intersection",
@@ -278,10 +274,22 @@ def existing(value: ModelValue, span: Span | None) -> Node:
         ScenarioError: map-lacks, where the map has nothing of the kind; wrong-type.
     """
     area = to_region(value, span)
-    if isinstance(area, Constant) and isinstance(area.value, PolygonSet | PolylineSet) and not area.value.pieces:
-        raise fail("map-lacks", f"the map has no {area.value.name}", span, "there is none",
+    names = _lacking(area.value) if isinstance(area, Constant) else ()
+    if names:
+        listed = " and ".join(f"`{name}`" for name in names)
+        raise fail("map-lacks", f"the map has nothing for {listed}", span, "there is none",
                    ("the map of another dataset may have it", "leave out what the program asks of it"))  # fmt: skip
     return area
+
+
+def _lacking(value: object) -> tuple[str, ...]:
+    """What an area consists of, if none of it is on the map."""
+    if isinstance(value, PolygonSet | PolylineSet):
+        return () if value.pieces else (value.name,)
+    if isinstance(value, UnionOf):
+        parts = [_lacking(part) for part in value.parts]
+        return tuple(name for names in parts for name in names) if all(parts) else ()
+    return ()
 
 
 def within(item: ModelValue, region: ModelValue, span: Span) -> Node:
@@ -340,29 +348,6 @@ def region_difference(left: ModelValue, right: ModelValue, span: Span) -> Node:
     """What lies in the left region only."""
     parts = to_region(left, span), to_region(right, span)
     return _combined(parts, RegionDifference(*parts, span=span), span)
-
-
-def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
-    """The preferred heading of a region at a point; None if it has none."""
-    match region:
-        case Constant():
-            field = orientation_of(cast(Region, region.value))
-            return None if field is None else DirectionAt(build.constant(field, span), point, span=span)
-        case Select():
-            options = [orientation(option, point, span) for option in region.options]
-            if any(option is None for option in options):
-                return None
-            fields = tuple(cast(DirectionAt, option).field for option in options)
-            if len({id(cast(Constant, field).value) for field in fields}) == 1:
-                return options[0]
-            return DirectionAt(Select(region.index, fields, span=span), point, span=span)
-        case RegionIntersection() | RegionUnion():
-            found = (orientation(part, point, span) for part in region.parts)
-            return next((heading for heading in found if heading is not None), None)
-        case RegionDifference():
-            return orientation(region.base, point, span)
-        case _:
-            return None
 
 
 def _follow_steps(distance: Node, version: int) -> int:

@@ -13,7 +13,9 @@ from typing import assert_never, cast
 from scenicq.compiler import operators
 from scenicq.compiler.choices import holds_instances, make_choice
 from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to_scalar, to_vector
+from scenicq.compiler.deviations import DEVIATIONS, deviation
 from scenicq.compiler.environment import FIRST_NAMES
+from scenicq.compiler.orientations import orientation
 from scenicq.compiler.specifiers import BoundSpecifier
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, lift
 from scenicq.errors import Span
@@ -98,12 +100,12 @@ def _own_position(instance: Instance, position: Node, span: Span) -> Node:
 def _in_region(span: Span, region: ModelValue, *, contained: bool = False, modifies: bool = False) -> BoundSpecifier:
     area = operators.existing(region, span)
     point = PointIn(area, span=span)
-    has_heading = operators.orientation(area, point, span) is not None
+    has_heading = orientation(area, point, span) is not None
 
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         given: dict[str, ModelValue] = {"position": point, "regionContainedIn": area}
         if has_heading:
-            given["heading"] = operators.orientation(area, _own_position(instance, point, span), span)
+            given["heading"] = orientation(area, _own_position(instance, point, span), span)
         return given
 
     def inside(instance: Instance) -> Node:
@@ -313,7 +315,10 @@ def _with(node: ast.WithSpecifier, value: ModelValue, around: Surroundings) -> B
     if name in _IN_SPACE and value != 0:
         raise fail("unsupported-construct", f"`with {name}` is not supported", node.span, "labels are matched in 2D",
                    ("state the heading with `facing`",))  # fmt: skip
-    return _specifier(node.span, name, lambda instance: {name: _known(value, instance)}, value)
+    own = DEVIATIONS.get(name, name)
+    return _specifier(
+        node.span, own, lambda instance: {own: deviation(name, _known(value, instance), node.span)}, value
+    )
 
 
 def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> BoundSpecifier:

@@ -12,6 +12,7 @@ from pathlib import PurePosixPath
 from scenicq.compiler import operators
 from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
+from scenicq.compiler.deviations import is_zero
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.models import (
@@ -125,7 +126,7 @@ class _World:
     def __init__(self, network: Network, version: int, initial: bool, loader: Loader | None) -> None:
         self.network = network
         self.loader = loader
-        self.interpreter = Interpreter(version, initial, self.load)
+        self.interpreter = Interpreter(version, initial, self.load, network)
         names = language_names() | sequence_functions(self.interpreter) | root_classes(version)
         self.base = Environment(names)
         self.modules: dict[str, Module] = {}
@@ -157,6 +158,7 @@ class _World:
             return None
         if name in self.loading:
             raise fail("unsupported-construct", f"`{name}` imports itself", span, "a circle of imports")
+        self.interpreter.budget.step(span, len(source.text))
         self.loading.append(name)
         try:
             scope = Environment({}, self.base)
@@ -176,8 +178,8 @@ def _record(_: Span, name: str, width: float, length: float) -> Module:
     return Module(name, {"name": name, "width": width, "length": length, "height": length})
 
 
-def _module(_: Span, name: str, names: dict[str, ModelValue]) -> Module:
-    return Module(name, names)
+def _module(_: Span, name: str, names: dict[str, ModelValue], call: ModelValue = None) -> Module:
+    return Module(name, names, call=call)
 
 
 def _no_ego(run: Interpreter, module: ast.Module, version: int) -> ScenarioError:
@@ -197,8 +199,9 @@ def _scenario(
     if run.current_ego is None:
         raise _no_ego(run, module, version)
     ego = run.current_ego
-    requirements = [_written(requirement.condition(), requirement.span) for requirement in run.requirements]
-    requirements += [_written(condition, span) for condition, span in run.exclusions()]
+    hard, soft = ([each for each in run.requirements if (each.probability < 1) == low] for low in (False, True))
+    requirements = [_written(requirement.condition(), requirement.span) for requirement in hard]
+    requirements += [_written(condition, span) for condition, span in run.excluded.conditions()]
     requirements = [requirement for requirement in requirements if requirement is not None]
     requirements += _built_in(run, ego)
     ego.label = ego.label or "ego"
@@ -213,7 +216,8 @@ def _scenario(
     scenario = Scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
-        tuple(run.soft), tuple(run.ignored), warnings,
+        tuple(Requirement(each.condition(), each.span, probability=each.probability) for each in soft),
+        tuple(run.ignored), warnings,
     )  # fmt: skip
     return simplify(scenario)
 
@@ -256,26 +260,18 @@ def _object(instance: Instance, name: str) -> ScenarioObject:
         node = _property(key, value, span)
         if node is not None:
             properties[key] = Property(node, key in instance.explicit, span)
+    if instance.mutation is not None:
+        properties["mutationScale"] = Property(to_scalar(instance.mutation, instance.span), False, instance.span)
     assert instance.index is not None
     return ScenarioObject(instance.index, name, instance.cls.category, properties, _mutated(instance), instance.span)
 
 
-def _mutated(instance: Instance) -> bool:
-    """Whether noise is added to an object's position and heading."""
+def _mutated(instance: Instance) -> frozenset[str]:
+    """The properties of an object to which noise is added."""
     scale = instance.mutation if instance.mutation is not None else instance.properties["mutationScale"]
-    if _is_zero(scale):
-        return False
-    still = next((name for name in ("positionStdDev", "headingStdDev") if _is_zero(instance.properties[name])), None)
-    if still is not None:
-        raise fail("unsupported-construct", "noise on only one of position and heading is not supported",
-                   instance.spans.get(still) or instance.span, "no noise here, but `mutate` adds some elsewhere",
-                   ("give the other property a wide distribution instead of `mutate`",))  # fmt: skip
-    return True
-
-
-def _is_zero(value: ModelValue) -> bool:
-    known = value.value if isinstance(value, Constant) else value
-    return isinstance(known, int | float) and known == 0
+    if is_zero(scale):
+        return frozenset()
+    return frozenset(name for name in ("position", "heading") if not is_zero(instance.properties[f"{name}StdDev"]))
 
 
 def _written(condition: Node, span: Span) -> Requirement | None:

@@ -13,13 +13,20 @@ from typing import Any
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random, plain_binary
 from scenicq.compiler.builtins import extreme, truth
+from scenicq.compiler.choices import map_choice
 from scenicq.compiler.comparisons import iterate
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.expressions import call
-from scenicq.compiler.values import Builtin, Function, ModelValue, fail
+from scenicq.compiler.settled import decided, settled
+from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail
 from scenicq.errors import Span
+from scenicq.forest.nodes import Constant
 
 __all__ = ["sequence_functions"]
+
+
+def _plain(value: ModelValue) -> ModelValue:
+    return value.value if isinstance(value, Constant) else value
 
 
 def sequence_functions(run: Runner) -> dict[str, ModelValue]:
@@ -34,14 +41,16 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
         return item if function is None else call(run, function, [item], {}, span)
 
     def filtered(span: Span, function: ModelValue, items: ModelValue) -> ModelValue:
-        return [item for item in iterate(items, span) if truth(apply(function, item, span), span)]
+        if isinstance(items, Choice):
+            return map_choice(items, lambda option: filtered(span, function, option), span)
+        return [item for item in iterate(items, span) if decided(run, apply(function, item, span), span)]
 
     def mapped(span: Span, function: ModelValue, *lists: ModelValue) -> ModelValue:
         columns = [iterate(items, span) for items in lists]
         return [call(run, function, list(row), {}, span) for row in zip(*columns, strict=False)]
 
     def ordered(span: Span, items: ModelValue, key: ModelValue = None, reverse: ModelValue = False) -> ModelValue:
-        keyed = [(apply(key, item, span), item) for item in iterate(items, span)]
+        keyed = [(_plain(settled(run, apply(key, item, span))), item) for item in iterate(items, span)]
         if any(is_random(value) for value, _ in keyed):
             raise fail("random-branch", "random values have no known order", span, "random here",
                        ("sort by something known",))  # fmt: skip
@@ -52,7 +61,7 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
 
         return [item for _, item in sorted(keyed, key=cmp_to_key(before), reverse=truth(reverse, span))]
 
-    def decided(op: str) -> Callable[..., ModelValue]:
+    def quantified(op: str) -> Callable[..., ModelValue]:
         def decide(span: Span, items: ModelValue) -> ModelValue:
             values = iterate(items, span)
             known = [truth(value, span) for value in values if not is_random(value)]
@@ -83,8 +92,8 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
         "filter": filtered,
         "map": mapped,
         "sorted": ordered,
-        "any": decided("or"),
-        "all": decided("and"),
+        "any": quantified("or"),
+        "all": quantified("and"),
         "min": extremal("min"),
         "max": extremal("max"),
         "callable": lambda span, value: isinstance(value, Function | Builtin),

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Span
-from scenicq.forest.nodes import Index, Node
+from scenicq.forest.nodes import Identity, Index, Node
 from scenicq.syntax import ast
 
 __all__ = [
@@ -161,14 +161,19 @@ class Choice:
     """One of several values that are not numbers, vectors or regions: which one is random.
 
     Attributes:
-        index: Which.
+        index: Which: a random variable, or an expression such as which lane lies at a place.
         options: The values.
         size: How many outcomes there are, those of nested choices included.
     """
 
-    index: Index
+    index: Node
     options: tuple[ModelValue, ...]
     size: int
+
+    @property
+    def key(self) -> Identity | int:
+        """What two choices have in common that always come out the same."""
+        return self.index.identity if isinstance(self.index, Index) else id(self.index)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,6 +198,7 @@ class Builtin:
         lifted: Whether the call waits for delayed arguments.
         owner: What it is a method of: the call may go through all of it.
         cost: Steps that a call takes besides.
+        known: Whether it takes known values only: what the program itself says of its objects counts as known.
     """
 
     name: str
@@ -200,6 +206,7 @@ class Builtin:
     lifted: bool = True
     owner: ModelValue = None
     cost: int = 0
+    known: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,11 +217,13 @@ class Module:
         name: What messages call it.
         names: The values by name.
         dynamic: Whether it has nothing to say about one instant: any name of it may be imported and stands for nothing.
+        call: What a call of it calls, as of a class of Python's that programs make values with; None if it is none.
     """
 
     name: str
     names: Mapping[str, ModelValue]
     dynamic: bool = False
+    call: ModelValue = None
 
 
 def lift(needed: Callable[..., ModelValue], *args: ModelValue) -> ModelValue:

@@ -18,6 +18,7 @@ _QUOTED = re.compile(r"\"\"\"(?:[^\\]|\\.)*?\"\"\"|'''(?:[^\\]|\\.)*?'''|\"[^\"\
 _RAW_TEXT = re.compile(r"[^{}]*")
 _PLAIN_TEXT = re.compile(r"(?:\\N\{[^}]*\}|\\[^{}]|[^{}\\]|\\)*")
 _MAX_DIGITS = 4000
+_MAX_FIELDS = 1000
 
 
 def _fail(source: Source, message: str, start: int, end: int, hint: str = "") -> ScenarioError:
@@ -145,6 +146,8 @@ def split_format(source: Source, start: int, end: int, *, raw: bool) -> list[Tex
         else:
             field = _field(source, stop, end)
             parts.append(field)
+            if len(parts) > _MAX_FIELDS:
+                raise _fail(source, f"a string has more than {_MAX_FIELDS:,} parts", start, position)
             position = field.end
     return parts
 

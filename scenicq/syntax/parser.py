@@ -14,7 +14,7 @@ from scenicq.syntax.walk import check_height
 
 __all__ = ["MAX_CHARACTERS", "parse"]
 
-MAX_CHARACTERS = 10_000_000
+MAX_CHARACTERS = 200_000
 """How long a program may be."""
 
 
@@ -34,7 +34,7 @@ def parse(source: Source, version: int | None = None) -> ast.Module:
         message = f"version {version} is none of {sorted(VERSIONS)}"
         raise ValueError(message)
     if len(source.text) > MAX_CHARACTERS:
-        message = f"`{source.name}` is longer than {MAX_CHARACTERS} characters"
+        message = f"`{source.name}` is longer than {MAX_CHARACTERS:,} characters"
         raise ScenarioError(Diagnostic("budget-exceeded", message))
     tokens = tokenize(source)
     parser = ProgramParser(source, tokens)

@@ -20,7 +20,10 @@ CASES = {
     "ego = new Object\nnew Object above ego by 1\n": ("unsupported-construct", "above ego by 1"),
     "ego = new Object\nrequire 1 > 2\n": ("impossible-requirement", "require 1 > 2"),
     "ego = new Object\nrequire always 1 > 2\n": ("unsupported-construct", "always 1 > 2"),
-    "ego = new Object with headingStdDev 0\nmutate\n": ("unsupported-construct", "with headingStdDev 0"),
+    "ego = new Object with positionStdDev (1, 2, 0)\nmutate\n": (
+        "unsupported-construct",
+        "with positionStdDev (1, 2, 0)",
+    ),
     "class A(Object, Point):\n    pass\nego = new A\n": ("unsupported-construct", "Point"),
     "class A:\n    def __init__(self):\n        pass\nego = new A\n": ("unsupported-construct", "__init__"),
     "class A:\n    pitch: 3\nego = new A\n": ("unsupported-construct", "pitch"),

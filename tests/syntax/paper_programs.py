@@ -122,6 +122,12 @@ mutate
         2,
         OLD,
     ),
+    "two cars": (
+        "wiggle = (-10 deg, 10 deg)\nego = EgoCar with roadDeviation wiggle\n"
+        + "Car visible, with roadDeviation resample(wiggle)\n" * 2,
+        3,
+        OLD,
+    ),
     "overlapping cars": (
         """\
 wiggle = (-10 deg, 10 deg)

@@ -82,7 +82,7 @@ def test_little_room_on_the_stack() -> None:
 def test_a_program_that_is_too_long() -> None:
     with pytest.raises(ScenarioError) as caught:
         parse(Source("long.scenic", " " * (MAX_CHARACTERS + 1)))
-    assert str(caught.value) == "error[budget-exceeded]: `long.scenic` is longer than 10000000 characters"
+    assert str(caught.value) == "error[budget-exceeded]: `long.scenic` is longer than 200,000 characters"
 
 
 LINES = """\

@@ -2,6 +2,10 @@
 
 class DrivingObject:
     requireVisible: False
+    isVehicle = False
+    isPedestrian = False
+    isCar = False
+    elevation = None
 
 class Vehicle(DrivingObject):
     regionContainedIn: roadOrShoulder
@@ -11,9 +15,17 @@ class Vehicle(DrivingObject):
     viewAngle: 90 deg
     width: 2
     length: 4.5
+    isVehicle = True
+    color = None
+    maxSteeringAngle = 35 deg
+    wheelDiameter = 0.7
+    groundClearance = 0.35
+    maxSpeed = 45
+    maxAcceleration = 5
+    maxDeceleration = 10
 
 class Car(Vehicle):
-    pass
+    isCar = True
 
 class NPCCar(Car):
     pass
@@ -25,3 +37,13 @@ class Pedestrian(DrivingObject):
     viewAngle: 90 deg
     width: 0.75
     length: 0.75
+    isPedestrian = True
+    color = (0, 0.5, 1)
+    mass = 65
+
+# a sensor says what is recorded, not what is there
+def SSSensor(*args, **kwargs):
+    return None
+
+def RGBSensor(*args, **kwargs):
+    return None

@@ -29,16 +29,6 @@ CarModel = _module("CarModel", {
     "egoModel": lambda: _models["BLISTA"],
 })
 
-# labels have no colours: a colour is what the program says it is
-CarColor = _module("CarColor", {
-    "byteToReal": lambda color: [part / 255 for part in color],
-    "defaultColor": lambda: None,
-    "defaultCarColor": lambda: None,
-    "uniformColor": lambda: None,
-    "withBytes": lambda color: [part / 255 for part in color],
-})
-Color = CarColor
-
 class Car:
     position: new Point on road
     heading: (roadDirection at self.position) + self.roadDeviation

@@ -1,5 +1,20 @@
 # Classes of Scenic's model for roads in the Webots simulator.
 
+modelWithName = {
+    "BmwX5": _record("BmwX5", 2, 4.75),
+    "CitroenCZero": _record("CitroenCZero", 1.5, 3.5),
+    "LincolnMKZ": _record("LincolnMKZ", 1.9, 5),
+    "RangeRoverSportSVR": _record("RangeRoverSportSVR", 1.9, 4.5),
+    "ToyotaPrius": _record("ToyotaPrius", 1.9, 4.5),
+    "Bus": _record("Bus", 3, 10),
+    "Truck": _record("Truck", 2.7, 14.5),
+    "Tractor": _record("Tractor", 2, 3),
+    "MotorBikeSimple": _record("MotorBikeSimple", 1, 2.5),
+}
+carModels = list(modelWithName.values())
+smallVehicles = carModels[:5]
+CarModel = _module("CarModel", {}, _record)
+
 class WebotsObject:
     pass
 

@@ -1,0 +1,53 @@
+"""How much noise `mutate` adds: the deviations of position and heading, also as Scenic 3 spells them."""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+from scenicq.compiler.values import ModelValue, fail, is_node
+from scenicq.errors import Span
+from scenicq.forest.nodes import Constant
+
+__all__ = ["DEVIATIONS", "deviation", "is_zero"]
+
+DEVIATIONS = {"positionStdDev": "positionStdDev", "orientationStdDev": "headingStdDev"}
+"""Properties of Scenic 3 that hold one deviation an axis, and the name of the one that counts in the plane."""
+
+
+def deviation(name: str, value: ModelValue, span: Span | None) -> ModelValue:
+    """The one deviation in the plane that `(1, 1, 0)` of a position, or `(5 deg, 0, 0)` of an orientation, stands for.
+
+    Raises:
+        ScenarioError: unsupported-construct, for different deviations along the axes, or out of the plane.
+    """
+    if is_node(value) and isinstance(value, Constant) and isinstance(value.value, tuple):
+        value = value.value
+    if name not in DEVIATIONS or not isinstance(value, tuple | list):
+        return value
+    parts = list(cast(Sequence[ModelValue], value))
+    even = (
+        name == "positionStdDev"
+        and len(parts) in (2, 3)
+        and parts[0] == parts[1]
+        and not any(map(_is_other_than_zero, parts[2:]))
+    )
+    turned = name == "orientationStdDev" and len(parts) == 3 and not any(map(_is_other_than_zero, parts[1:]))
+    if not even and not turned:
+        raise fail("unsupported-construct", f"this `{name}` is not supported: labels are matched in 2D", span,
+                   "not the same in all directions of the plane",
+                   ("write one number for x and y, and none for the rest",))  # fmt: skip
+    return parts[0]
+
+
+def _is_other_than_zero(value: ModelValue) -> bool:
+    return not is_zero(value)
+
+
+def is_zero(value: ModelValue) -> bool:
+    """Whether a value is known to be 0."""
+    known = value.value if isinstance(value, Constant) else value
+    return isinstance(known, int | float) and known == 0

@@ -1,0 +1,129 @@
+"""Methods of map elements: which of their parts lies at a place, what their direction leads to."""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, cast
+
+from scenicq.compiler import operators
+from scenicq.compiler.coerce import to_vector
+from scenicq.compiler.environment import Runner
+from scenicq.compiler.lookups import among
+from scenicq.compiler.road_attributes import worked_out
+from scenicq.compiler.settled import settled
+from scenicq.compiler.values import Builtin, ModelValue, describe, fail
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.nodes import Constant, Vector
+from scenicq.geometry.elements import Intersection, Lane, LaneGroup, LaneSection, Maneuver, NetworkElement, Road
+from scenicq.geometry.network import Network
+
+__all__ = ["METHODS", "find_among", "method_of", "nominal_directions"]
+
+_PARTS: dict[str, tuple[tuple[type, Callable[[Any], Sequence[NetworkElement]]], ...]] = {
+    "sectionAt": ((Lane, lambda lane: lane.sections),),
+    "laneAt": ((LaneGroup, lambda group: group.lanes), (Road, lambda road: road.lanes)),
+    "laneGroupAt": ((Road, lambda road: road.laneGroups),),
+    "laneSectionAt": ((Road, lambda road: [section for lane in road.lanes for section in lane.sections]),),
+}
+"""Look-ups among the parts of an element."""
+
+METHODS = frozenset({"nominalDirectionsAt"})
+"""Methods that every element and the network have."""
+
+
+def find_among(run: Runner, point: ModelValue, elements: ModelValue, reject: ModelValue, span: Span) -> ModelValue:
+    """`network.findPointIn(point, elements, reject)`.
+
+    Raises:
+        ScenarioError: wrong-type, for what are no elements.
+    """
+    known = isinstance(elements, list | tuple)
+    if not known or not all(isinstance(each, NetworkElement) for each in cast("list[Any]", elements)):
+        raise fail("wrong-type", "a known list of elements of the map is needed here", span,
+                   f"this is {describe(elements)}")  # fmt: skip
+    return among(run, list(cast("Sequence[NetworkElement]", elements)), "findPointIn", point, reject, span)
+
+
+def method_of(run: Runner, value: NetworkElement, name: str) -> Builtin | None:
+    """A method of an element, None if it has no such method."""
+    parts = next((parts for kind, parts in _PARTS.get(name, ()) if isinstance(value, kind)), None)
+    if parts is not None:
+        return Builtin(name, _finder(run, parts(value), f"{name} of {value.id}"))
+    if name == "crossingAt" and isinstance(value, Road):
+
+        def crossing(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
+            found = worked_out(run, value, "crossings", span)
+            assert found is not None
+            return among(run, found[0], f"crossingAt of {value.id}", point, reject, span)
+
+        return Builtin(name, crossing)
+    if name == "nominalDirectionsAt":
+        return nominal_directions(run, run.network)
+    if name == "maneuversAt" and isinstance(value, Intersection):
+        return Builtin(name, lambda span, point: _maneuvers_at(run, value, point, span))
+    if name == "shiftedBy" and isinstance(value, LaneSection):
+        return Builtin(name, lambda span, offset: _shifted(run, value, offset, span))
+    if name == "flowFrom" and value.orientation is not None:
+        field = build.constant(value.orientation)
+
+        def flow(span: Span, point: ModelValue, distance: ModelValue, **_: ModelValue) -> ModelValue:
+            return operators.follow(field, point, distance, run.version, span).properties["position"]
+
+        return Builtin(name, flow)
+    return None
+
+
+def _finder(run: Runner, parts: Sequence[NetworkElement], name: str) -> Callable[..., ModelValue]:
+    def find(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
+        return among(run, parts, name, point, reject, span)
+
+    return find
+
+
+def _known_place(run: Runner, point: ModelValue, what: str, hint: str, span: Span) -> Vector:
+    where = settled(run, to_vector(point, span))
+    if not isinstance(where, Constant):
+        raise fail("unsupported-construct", f"`{what}` of a random point is not supported", span,
+                   "as many as there are there", (hint,))  # fmt: skip
+    return cast(Vector, where.value)
+
+
+def nominal_directions(run: Runner, network: Network) -> Builtin:
+    """`nominalDirectionsAt` of a known point."""
+
+    def directions(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
+        hint = "`roadDirection at` it may be any of them"
+        return network.nominalDirectionsAt(*_known_place(run, point, "nominalDirectionsAt", hint, span))
+
+    return Builtin("nominalDirectionsAt", directions)
+
+
+def _maneuvers_at(run: Runner, intersection: Intersection, point: ModelValue, span: Span) -> ModelValue:
+    """The ways through an intersection that pass a known point."""
+    hint = "choose a maneuver first, as in `Uniform(*intersection.maneuvers)`"
+    x, y = _known_place(run, point, "maneuversAt", hint, span)
+
+    def passes(maneuver: Maneuver) -> bool:
+        way = maneuver.connectingLane
+        return way is not None and among(run, [way], "maneuversAt", (x, y), None, span) is not None
+
+    return [maneuver for maneuver in intersection.maneuvers if passes(maneuver)]
+
+
+def _shifted(run: Runner, section: LaneSection, offset: ModelValue, span: Span) -> ModelValue:
+    """The section some lanes over: to the left, or to the right where the number is negative."""
+    if isinstance(offset, bool) or not isinstance(offset, int):
+        raise fail("wrong-type", "`shiftedBy` needs a known whole number", span)
+    found: LaneSection | None = section
+    for _ in range(abs(offset)):
+        run.budget.step(span)
+        found = getattr(found, "_laneToLeft" if offset > 0 else "_laneToRight")
+        if found is None:
+            raise fail("map-lacks", f"the map says that {section.name} has no lane so far over", span,
+                       "not in this map")  # fmt: skip
+    return found

@@ -1,0 +1,88 @@
+"""What lies at a place: `network.laneAt(p)`, `ego.lane`, `road.laneAt(p)` and their like.
+
+At a known place it is one element, or None. At a random one it is a random choice between the elements whose index is
+a function of the place (see `occupancy`), so that any two look-ups at one place agree; its attributes are again random
+choices. Where elements of one kind overlap, any of them may be meant; which one is chosen once for a place, for lanes,
+their sections, groups and roads together.
+"""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import cast
+
+from scenicq.compiler.coerce import to_vector
+from scenicq.compiler.environment import Runner
+from scenicq.compiler.places import LOOKUPS, Table, own
+from scenicq.compiler.settled import settled
+from scenicq.compiler.values import Choice, ModelValue, fail
+from scenicq.errors import Span
+from scenicq.forest.nodes import Constant, Vector
+from scenicq.geometry.elements import NetworkElement
+from scenicq.geometry.network import Network
+
+__all__ = ["among", "look_up"]
+
+
+def look_up(run: Runner, network: Network, name: str, point: ModelValue, reject: ModelValue, span: Span) -> ModelValue:
+    """`network.laneAt(point)` and its like.
+
+    Args:
+        run: The interpreter.
+        network: The network.
+        name: Which look-up.
+        point: The place.
+        reject: Whether there is no scene where there is no element; then the result is never None.
+        span: The call.
+
+    Raises:
+        ScenarioError: impossible-requirement, where there is no element at a known place but must be.
+    """
+    family, layers = LOOKUPS[name]
+    table = run.lookups.table((id(network), name), f"network.{name}", family, lambda: layers(network))
+    known = getattr(network, name, None)
+    return _at(run, (id(network), name), table, point, reject, span, known)
+
+
+def among(
+    run: Runner, elements: Sequence[NetworkElement], name: str, point: ModelValue, reject: ModelValue, span: Span
+) -> ModelValue:
+    """The same among some elements only, as in `road.laneAt(point)`."""
+    key = (name, tuple(element.id for element in elements))
+    table = run.lookups.table(key, name, f"{name} {key}", lambda: [own(elements)])
+    return _at(run, key, table, point, reject, span, None)
+
+
+def _at(
+    run: Runner,
+    key: object,
+    table: Table,
+    point: ModelValue,
+    reject: ModelValue,
+    span: Span,
+    known: Callable[[float, float], NetworkElement | None] | None,
+) -> ModelValue:
+    place = to_vector(point, span)
+    certain = settled(run, place)
+    options = (*table.options, None)
+    if isinstance(certain, Constant):
+        x, y = cast(Vector, certain.value)
+        found = options[table.occupancy.at(x, y)[0]] if known is None else known(x, y)
+        if found is None and reject:
+            raise fail("impossible-requirement", f"there is nothing for `{table.occupancy.name}` at this point", span,
+                       "no scene is left", ("without `reject`, the result is None",))  # fmt: skip
+        return found
+    if not table.options:
+        if reject:
+            raise fail("map-lacks", f"the map has nothing for `{table.occupancy.name}`", span, "there is none",
+                       ("the map of another dataset may have it",))  # fmt: skip
+        return None
+    run.budget.step(span, len(options) // run.budget.ITEMS_PER_STEP)
+    index = run.lookups.index(key, table, place, span)
+    if reject:
+        run.exclude(index, [len(table.options)], len(options), span)
+    return Choice(index, options, len(options))

@@ -1,0 +1,220 @@
+"""Which element of the map lies at a point, as a vector field: what look-ups at a random place are made of.
+
+An expression that asks for the element at a point is a choice whose index is a function of the point. As a field it
+goes wherever fields go: at an observed point it is one known option, and at a random one only the elements near it are
+looked at. The field's angles number the options; an angle times `scale` is the number, exactly.
+
+Where elements overlap, Scenic takes the first in the order of its lists, an accident; here each of them is allowed, and
+a rank says which (as with the directions of traffic). A point in none, but within the map's tolerance of some, counts
+as in these, as in Scenic; here the border is a polygon, so that every point of the plane lies in pieces that are convex.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import STRtree
+
+from scenicq.geometry import shapes
+from scenicq.geometry.cells import convex_parts
+from scenicq.geometry.fields import FieldCell
+from scenicq.geometry.regions import SLACK
+from scenicq.geometry.shapes import Bounds, Shape
+
+__all__ = ["Layer", "Occupancy", "Place", "Ranked"]
+
+TOLERANCE = 0.05
+"""Metres beside an element that still count as in it where no element holds a point (Scenic's `tolerance`)."""
+_OVERLAP = 1e-6
+"""Square metres that two elements may share without counting as overlapping."""
+_KEPT = 4096
+
+Place: TypeAlias = tuple[Shape, int, int]
+"""An area, the number of the option that is found in it, and whose area it is: an owner is found once at a point."""
+Layer: TypeAlias = tuple[Place, ...]
+Corners: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A convex piece of the plane in which all points have the same options.
+
+    Attributes:
+        corners: In metres, counter-clockwise, shape (k, 2).
+        found: The options.
+        number: The one of them whose area this is a piece of.
+    """
+
+    corners: Corners
+    found: tuple[int, ...]
+    number: int
+
+
+@dataclass(frozen=True, eq=False)
+class Occupancy:
+    """The options at each point.
+
+    Attributes:
+        layers: Areas in the order in which they count: those of a later layer only where the earlier ones have none.
+        nothing: The number that stands for no option at all.
+        name: What messages call it.
+    """
+
+    layers: tuple[Layer, ...] = field(repr=False)
+    nothing: int
+    name: str
+
+    @cached_property
+    def scale(self) -> int:
+        """The power of two by which an angle in (-pi, pi] becomes the number of any option."""
+        return 1 << max(0, math.ceil(math.log2((self.nothing + 1) / math.pi)))
+
+    @cached_property
+    def depth(self) -> int:
+        """At least as many as there are options of one layer at any point."""
+        most = 1
+        for layer, tree in zip(self.layers, self._trees, strict=True):
+            areas = shapes.array([area for area, _, _ in layer])
+            first, second = shapes.tree_pairs_within(tree, areas, 0.0)
+            apart = first < second
+            shared: dict[int, set[int]] = {}
+            pairs: list[tuple[int, int]] = list(zip(first[apart].tolist(), second[apart].tolist(), strict=True))
+            for one, other in pairs:
+                if layer[one][2] != layer[other][2] and self._overlap(layer[one][0], layer[other][0]):
+                    shared.setdefault(one, set()).add(layer[other][2])
+                    shared.setdefault(other, set()).add(layer[one][2])
+            most = max(most, 1 + max(map(len, shared.values()), default=0))
+        return most
+
+    def at(self, x: float, y: float) -> tuple[int, ...]:
+        """The numbers of the options at a point, at least one."""
+        known = self._known.get((x, y))
+        if known is None:
+            if len(self._known) >= _KEPT:
+                self._known.clear()
+            known = self._known[x, y] = self._find(x, y)
+        return known
+
+    def _find(self, x: float, y: float) -> tuple[int, ...]:
+        here = shapes.point(x, y)
+        for trees in (self._trees, self._wider_trees):
+            for layer, tree in zip(self.layers, trees, strict=True):
+                hits: list[int] = np.sort(shapes.tree_within(tree, here, SLACK)).tolist()
+                owners = {layer[hit][2]: layer[hit][1] for hit in reversed(hits)}
+                found = [owners[owner] for owner in sorted(owners)]
+                if any(number != self.nothing for number in found):
+                    return tuple(found)
+        return (self.nothing,)
+
+    def pieces_near(self, bounds: Bounds) -> list[Piece]:
+        """Convex pieces of all areas and their borders within a box, each once for each area that it belongs to."""
+        box = _box(bounds)
+        return [
+            piece
+            for level, tree in enumerate(self._trees)
+            for hit in np.sort(shapes.tree_within(tree, box, 2 * TOLERANCE)).tolist()
+            for piece in self._pieces_of(level, hit)
+        ]
+
+    def outside(self, bounds: Bounds) -> list[Corners]:
+        """Convex pieces of what lies in no area within a box."""
+        if bounds not in self._outside:
+            if len(self._outside) >= _KEPT:
+                self._outside.clear()
+            box = _box(bounds)
+            near = [
+                wide for tree in self._wider_trees for wide in tree.geometries.take(shapes.tree_within(tree, box, 0.0))
+            ]
+            left = shapes.difference(box, shapes.union_all(near))
+            self._outside[bounds] = [cell for part in shapes.polygonal_part(left) for cell in convex_parts(part)]
+        return self._outside[bounds]
+
+    def _pieces_of(self, level: int, hit: int) -> list[Piece]:
+        """The pieces of one area and of its border, the first those that lie in it."""
+        if (level, hit) not in self._pieces:
+            area, number, _ = self.layers[level][hit]
+            inside = shapes.divided(area, self._crossing(self._trees, area))
+            rest = shapes.difference(shapes.band(area, TOLERANCE), shapes.union_all(self._meeting(self._trees, area)))
+            border = [
+                part
+                for ring in shapes.polygonal_part(rest)
+                for part in shapes.divided(ring, self._crossing(self._wider_trees, ring))
+            ]
+            self._pieces[level, hit] = [
+                Piece(cell, found, number)
+                for part in (*inside, *border)
+                if number in (found := self.at(*shapes.inner_point(part)))
+                for cell in convex_parts(part)
+            ]
+        return self._pieces[level, hit]
+
+    def _meeting(self, trees: Sequence[STRtree], area: Shape) -> list[Shape]:
+        return [shape for tree in trees for shape in tree.geometries.take(shapes.tree_within(tree, area, TOLERANCE))]
+
+    def _crossing(self, trees: Sequence[STRtree], area: Shape) -> list[Shape]:
+        return [shape for shape in self._meeting(trees, area) if shape is not area and self._overlap(area, shape)]
+
+    @cached_property
+    def _trees(self) -> tuple[STRtree, ...]:
+        return tuple(STRtree([area for area, _, _ in layer]) for layer in self.layers)
+
+    @cached_property
+    def _wider_trees(self) -> tuple[STRtree, ...]:
+        return tuple(STRtree([shapes.band(area, TOLERANCE) for area, _, _ in layer]) for layer in self.layers)
+
+    @cached_property
+    def _pieces(self) -> dict[tuple[int, int], list[Piece]]:
+        return {}
+
+    @cached_property
+    def _outside(self) -> dict[Bounds, list[Corners]]:
+        return {}
+
+    @cached_property
+    def _known(self) -> dict[tuple[float, float], tuple[int, ...]]:
+        return {}
+
+    @staticmethod
+    def _overlap(one: Shape, other: Shape) -> bool:
+        return shapes.intersection(one, other).area > _OVERLAP
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """One of the options at each point, by its rank among them: a vector field whose angles number the options."""
+
+    options: Occupancy
+    rank: int
+
+    @property
+    def name(self) -> str:
+        """What messages call the field."""
+        return self.options.name
+
+    def values(self, x: float, y: float) -> tuple[float, ...]:
+        """The angle that stands for the option at a point."""
+        found = self.options.at(x, y)
+        return (found[self.rank % len(found)] / self.options.scale,)
+
+    def cells(self, bounds: Bounds) -> list[FieldCell]:
+        """Convex cells that hold every point with its option within the bounds."""
+        options, scale = self.options, self.options.scale
+        cells = [
+            FieldCell(piece.corners, piece.number / scale, exact=True)
+            for piece in options.pieces_near(bounds)
+            if piece.found[self.rank % len(piece.found)] == piece.number
+        ]
+        beside = options.outside(bounds)
+        return cells + [FieldCell(corners, options.nothing / scale, exact=True) for corners in beside]
+
+
+def _box(bounds: Bounds) -> Shape:
+    """A box grown a little: one without width would meet nothing."""
+    west, south, east, north = bounds
+    return shapes.box(west - TOLERANCE, south - TOLERANCE, east + TOLERANCE, north + TOLERANCE)

@@ -1,0 +1,127 @@
+"""The elements of the map as look-ups give them: which there are, where each counts, and which one lies at a place."""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeAlias
+
+from scenicq.compiler.occupancy import Layer, Occupancy, Ranked
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, Feature, Index, Node, Select
+from scenicq.geometry import shapes
+from scenicq.geometry.elements import NetworkElement
+from scenicq.geometry.network import Network
+
+__all__ = ["LOOKUPS", "Entry", "Lookups", "Table", "own"]
+
+Entry: TypeAlias = tuple[NetworkElement, "NetworkElement | None", NetworkElement]
+"""An element whose area counts, the one found there, and the one it is found for: at a point once for each of these."""
+
+
+def own(elements: Iterable[NetworkElement]) -> list[Entry]:
+    """Elements that are found in their own area."""
+    return [(element, element, element) for element in elements]
+
+
+def _lane_groups(network: Network) -> list[list[Entry]]:
+    return [[(lane, lane.group, lane) for lane in network.lanes], own(network.laneGroups)]
+
+
+def _roads(network: Network) -> list[list[Entry]]:
+    return [[(lane, lane.road, lane) for lane in network.lanes], own(network.allRoads)]
+
+
+def _elements(network: Network) -> list[list[Entry]]:
+    kinds: tuple[Sequence[NetworkElement], ...] = (
+        network.intersections, network.allRoads, network.lanes, network.shoulders, network.sidewalks,
+        network.crossings,
+    )  # fmt: skip
+    return [own(kind) for kind in kinds]
+
+
+LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[Entry]]]]] = {
+    "laneAt": ("lane", lambda network: [own(network.lanes)]),
+    "laneSectionAt": ("lane", lambda network: [[(s, s, s.lane) for s in network.laneSections]]),
+    "laneGroupAt": ("lane", _lane_groups),
+    "roadAt": ("lane", _roads),
+    "intersectionAt": ("intersection", lambda network: [own(network.intersections)]),
+    "crossingAt": ("crossing", lambda network: [own(network.crossings)]),
+    "sidewalkAt": ("sidewalk", lambda network: [own(network.sidewalks)]),
+    "shoulderAt": ("shoulder", lambda network: [own(network.shoulders)]),
+    "elementAt": ("element", _elements),
+}
+"""The look-ups of the network: which ranks they share, and the elements in the order in which they count."""
+
+
+class Table:
+    """The elements that one look-up may give, and where each lies."""
+
+    def __init__(self, name: str, family: str, layers: list[list[Entry]]) -> None:
+        found = (element for layer in layers for _, element, _ in layer if element is not None)
+        self.family = family
+        self.options: tuple[NetworkElement, ...] = tuple(dict.fromkeys(found))
+        numbers = {element: number for number, element in enumerate(self.options)}
+        nothing = len(self.options)
+
+        def places(layer: list[Entry]) -> Layer:
+            owners = {owner: number for number, owner in enumerate(dict.fromkeys(owner for _, _, owner in layer))}
+            return tuple(
+                (part, nothing if element is None else numbers[element], owners[owner])
+                for area, element, owner in layer
+                for part in shapes.simple_parts([area.polygon])
+            )
+
+        self.occupancy = Occupancy(tuple(places(layer) for layer in layers), nothing, name)
+
+
+class Lookups:
+    """The look-ups of one run of a program: the same one at the same place is the same choice.
+
+    Attributes:
+        tables: By what identifies a look-up.
+        indices: Which option lies at a place, by look-up and place; places are kept so that they stay what they are.
+        ranks: Which of several elements that overlap, by family and place.
+        known: Properties of objects, by index and name: their values, or None for those that are random.
+    """
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self.tables: dict[object, Table] = {}
+        self.indices: dict[tuple[object, object], Node] = {}
+        self.ranks: dict[tuple[str, object], Index] = {}
+        self.known: dict[tuple[int, str], Constant | None] = {}
+        self._kept: list[Node] = []
+
+    def table(self, key: object, name: str, family: str, layers: Callable[[], list[list[Entry]]]) -> Table:
+        """The table of a look-up, made once."""
+        if key not in self.tables:
+            self.tables[key] = Table(name, family, layers())
+        return self.tables[key]
+
+    def index(self, key: object, table: Table, place: Node, span: Span) -> Node:
+        """Which option lies at a random place."""
+        where = (place.object, place.property) if isinstance(place, Feature) else id(place)
+        if (key, where) not in self.indices:
+            self._kept.append(place)
+            self.indices[key, where] = self._make_index(table, place, where, span)
+        return self.indices[key, where]
+
+    def _make_index(self, table: Table, place: Node, where: object, span: Span) -> Node:
+        options = table.occupancy
+        scale = build.constant(float(options.scale), span)
+
+        def number(rank: int) -> Node:
+            angle = DirectionAt(build.constant(Ranked(options, rank), span), place, span=span)
+            return build.arithmetic(ArithmeticOp.MUL, angle, scale, span=span)
+
+        if options.depth == 1:
+            return number(0)
+        rank = self.ranks.setdefault((table.family, where), Index((1.0,) * options.depth, span=span))
+        if len(rank.weights) < options.depth:
+            # more overlap here than the ranks of the family tell apart
+            rank = Index((1.0,) * options.depth, span=span)
+        return Select(rank, tuple(number(n) for n in range(len(rank.weights))), span=span)

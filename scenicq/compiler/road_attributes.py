@@ -1,0 +1,199 @@
+"""Attributes of map elements that Scenic has and datasets' maps don't say: worked out from where things lie.
+
+A lane group's curb, sidewalk and shoulder are those along its right edge; the crossings of a road or an intersection
+those that reach into it. What depends on facts that no map of a dataset holds is an error that says so.
+"""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar, cast
+
+from shapely.geometry import LineString
+
+from scenicq.compiler.environment import Runner
+from scenicq.compiler.values import ModelValue, fail
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.geometry import shapes
+from scenicq.geometry.curbs import right_edges, side_edges
+from scenicq.geometry.elements import (
+    Intersection,
+    Lane,
+    LaneGroup,
+    LaneSection,
+    NetworkElement,
+    PedestrianCrossing,
+    Road,
+    Shoulder,
+    Sidewalk,
+)
+from scenicq.geometry.network import Network
+from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
+from scenicq.geometry.road_direction import along_lines
+from scenicq.geometry.shapes import Shape
+
+__all__ = ["names_worked_out", "worked_out"]
+
+_CURB, _SIDEWALK, _SHOULDER = 5.0, 8.0, 1.0
+"""Metres from a road's right edge within which a curb, sidewalk or shoulder belongs to it."""
+_SHARE = 1.0
+"""Square metres of the strip beside an edge that a sidewalk or shoulder must at least have."""
+_INSIDE = 0.5
+"""Square metres that a crossing must at least share with the road that it belongs to."""
+
+_Element = TypeVar("_Element", bound=NetworkElement)
+_Work = tuple[type, Callable[[Network, Any], ModelValue]]
+
+
+def _lines(lines: Sequence[Shape], name: str) -> ModelValue:
+    own = cast("tuple[LineString, ...]", tuple(lines))
+    return build.constant(PolylineSet(own, name, along_lines(own, name))) if own else None
+
+
+def _edges(group: LaneGroup) -> tuple[LineString, ...]:
+    """The right edge of a group's lanes, as far as it is no border between two of them."""
+    return right_edges(group.lanes, [])
+
+
+def _curb(network: Network, group: LaneGroup) -> ModelValue:
+    edges = _edges(group)
+    if not edges:
+        return None
+    strip = shapes.band(shapes.union_all(edges), _CURB)
+    near = [shapes.intersection(network.roadDirection.forward(curb.line), strip) for curb in network.curbs]
+    own = [part for part in shapes.simple_parts(near) if part.length > 0]
+    # inside intersections maps have none of the kind: what comes near there belongs to other roads
+    crossing = group.road is not None and group.road.intersection is not None
+    along = sum(part.length for part in own) >= 0.5 * sum(edge.length for edge in edges)
+    return _lines(own if along and not crossing else edges, f"curb of {group.id}")
+
+
+def _beside(group: LaneGroup, candidates: Iterable[_Element], reach: float) -> _Element | None:
+    """The element that has most of the strip to the right of a group."""
+    edges = _edges(group)
+    if not edges:
+        return None
+    strip = shapes.difference(shapes.band(shapes.union_all(edges), reach), group.polygon)
+    shares = [(shapes.intersection(each.polygon, strip).area, each) for each in candidates]
+    most, found = max(shares, key=lambda share: share[0], default=(0.0, None))
+    return found if most >= _SHARE else None
+
+
+def _crossings(network: Network, element: NetworkElement) -> tuple[PedestrianCrossing, ...]:
+    own = [
+        crossing
+        for crossing in network.crossings
+        if crossing.properties.get("road") == element.id
+        or shapes.intersection(crossing.polygon, element.polygon).area > _INSIDE
+    ]
+    return tuple(own)
+
+
+def _bike_lane(_: Network, group: LaneGroup) -> Lane | None:
+    others = group.road.lanes if group.road else group.lanes
+    kinds = ((lane, str(lane.properties.get("lane_type", "")).lower()) for lane in others)
+    return next((lane for lane, kind in kinds if kind.startswith(("bike", "biking", "bicycle"))), None)
+
+
+def _sidewalks(network: Network, road: Road) -> tuple[Sidewalk, ...]:
+    found = (_beside(group, network.sidewalks, _SIDEWALK) for group in road.laneGroups)
+    return tuple(dict.fromkeys(each for each in found if each is not None))
+
+
+def _sidewalk_region(network: Network, road: Road) -> ModelValue:
+    own = _sidewalks(network, road)
+    return build.constant(PolygonSet(tuple(each.polygon for each in own), f"sidewalk of {road.id}"))
+
+
+def _side(element: Lane | LaneSection, *, left: bool) -> ModelValue:
+    if element.centerline is None:
+        return None
+    lines = side_edges(element.polygon, element.centerline.lines, left=left)
+    return _lines(lines, f"{'left' if left else 'right'} edge of {element.id}")
+
+
+def _road_of(network: Network, element: NetworkElement) -> Road | None:
+    name = element.properties.get("road")
+    return next((road for road in network.allRoads if road.id == name), None)
+
+
+def _speed_limit(_: Network, element: NetworkElement) -> ModelValue:
+    limit = element.properties.get("speed_limit")
+    return float(limit) if isinstance(limit, int | float) and not isinstance(limit, bool) else None
+
+
+_WORKED_OUT: dict[str, tuple[_Work, ...]] = {
+    "network": ((NetworkElement, lambda network, _: network),),
+    "speedLimit": ((NetworkElement, _speed_limit),),
+    "tags": ((NetworkElement, lambda _, element: frozenset(element.properties.get("tags") or ())),),
+    "leftEdge": tuple((kind, lambda _, lane: _side(lane, left=True)) for kind in (Lane, LaneSection)),
+    "rightEdge": tuple((kind, lambda _, lane: _side(lane, left=False)) for kind in (Lane, LaneSection)),
+    "curb": ((LaneGroup, _curb),),
+    "sidewalk": ((LaneGroup, lambda network, group: _beside(group, network.sidewalks, _SIDEWALK)),),
+    "shoulder": ((LaneGroup, lambda network, group: _beside(group, network.shoulders, _SHOULDER)),),
+    "bikeLane": ((LaneGroup, _bike_lane),),
+    "crossings": ((Road, _crossings), (Intersection, _crossings)),
+    "sidewalks": ((Road, _sidewalks),),
+    "sidewalkRegion": ((Road, _sidewalk_region),),
+    "road": ((Shoulder, _road_of), (Sidewalk, _road_of)),
+    "elements": ((Network, lambda network, _: dict(network.elements)),),
+    "driveOnLeft": ((Network, lambda *_: False),),
+    "tolerance": ((Network, lambda *_: 0.05),),
+}
+"""Attributes by name, for each kind of element that has them; some are also there with an underscore."""
+
+_UNDERSCORED = frozenset({"sidewalk", "shoulder", "bikeLane"})
+_REQUIRED = _UNDERSCORED | {"curb", "leftEdge", "rightEdge"}
+_UNKNOWN: dict[str, tuple[type | tuple[type, ...], str]] = {
+    "signals": ((Road, Intersection), "where traffic signals are"),
+    "isSignalized": (Intersection, "which intersections have traffic signals"),
+    "openDriveID": (LaneSection, "the numbers of lanes in OpenDRIVE"),
+    "startSidewalk": (PedestrianCrossing, "which sidewalks a crossing joins"),
+    "endSidewalk": (PedestrianCrossing, "which sidewalks a crossing joins"),
+    "parent": (PedestrianCrossing, "what a crossing belongs to"),
+    "centerline": ((PedestrianCrossing, Sidewalk, Shoulder), "the centrelines of sidewalks, shoulders and crossings"),
+    "vehicleTypes": (NetworkElement, "which vehicles may use a lane"),
+}
+_REFUSED: dict[str, tuple[type | tuple[type, ...], str]] = {
+    "leftEdge": ((LaneGroup, Road), "use that of its lanes"),
+    "rightEdge": ((LaneGroup, Road), "use that of its lanes, or `curb`"),
+    "sections": (Road, "use the `sections` of its lanes"),
+    "roadSections": (Network, "use `laneSections`"),
+    "sectionAt": (Road, "use `laneSectionAt`"),
+    "shiftLanes": (Road, "use `shiftedBy` of a lane section"),
+}
+
+
+def names_worked_out(value: NetworkElement | Network) -> set[str]:
+    """The attributes that are worked out for a value."""
+    found = {name for name, works in _WORKED_OUT.items() if any(isinstance(value, kind) for kind, _ in works)}
+    return found | {f"_{name}" for name in found & _UNDERSCORED}
+
+
+def worked_out(run: Runner, value: NetworkElement | Network, name: str, span: Span) -> tuple[ModelValue] | None:
+    """An attribute that is worked out, in a tuple of its own; None for any other.
+
+    Raises:
+        ScenarioError: map-lacks, where there is no such element or the map doesn't say; unsupported-construct.
+    """
+    plain = name.removeprefix("_") if name.removeprefix("_") in _UNDERSCORED else name
+    work = next((work for kind, work in _WORKED_OUT.get(plain, ()) if isinstance(value, kind)), None)
+    if work is not None:
+        run.budget.step(span, 50)
+        found = work(run.network, value)
+        if found is None and plain is name and name in _REQUIRED:
+            assert isinstance(value, NetworkElement)
+            raise fail("map-lacks", f"the map has no {name} of {value.name}", span, "not in this map")
+        return (build.constant(found, span) if isinstance(found, Region) else cast(ModelValue, found),)
+    if name in _UNKNOWN and isinstance(value, _UNKNOWN[name][0]):
+        raise fail("map-lacks", f"the map does not say {_UNKNOWN[name][1]}", span, "not in this map",
+                   ("leave out what the program asks of it",))  # fmt: skip
+    if name in _REFUSED and isinstance(value, _REFUSED[name][0]):
+        raise fail("unsupported-construct", f"`{name}` is not supported here", span, "of a whole road",
+                   (_REFUSED[name][1],))  # fmt: skip
+    return None

@@ -1,0 +1,73 @@
+"""What a program knows of its objects although labels observe it: properties that the program sets to known values.
+
+Objects' positions and the like are held by reference, because a label's value takes their place. Where the course of
+the program depends on one, only the program's own value can be meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from scenicq.compiler.builtins import truth
+from scenicq.compiler.environment import Runner
+from scenicq.compiler.values import ModelValue, is_node
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.condition import condition
+from scenicq.forest.nodes import Constant, Node, Value
+from scenicq.forest.walk import features
+
+__all__ = ["decided", "settled"]
+
+
+def settled(run: Runner, value: ModelValue) -> ModelValue:
+    """A value with known properties of objects put in, if that leaves nothing random; else the value itself."""
+    if not is_node(value) or isinstance(value, Constant):
+        return value
+    known = run.lookups.known
+    todo = list(features(value))
+    waiting: set[tuple[int, str]] = set()
+    while todo:
+        key = todo[-1]
+        own = _definition(run, key)
+        if key in known or own is None:
+            todo.pop()
+            continue
+        missing = [other for other in features(own) if other not in known and _definition(run, other) is not None]
+        if missing and key not in waiting:
+            waiting.add(key)
+            todo += missing
+            continue
+        known[key] = _put_in(own, known)
+        todo.pop()
+    return _put_in(value, known) or value
+
+
+def _definition(run: Runner, key: tuple[int, str]) -> Node | None:
+    """What the program says of a property, as far as it is an expression or a plain value."""
+    own = run.objects[key[0]].properties.get(key[1])
+    if is_node(own):
+        return own
+    plain = isinstance(own, int | float | str) and not isinstance(own, bool)
+    return build.constant(own) if plain else None
+
+
+def _put_in(node: Node, known: Mapping[tuple[int, str], Constant | None]) -> Constant | None:
+    """The value of an expression with known properties put in; None if it is random."""
+    given: dict[tuple[int, str], Value] = {}
+    for key in features(node):
+        value = known.get(key)
+        if value is None:
+            return None
+        given[key] = value.value
+    found = condition(node, given)
+    return found if isinstance(found, Constant) else None
+
+
+def decided(run: Runner, value: ModelValue, span: Span) -> bool:
+    """The truth of a condition on which the program's course depends.
+
+    Raises:
+        ScenarioError: random-branch, where it is random.
+    """
+    return truth(settled(run, value), span)

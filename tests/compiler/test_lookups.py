@@ -1,0 +1,228 @@
+"""What lies at a random place: look-ups are drawn, matched and perturbed, and agree with the map itself."""
+
+from __future__ import annotations
+
+import math
+import random
+from functools import cache
+
+import numpy as np
+import pytest
+import shapely
+
+from scenicq.compiler.occupancy import Ranked
+from scenicq.compiler.places import LOOKUPS, Lookups
+from scenicq.forest.improvise import draw_scene
+from scenicq.forest.nodes import Constant, DirectionAt
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.walk import postorder
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.verdict import Match, NoMatch
+from scenicq.smt.solver import open_solver
+from scenicq.store.labels import Label, LabelObject
+
+from .scenes import compiled, network, refused
+
+HEADER = "model scenic.domains.driving.model\n"
+ANY = "ego = new Car facing Range(-180, 180) deg\n"
+PROGRAMS = {
+    "own lane": "ego = new Car\nnew Car on ego.lane\n",
+    "lane to the left": "ego = new Car\nnew Car on ego.laneSection.laneToLeft\n",
+    "other direction": "ego = new Car\nnew Car on ego.oppositeLaneGroup\n",
+    "road": "ego = new Car\nnew Car\nrequire ego.road is ego.lane.road\n",
+    "same lane": f"{ANY}other = new Car facing Range(-180, 180) deg\nrequire ego._lane is other._lane\n",
+    "other lanes": "ego = new Car\nother = new Car\nrequire ego.lane is not other.lane\n",
+    "on through": "ego = new Car\nway = Uniform(*ego.lane.maneuvers)\nnew Car on way.endLane\n",
+    "straight on": (
+        "ego = new Car\nways = filter(lambda m: m.type is ManeuverType.STRAIGHT, ego.lane.maneuvers)\n"
+        "new Car on Uniform(*ways).connectingLane.centerline\n"
+    ),
+    "hidden place": "ego = new Car\nspot = new OrientedPoint on road\nnew Car on network.laneAt(spot)\n",
+    "beside the curb": "ego = new Car\nspot = new OrientedPoint on ego.laneGroup.curb\nnew Car left of spot by 1\n",
+    "sidewalk": "ego = new Car\nnew Pedestrian on ego.laneGroup.sidewalk\n",
+    "crossing": f"{ANY}who = new Pedestrian on crossing\nrequire who.crossing is network.crossings[0]\n",
+    "intersection": f"{ANY}new Car in ego.intersection, facing Range(-180, 180) deg\n",
+    "nowhere": f"{ANY}require ego._lane is None and ego._element is ego._intersection\n",
+    "part of a choice": (
+        "lane = Uniform(*network.lanes)\nego = new Car on lane.centerline\n"
+        "require lane.sectionAt(ego) is ego.laneSection\n"
+    ),
+    "numbers": "ego = new Car\nnew Car at ego offset by (0, ego.lane.centerline.length / 10), facing ego.heading\n",
+}
+
+
+@cache
+def scenario(name: str) -> Scenario:
+    """One of the programs."""
+    return compiled(HEADER + PROGRAMS[name])
+
+
+def label(things: list[tuple[str, float, float, float]]) -> Label:
+    """A label of classes, places and headings, the ego first."""
+    found = [
+        LabelObject(f"object-{number}", category, category, x, y, heading, 2.0, 4.5)
+        for number, (category, x, y, heading) in enumerate(things)
+    ]
+    return Label("frame", "recording", 0, "street", found[0], tuple(found[1:]))
+
+
+def drawn(name: str, seed: int) -> Label:
+    """A scene as a label, its objects in another order and with one that is not part of it."""
+    program = scenario(name)
+    scene = draw_scene(program, random.Random(seed))
+    assert scene is not None
+    things = [
+        (each.category, *scene.values[each.index, "position"], scene.values[each.index, "heading"])  # type: ignore[misc]
+        for each in program.objects
+    ]
+    return label([things[0], ("Car", 300.0, 300.0, 1.0), *reversed(things[1:])])
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_drawn_scene_matches(name: str) -> None:
+    with open_solver("portable") as solver:
+        matcher = Matcher(scenario(name), MatchOptions(), solver)
+        for seed in range(4):
+            verdict = matcher.match(drawn(name, seed))
+            assert isinstance(verdict, Match), (seed, verdict)
+
+
+IN_LANES: dict[str, tuple[float, float, float]] = {
+    "outer": (5.25, 50.0, 0.0),
+    "inner": (1.75, 70.0, 0.0),
+    "oncoming": (-1.75, 60.0, math.pi),
+    "elsewhere": (30.0, -1.75, -math.pi / 2),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "where", "matches"),
+    [
+        ("own lane", "outer", True),
+        ("own lane", "inner", False),
+        ("lane to the left", "inner", True),
+        ("lane to the left", "outer", False),
+        ("other direction", "oncoming", True),
+        ("other direction", "inner", False),
+        ("same lane", "outer", True),
+        ("same lane", "oncoming", False),
+        ("other lanes", "inner", True),
+        ("other lanes", "outer", False),
+        ("on through", "elsewhere", False),
+        ("hidden place", "elsewhere", True),
+    ],
+)
+def test_a_scene_pushed_out_of_its_element_does_not_match(name: str, where: str, matches: bool) -> None:
+    x, y, heading = IN_LANES[where]
+    found = Matcher(scenario(name)).match(label([("Car", 5.25, 20.0, 0.0), ("Car", x, y, heading)]))
+    assert isinstance(found, Match if matches else NoMatch), found
+
+
+def test_every_method_gives_the_same_verdict() -> None:
+    places = [("Car", x, y, heading) for x, y, heading in IN_LANES.values()]
+    with open_solver("portable") as solver:
+        for name in ("own lane", "other lanes", "same lane", "on through"):
+            for place in places:
+                verdicts = {
+                    type(Matcher(scenario(name), MatchOptions(method=method), solver).match(label([places[0], place])))
+                    for method in ("auto", "smt", "monolithic")
+                }
+                assert len(verdicts) == 1, (name, place, verdicts)
+
+
+CROSSED = (1.75, -1.75)
+"""A point of the intersection in several lanes."""
+
+
+def test_overlapping_elements_are_each_allowed_and_one_at_a_time() -> None:
+    here = [lane.id for lane in network().lanes if shapely.intersects(lane.polygon, shapely.Point(CROSSED))]
+    assert len(here) > 1
+    ego = label([("Car", *CROSSED, 0.3)])
+    first, second = (f"require ego.lane is network.elements['{name}']\n" for name in here[:2])
+    for text, verdict in ((first, Match), (second, Match), (first + second, NoMatch)):
+        assert isinstance(Matcher(compiled(HEADER + ANY + text)).match(ego), verdict), text
+    elsewhere = next(lane.id for lane in network().lanes if lane.id not in here)
+    text = f"require ego.lane is network.elements['{elsewhere}']\n"
+    assert isinstance(Matcher(compiled(HEADER + ANY + text)).match(ego), NoMatch)
+    # the road and the section are those of the lane that is meant
+    own = "require ego.road is ego.lane.road\nrequire ego.laneSection.lane is ego.lane\n"
+    assert isinstance(Matcher(compiled(HEADER + ANY + first + own)).match(ego), Match)
+    assert isinstance(
+        Matcher(compiled(HEADER + ANY + first + f"require ego.road.lanes[0] is network.elements['{here[1]}']\n")).match(
+            ego
+        ),
+        NoMatch,
+    )
+
+
+def fields(lookup: str) -> list[Ranked]:
+    """The fields of a look-up at a random place of the street."""
+    program = compiled(f"{HEADER}ego = new Car\nx = network.{lookup}(ego, reject=True)\n")
+    return [
+        node.field.value
+        for requirement in program.requirements
+        for node in postorder((requirement.condition,))
+        if isinstance(node, DirectionAt) and isinstance(node.field, Constant) and isinstance(node.field.value, Ranked)
+    ]
+
+
+@pytest.mark.parametrize("lookup", LOOKUPS)
+def test_cells_hold_every_point_with_its_option(lookup: str) -> None:
+    rng = np.random.default_rng(1)
+    for field in fields(lookup)[:3]:
+        for _ in range(6):
+            west, south = rng.uniform(-15, 12, 2).tolist()
+            bounds = (west, south, west + rng.uniform(0, 6), south + rng.choice([0.0, 5.0]))
+            cells = [(shapely.Polygon(cell.polygon), cell) for cell in field.cells(bounds)]
+            for x, y in rng.uniform(bounds[:2], bounds[2:], (12, 2)).tolist():
+                (value,) = field.values(x, y)
+                assert -math.pi < value <= math.pi
+                here = [cell for shape, cell in cells if shape.distance(shapely.Point(x, y)) < 1e-9]
+                assert any(cell.heading == value for cell in here), (lookup, x, y)
+                assert all(cell.heading == value for cell in here if cell.exact and len(field.options.at(x, y)) == 1)
+
+
+def test_what_is_found_is_what_the_map_says() -> None:
+    lookups = Lookups()
+    for name in ("laneAt", "roadAt", "laneGroupAt", "intersectionAt", "sidewalkAt", "crossingAt", "elementAt"):
+        family, layers = LOOKUPS[name]
+        table = lookups.table(name, name, family, lambda layers=layers: layers(network()))
+        for x, y in np.random.default_rng(2).uniform(-40, 40, (200, 2)).tolist():
+            known = getattr(network(), name)(x, y)
+            found = [(*table.options, None)[number] for number in table.occupancy.at(x, y)]
+            assert known in found or shapely.distance(found[0].polygon, shapely.Point(x, y)) <= 0.05, (name, x, y)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("ego = new Object\nx = ego.lane\n", ("unknown-attribute", "lane")),
+        ("ego = new Car\nif ego.lane.isForward:\n    pass\n", ("random-branch", "ego.lane.isForward")),
+        ("ego = new Car at (500, 500)\nx = ego.lane\n", ("impossible-requirement", "lane")),
+        ("ego = new Car\nx = network.intersections[0].isSignalized\n", ("map-lacks", "isSignalized")),
+        ("ego = new Car\nx = network.roads[0].sections\n", ("unsupported-construct", "sections")),
+        (
+            "ego = new Car\nx = network.nominalDirectionsAt(ego)\n",
+            ("unsupported-construct", "nominalDirectionsAt(ego)"),
+        ),
+        ("ego = new Car\nx = resample(ego.lane)\n", ("wrong-type", "resample(ego.lane)")),
+        ("ego = new Car\nx = network.findPointIn(ego, [1])\n", ("wrong-type", "network.findPointIn(ego, [1])")),
+    ],
+)
+def test_what_is_no_element_is_refused(text: str, expected: tuple[str, str]) -> None:
+    code, place = refused(HEADER + text)
+    assert code == expected[0]
+    assert expected[1] in place
+
+
+def test_the_course_may_depend_on_the_lane_of_a_known_place() -> None:
+    text = (
+        f"{HEADER}ego = new Car at (1.75, 50)\nfor maneuver in ego.lane.maneuvers:\n    new Car on maneuver.endLane\n"
+        "assert ego.lane is network.laneAt((1.75, 60)) and ego._intersection is None\n"
+        "assert ego.laneGroup.laneAt(ego).sectionAt(ego) is ego.laneSection\n"
+        "assert ego.width == 2 and ego.position.y > 40\nfor n in range(int(ego.width)):\n    new Pedestrian\n"
+    )
+    program = compiled(text)
+    assert [each.category for each in program.objects].count("Car") == 1 + len(network().laneAt(1.75, 50).maneuvers)
+    assert [each.category for each in program.objects].count("Pedestrian") == 2

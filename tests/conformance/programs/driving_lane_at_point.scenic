@@ -1,0 +1,3 @@
+model scenic.domains.driving.model
+spot = new Point on road
+ego = new Car on network.laneAt(spot, reject=True)

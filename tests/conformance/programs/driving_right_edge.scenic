@@ -1,0 +1,4 @@
+model scenic.domains.driving.model
+lane = Uniform(*network.lanes)
+ego = new Car on lane.centerline
+new Car at (new OrientedPoint on lane.rightEdge)

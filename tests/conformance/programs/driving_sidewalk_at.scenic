@@ -1,0 +1,3 @@
+model scenic.domains.driving.model
+ego = new Pedestrian on sidewalk
+new Pedestrian on network.sidewalkAt(ego, reject=True)
