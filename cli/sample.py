@@ -11,35 +11,50 @@ from scenicq.query.run import beside, read_program
 from scenicq.query.sample import sample_labels, sample_record, write_sample
 
 from .check import networks_of, read_version
+from .manual import Manual
+from .options import built_ins
 
 __all__ = ["sample"]
 
 
 @click.command(
+    cls=Manual,
+    arguments={
+        "SCENARIO": "A Scenic program, as a file.",
+        "DATASET": "A folder that `scenicq ingest` made, for its map.",
+    },
     epilog="\b\nExamples:\n"
     "  scenicq sample crossing.scenic -n 5 --seed 0\n"
-    "  scenicq sample crossing.scenic dataset -n 100 -o scenes"
+    "  scenicq sample crossing.scenic dataset -n 100 -o scenes",
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path(path_type=Path), required=False)
-@click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON map.")
+@click.argument("dataset", type=click.Path(), required=False)
+@click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
 @click.option("-n", "--number", metavar="N", type=click.IntRange(1), default=1, help="Scenes to draw.")
 @click.option("--seed", metavar="N", type=int, default=0, help="The same seed gives the same scenes.")
+@click.option(
+    "--waive",
+    metavar="LIST",
+    default="",
+    help="Built-in requirements that need not hold: visibility, containment, collision.",
+)
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
               help="Write an interchange folder with labels and map, to be ingested.")  # fmt: skip
-def sample(scenario: Path, dataset: Path | None, *, map_file: Path | None, number: int, seed: int,
-           scenic: str | None, initial: bool, output: Path | None) -> None:  # fmt: skip
+def sample(scenario: Path, dataset: str | None, *, map_file: Path | None, number: int, seed: int,
+           waive: str, scenic: str | None, initial: bool, output: Path | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
 
-    On the first map of the dataset, the map that is given, or else a small built-in street. One line of JSON a scene.
+    They have the distribution of the program, given that all requirements hold, those that Scenic adds included. On
+    the first map of the dataset, the map that is given, the one that the program names with `param map =
+    localPath('FILE')`, or else a small built-in street. One line of JSON a scene.
     """
     source = read_program(scenario)
-    network = next(networks_of(dataset, map_file))
     version = read_version(scenic)
+    network = next(networks_of(dataset, map_file, scenario, version))
     compiled = compile_scenario(source, network, version=version, initial=initial, loader=beside(scenario))
-    labels = sample_labels(compiled, number, seed)
+    labels = sample_labels(compiled, number, seed, built_ins(waive))
     if output is not None:
         write_sample(labels, network, scenario.stem, output)
         return

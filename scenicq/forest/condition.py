@@ -73,7 +73,10 @@ def condition(
     def step(node: Node) -> Node:
         if is_leaf(node):
             leaf = cast(Leaf, node)
-            return Constant(given[leaf.identity], span=node.span) if leaf.identity in given else node
+            if leaf.identity in given:
+                return Constant(given[leaf.identity], span=node.span)
+            # a distribution over what is not there has no value either
+            return next((part for part in children(leaf) if _is_undefined(part)), node)
         if isinstance(node, Constant):
             return node
         if isinstance(node, Feature):
@@ -89,6 +92,8 @@ def _fold(node: Node) -> Node:
     if isinstance(node, Select) and isinstance(node.index, Constant):
         picked = node.index.value
         return Constant(picked) if isinstance(picked, Undefined) else node.options[int(cast(float, picked))]
+    if isinstance(node, Select) and isinstance(node.index, Index) and _all_same(node.options):
+        return node.options[0]
     if isinstance(node, Logic) and node.op is not LogicOp.NOT:
         return _fold_logic(node)
     if not all(isinstance(child, Constant) for child in below):
@@ -97,6 +102,21 @@ def _fold(node: Node) -> Node:
     if isinstance(node, DirectionAt):
         return _fold_direction(node, args)
     return Constant(compute(node, args), span=node.span)
+
+
+def _is_undefined(node: Node) -> bool:
+    return isinstance(node, Constant) and isinstance(node.value, Undefined)
+
+
+def _all_same(options: tuple[Node, ...]) -> bool:
+    first = options[0]
+    if not isinstance(first, Constant):
+        return all(option is first for option in options)
+    kind, value = type(first.value), first.value
+    return all(
+        option is first or (isinstance(option, Constant) and type(option.value) is kind and option.value == value)
+        for option in options
+    )
 
 
 def _fold_logic(node: Logic) -> Node:

@@ -1,37 +1,31 @@
-"""Drawing scenes from a scenario: the improviser of the language paper (section 5.4), by rejection."""
+"""Drawing scenes from a scenario: the improviser of the language paper (section 5.4), by rejection with pruning.
+
+Scenes come with the distribution of the program: that of its random variables, given that every requirement holds. A
+requirement of probability p below 1 is in force in a share p of the scenes. What makes rejection quick keeps the
+distribution: conditions are tested as soon as they can be, independent parts are drawn apart (`tape`), and random
+points are not drawn where conditions exclude them (`containers`, `windows`).
+"""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import cast
+from collections import Counter
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, replace
 
+from scenicq.forest.assemble import Check, assemble
 from scenicq.forest.compute import CannotEvaluate
-from scenicq.forest.evaluate import evaluate
-from scenicq.forest.nodes import (
-    DirectionAt,
-    DiscreteRange,
-    Identity,
-    Index,
-    Leaf,
-    Node,
-    Normal,
-    PointIn,
-    Range,
-    TruncatedNormal,
-    Undefined,
-    Value,
-)
+from scenicq.forest.containers import shrink_regions
+from scenicq.forest.nodes import Constant, Encloses, Identity, Undefined, Value
 from scenicq.forest.scenario import BuiltIn, Scenario
-from scenicq.forest.walk import children, features, leaves
-from scenicq.geometry.regions import Region
-from scenicq.geometry.sampling import sample
+from scenicq.forest.tape import Tape, lay_out
+from scenicq.forest.windows import Window, close_points
 
-__all__ = ["Draw", "Scene", "draw_scene"]
+__all__ = ["Improviser", "Scene", "draw_scene"]
 
-_MOST_DRAWS = 1000
-"""Draws of a truncated normal before its interval counts as out of reach."""
+_ALL = frozenset(BuiltIn)
+_PATIENCE = 30
+"""Boxes that stick out of their container before the regions that they stand in are cut to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,166 +41,141 @@ class Scene:
     params: Mapping[str, Value]
 
 
-class Draw:
-    """Values of random variables, drawn when first asked for."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plan:
+    """A tape with the condition that each step tests, and the conditions that no scene meets."""
 
-    def __init__(self, rng: random.Random) -> None:
-        """Take the source of randomness."""
-        self.rng = rng
-        self.values: dict[Identity, Value] = {}
-        self._picked: dict[int, float] = {}
-
-    def __call__(self, leaf: Leaf, args: tuple[Value, ...]) -> Value:
-        """The value of a random variable, given its distribution's parameters."""
-        if leaf.identity not in self.values:
-            undefined = next((arg for arg in args if isinstance(arg, Undefined)), None)
-            self.values[leaf.identity] = self._draw(leaf, args) if undefined is None else undefined
-        return self.values[leaf.identity]
-
-    def _draw(self, leaf: Leaf, args: tuple[Value, ...]) -> Value:
-        numbers = cast("tuple[float, ...]", args)
-        match leaf:
-            case Range():
-                return self.rng.uniform(*numbers)
-            case Normal():
-                return self.rng.gauss(*numbers)
-            case TruncatedNormal():
-                mean, deviation, low, high = numbers
-                for _ in range(_MOST_DRAWS):
-                    value = self.rng.gauss(mean, deviation)
-                    if low <= value <= high:
-                        return value
-                return Undefined("a truncated normal far outside of its interval")
-            case DiscreteRange():
-                return float(self.rng.randint(int(numbers[0]), int(numbers[1])))
-            case Index():
-                return float(self.rng.choices(range(len(leaf.weights)), leaf.weights)[0])
-            case PointIn():
-                try:
-                    return sample(cast(Region, args[0]), self.rng)
-                except ValueError:
-                    return Undefined("an empty region")
-
-    def choose(self, node: DirectionAt, allowed: tuple[float, ...]) -> float:
-        """One of several directions, the same one for every reference to one use of a field."""
-        return self._picked.setdefault(id(node), self.rng.choice(allowed))
+    tape: Tape
+    tested: tuple[int | None, ...]
+    impossible: tuple[int, ...]
 
 
-def draw_scene(scenario: Scenario, rng: random.Random, attempts: int = 1000) -> Scene | None:
-    """A scene that satisfies every hard requirement, or None if none came up: acceptance is then below 1 in `attempts`.
+class Improviser:
+    """Draws scenes from a scenario, one after the other.
 
-    What fails is drawn again by itself, the rest is kept: any scene of the support will do. For the same reason soft
-    requirements are ignored. Mutation noise is not added.
+    Attributes:
+        checks: The conditions.
+        rejected: How often each condition was not met so far, by its index in `checks`.
+    """
+
+    def __init__(self, scenario: Scenario, enforce: Set[BuiltIn] = _ALL, *, prune: bool = True) -> None:
+        """Prepare to draw.
+
+        Args:
+            scenario: The scenario.
+            enforce: The built-in requirements in force.
+            prune: Whether random points are kept from where conditions exclude them; scenes are the same without.
+        """
+        parts = assemble(scenario, enforce)
+        self.checks = parts.checks
+        self.rejected: Counter[int] = Counter()
+        self._keys, self._params = tuple(parts.values), tuple(parts.params)
+        conditions = (check.condition for check in parts.checks)
+        self._roots = (*conditions, *parts.values.values(), *parts.params.values())
+        self._prune, self._shrunk = prune, False
+        self._plan = self._planned()
+
+    def draw(self, rng: random.Random, attempts: int) -> Scene | None:
+        """A scene, or None where more than `attempts` conditions failed on the way (`rejected` says which).
+
+        Args:
+            rng: Source of randomness; the same scenes come from the same state of it and of the improviser.
+            attempts: Failures to endure.
+        """
+        # once a scene, not once an attempt: the requirement then holds in a share p of the scenes, or more
+        waived = {
+            number for number, check in enumerate(self.checks)
+            if check.probability < 1.0 and rng.random() >= check.probability
+        }  # fmt: skip
+        values, place, failures = self._blank(), 0, 0
+        while place < len(self._plan.tape.steps):
+            if self._plan.impossible:
+                self.rejected.update(self._plan.impossible)
+                return None
+            number = self._plan.tested[place]
+            if self._step(place, values, rng) or number in waived:
+                place += 1
+                continue
+            failures += 1
+            if failures > attempts:
+                return None
+            place = self._plan.tape.restarts[place]
+            if number is not None:
+                self.rejected[number] += 1
+                if self._prune and not self._shrunk and self._contained_failures() >= _PATIENCE:
+                    self._shrunk, place = True, 0
+                    self._plan = self._planned()
+                    values = self._blank()
+        found = [values[slot] for slot in self._plan.tape.places]
+        count = len(self._keys)
+        return Scene(
+            dict(zip(self._keys, found[:count], strict=True)), dict(zip(self._params, found[count:], strict=True))
+        )
+
+    def _step(self, place: int, values: list[Value], rng: random.Random) -> bool:
+        try:
+            return self._plan.tape.steps[place].run(values, rng)
+        except CannotEvaluate:
+            return False
+
+    def _blank(self) -> list[Value]:
+        tape = self._plan.tape
+        return [tape.constants.get(slot) for slot in range(tape.slots)]
+
+    def _contained_failures(self) -> int:
+        return sum(
+            times for number, times in self.rejected.items() if isinstance(self.checks[number].condition, Encloses)
+        )
+
+    def _planned(self) -> _Plan:
+        roots, barren = self._roots, ()
+        windows: dict[Identity, Window] = {}
+        hard = [check.probability == 1.0 and not check.defined for check in self.checks]
+        if self._shrunk:
+            roots, barren = shrink_regions(roots, hard)
+        if self._prune:
+            roots, windows = close_points([root for root, sure in zip(roots, hard, strict=False) if sure], roots)
+        checks = [replace(check, condition=root) for check, root in zip(self.checks, roots, strict=False)]
+        false = (number for number, check in enumerate(checks) if check.probability == 1.0 and _never(check))
+        numbers = {id(check): number for number, check in enumerate(checks)}
+        tape = lay_out(roots[len(checks) :], checks, windows)
+        tested = tuple(None if check is None else numbers[id(check)] for check in tape.checks())
+        return _Plan(tape, tested, (*barren, *false))
+
+    @property
+    def impossible(self) -> Check | None:
+        """A condition that no scene meets, as far as that is known."""
+        return next((self.checks[number] for number in self._plan.impossible), None)
+
+    def times_rejected(self) -> list[tuple[Check, int]]:
+        """How often each requirement was not met so far, the most frequent first."""
+        sums: Counter[int] = Counter()
+        for number, times in self.rejected.items():
+            sums[self.checks[number].source] += times
+        first = {check.source: check for check in reversed(self.checks)}
+        return [(first[source], times) for source, times in sums.most_common()]
+
+
+def _never(check: Check) -> bool:
+    """Whether a condition is known to fail."""
+    if not isinstance(check.condition, Constant):
+        return False
+    value = check.condition.value
+    return isinstance(value, Undefined) or not (check.defined or bool(value))
+
+
+def draw_scene(
+    scenario: Scenario,
+    rng: random.Random,
+    attempts: int = 1000,
+    enforce: Set[BuiltIn] = frozenset({BuiltIn.VISIBILITY}),
+) -> Scene | None:
+    """A scene that satisfies every hard requirement, or None if none came up; see `Improviser` for many scenes.
 
     Args:
         scenario: The scenario.
         rng: Source of randomness.
-        attempts: Scenes to try.
+        attempts: Failures to endure.
+        enforce: The built-in requirements in force; by default those that matching enforces.
     """
-    order = _order(scenario)
-    depends = _dependencies(order, scenario)
-    draw = Draw(rng)
-    conditions = [
-        requirement.condition
-        for requirement in scenario.requirements
-        if requirement.built_in in (None, BuiltIn.VISIBILITY)
-    ]
-    for attempt in range(attempts):
-        scene = _attempt(scenario, order, conditions, draw)
-        if isinstance(scene, Scene):
-            return scene
-        if scene is None or attempt % _PATIENCE == _PATIENCE - 1:
-            draw.values.clear()
-        else:
-            _forget(draw, scene, depends)
-    return None
-
-
-_PATIENCE = 40
-"""Attempts at mending a scene before all of it is drawn anew."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Dependencies:
-    """What depends on which random variables.
-
-    Attributes:
-        keys: The random variables that each feature depends on.
-        leaves: The random variables that the distribution of each one depends on.
-    """
-
-    keys: Mapping[tuple[int, str], frozenset[Identity]]
-    leaves: Mapping[Identity, frozenset[Identity]]
-
-    def of(self, node: Node) -> frozenset[Identity]:
-        """The random variables that an expression depends on."""
-        own = frozenset(leaf.identity for leaf in leaves(node))
-        return own.union(*(self.keys[key] for key in features(node)))
-
-
-def _dependencies(order: Iterable[tuple[tuple[int, str], Node]], scenario: Scenario) -> _Dependencies:
-    found = _Dependencies({}, {})
-    nodes = [(key, node) for key, node in order]
-    nodes += [(None, requirement.condition) for requirement in scenario.requirements]
-    for key, node in nodes:
-        if key is not None:
-            cast("dict[tuple[int, str], frozenset[Identity]]", found.keys)[key] = found.of(node)
-        for leaf in leaves(node):
-            parameters = frozenset[Identity]().union(*(found.of(child) for child in children(leaf)))
-            cast("dict[Identity, frozenset[Identity]]", found.leaves)[leaf.identity] = parameters
-    return found
-
-
-def _forget(draw: Draw, failed: Node, depends: _Dependencies) -> None:
-    """Forget some of the values that a failed expression depends on, and all that was drawn with their help."""
-    candidates = sorted(depends.of(failed), key=list(draw.values).index) if draw.values else []
-    candidates = [identity for identity in candidates if identity in draw.values]
-    if not candidates:
-        draw.values.clear()
-        return
-    void = {identity for identity in candidates if isinstance(draw.values[identity], Undefined)}
-    gone = void.union(*(depends.leaves[identity] for identity in void))
-    # what was drawn late disturbs least; now and then more goes
-    start = max(0, len(candidates) - 1 - int(draw.rng.expovariate(0.7)))
-    gone |= set() if void else set(candidates[start:])
-    for identity in list(draw.values):
-        if identity in gone or gone & depends.leaves.get(identity, frozenset()):
-            gone.add(identity)
-            del draw.values[identity]
-
-
-def _order(scenario: Scenario) -> list[tuple[tuple[int, str], Node]]:
-    """Properties in an order in which each comes after those it refers to."""
-    pending = {
-        (thing.index, name): given.value for thing in scenario.objects for name, given in thing.properties.items()
-    }
-    needs = {key: features(node) for key, node in pending.items()}
-    order: list[tuple[tuple[int, str], Node]] = []
-    done: set[tuple[int, str]] = set()
-    while pending:
-        ready = [key for key in pending if needs[key] <= done]
-        assert ready, "properties depend on each other"
-        for key in ready:
-            order.append((key, pending.pop(key)))
-            done.add(key)
-    return order
-
-
-def _attempt(
-    scenario: Scenario, order: Iterable[tuple[tuple[int, str], Node]], conditions: Iterable[Node], draw: Draw
-) -> Scene | Node | None:
-    """A scene, or the expression that failed, or None where nothing can be told."""
-    values: dict[tuple[int, str], Value] = {}
-    try:
-        for key, node in order:
-            values[key] = evaluate(node, draw, values, draw.choose)
-            if key[1] in ("position", "heading") and isinstance(values[key], Undefined):
-                return node
-        for condition in conditions:
-            held = evaluate(condition, draw, values, draw.choose)
-            if isinstance(held, Undefined) or not held:
-                return condition
-        params = {name: evaluate(given.value, draw, values, draw.choose) for name, given in scenario.params.items()}
-    except CannotEvaluate:
-        return None
-    return Scene(values, params)
+    return Improviser(scenario, enforce).draw(rng, attempts)

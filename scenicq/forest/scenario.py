@@ -44,7 +44,7 @@ class ScenarioObject:
         name: The variable that the program gives it, else `Class#n` in program order.
         category: Its class in the class tree.
         properties: Its properties by name.
-        mutated: Whether noise of unbounded support is added to position and heading at the end.
+        mutated: The properties (position, heading) to which noise of unbounded support is added at the end.
         span: The expression that creates it.
     """
 
@@ -52,7 +52,7 @@ class ScenarioObject:
     name: str
     category: str
     properties: Mapping[str, Property]
-    mutated: bool
+    mutated: frozenset[str]
     span: Span | None
 
 
@@ -65,12 +65,14 @@ class Requirement:
         span: Where the program says it.
         built_in: Which built-in requirement it is; None if the author wrote it.
         objects: Indices of the objects that a built-in requirement is about.
+        probability: With which it must hold: below 1 it excludes nothing.
     """
 
     condition: Node
     span: Span | None
     built_in: BuiltIn | None = None
     objects: tuple[int, ...] = ()
+    probability: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +89,7 @@ class Scenario:
         params: Global parameters with the places that set them.
         solid: Indices of the objects that do not allow collisions: no two of their boxes may overlap (requirements of
             all pairs are made only where they are enforced: there are many).
-        soft: Places of requirements with a probability below 1, which exclude nothing.
+        soft: Requirements with a probability below 1, which exclude nothing.
         ignored: Dynamic parts that were left out.
         warnings: What the author should know.
     """
@@ -100,6 +102,6 @@ class Scenario:
     requirements: tuple[Requirement, ...]
     params: Mapping[str, Property]
     solid: tuple[int, ...] = ()
-    soft: tuple[Span, ...] = ()
+    soft: tuple[Requirement, ...] = ()
     ignored: tuple[Diagnostic, ...] = ()
     warnings: tuple[Diagnostic, ...] = field(default=())

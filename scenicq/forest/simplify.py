@@ -22,7 +22,8 @@ __all__ = ["simplify"]
 
 def _roots(scenario: Scenario) -> list[Node]:
     found = [given.value for thing in scenario.objects for given in thing.properties.values()]
-    return [*found, *(each.condition for each in scenario.requirements), *(p.value for p in scenario.params.values())]
+    found += [each.condition for each in (*scenario.requirements, *scenario.soft)]
+    return [*found, *(p.value for p in scenario.params.values())]
 
 
 def _merged(regions: list[Region]) -> Region:
@@ -61,6 +62,9 @@ def _rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
         replace(thing, properties={name: replace(p, value=change(p.value)) for name, p in thing.properties.items()})
         for thing in scenario.objects
     )
-    requirements = tuple(replace(each, condition=change(each.condition)) for each in scenario.requirements)
+    requirements, soft = (
+        tuple(replace(each, condition=change(each.condition)) for each in conditions)
+        for conditions in (scenario.requirements, scenario.soft)
+    )
     params = {name: replace(p, value=change(p.value)) for name, p in scenario.params.items()}
-    return replace(scenario, objects=objects, requirements=requirements, params=params)
+    return replace(scenario, objects=objects, requirements=requirements, soft=soft, params=params)

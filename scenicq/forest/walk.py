@@ -164,6 +164,8 @@ def postorder(roots: Iterable[Node]) -> Iterator[Node]:
 def transform(root: Node, step: Callable[[Node], Node], memo: dict[int, Node] | None = None) -> Node:
     """Rebuild an expression bottom-up, applying `step` to each node over its transformed children.
 
+    Of a choice whose index has become known, or one of a few known numbers, only the options in question are visited.
+
     Args:
         root: The expression.
         step: Called once a node, with children already transformed.
@@ -176,6 +178,25 @@ def transform(root: Node, step: Callable[[Node], Node], memo: dict[int, Node] | 
         node, expanded = stack.pop()
         if id(node) in memo:
             continue
+        if isinstance(node, Select):
+            if id(node.index) not in memo:
+                stack += [(node, True), (node.index, False)]
+                continue
+            index = memo[id(node.index)]
+            numbers = _known_numbers(index)
+            wanted = node.options if numbers is None else tuple(node.options[number] for number in numbers)
+            missing = [(option, False) for option in wanted if id(option) not in memo]
+            if missing:
+                stack += [(node, True), *missing]
+                continue
+            chosen = tuple(memo[id(option)] for option in wanted)
+            if numbers is None:
+                memo[id(node)] = step(rebuild(node, (index, *chosen)))
+            elif isinstance(index, Select):
+                memo[id(node)] = step(Select(index.index, chosen, span=node.span))
+            else:
+                memo[id(node)] = chosen[0]
+            continue
         below = children(node)
         if not expanded and below:
             stack.append((node, True))
@@ -183,6 +204,15 @@ def transform(root: Node, step: Callable[[Node], Node], memo: dict[int, Node] | 
         else:
             memo[id(node)] = step(rebuild(node, tuple(memo[id(child)] for child in below)))
     return memo[id(root)]
+
+
+def _known_numbers(index: Node) -> list[int] | None:
+    """The numbers that the index of a choice may have, where these are all known and one variable says which."""
+    options = index.options if isinstance(index, Select) else (index,)
+    numbers = [option.value for option in options if isinstance(option, Constant)]
+    if len(numbers) < len(options) or not all(isinstance(number, float) for number in numbers):
+        return None
+    return [int(number) for number in numbers if isinstance(number, float)]
 
 
 def leaves(*roots: Node) -> tuple[Leaf, ...]:
