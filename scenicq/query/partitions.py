@@ -1,26 +1,27 @@
 """Running a query piece by piece: partitions, their files, and putting them together.
 
-A partition is a run of recordings, so the pieces of a dataset are the same for everybody who asks for the same number.
-Each finished piece is one file, written under a temporary name and renamed; whoever runs again does what is missing.
-Any launcher will do: a loop, xargs, an array of cluster jobs.
+A partition is a run of recordings in the order of a query, so the pieces of a dataset are the same for everybody who
+asks for the same number. Each finished piece is one file, written under a temporary name and renamed; whoever runs
+again does what is missing. Any launcher will do: a loop, xargs, an array of cluster jobs.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.results import Funnel
-from scenicq.query.run import QueryOptions
+from scenicq.query.run import QueryOptions, Stretch
 from scenicq.store.dataset import Dataset
-from scenicq.store.manifest import Counts
 
 __all__ = ["Gathered", "Partition", "fingerprint", "gather", "is_done", "partitions", "write_partition"]
 
@@ -32,38 +33,44 @@ class Partition:
     Attributes:
         number: From 0.
         count: How many pieces there are.
-        first, last: Its first and last recording, in order of their names; the same name for one recording.
-        frames: How many frames it holds.
+        recordings: Its recordings of each map.
     """
 
     number: int
     count: int
-    first: str
-    last: str
-    frames: int
+    recordings: Mapping[str, Stretch]
 
     @property
-    def recordings(self) -> tuple[str, str]:
-        """First and last recording."""
-        return (self.first, self.last)
+    def frames(self) -> int:
+        """How many frames it holds."""
+        return sum(stretch.frames for stretch in self.recordings.values())
 
 
 def partitions(dataset: Dataset, count: int) -> tuple[Partition, ...]:
-    """At most `count` pieces of about the same number of frames; fewer where the dataset has fewer recordings."""
-    by_recording: Mapping[str, Counts] = dataset.manifest.by_recording
-    names = sorted(by_recording)
-    total = sum(by_recording[name].frames for name in names)
+    """At most `count` pieces of about the same number of frames; fewer where the dataset has fewer recordings.
+
+    One after the other they hold the frames in the order in which a query finds them: map by map.
+    """
+    with contextlib.closing(dataset.connect()) as connection:
+        rows = connection.execute("SELECT map, recording, count(*) FROM labels GROUP BY ALL").fetchall()
+    runs: list[tuple[str, str, int]] = sorted(rows)
+    total = sum(frames for *_, frames in runs)
     cuts = [0]
     seen = 0
-    for number, name in enumerate(names, 1):
-        seen += by_recording[name].frames
-        if seen * count >= total * len(cuts) or number == len(names):
+    for number, (*_, frames) in enumerate(runs, 1):
+        seen += frames
+        if seen * count >= total * len(cuts) or number == len(runs):
             cuts.append(number)
-    pieces = [names[low:high] for low, high in pairwise(cuts) if high > low]
-    return tuple(
-        Partition(i, len(pieces), piece[0], piece[-1], sum(by_recording[name].frames for name in piece))
-        for i, piece in enumerate(pieces)
-    )
+    pieces = [runs[low:high] for low, high in pairwise(cuts) if high > low]
+    return tuple(Partition(number, len(pieces), _stretches(piece)) for number, piece in enumerate(pieces))
+
+
+def _stretches(runs: Sequence[tuple[str, str, int]]) -> dict[str, Stretch]:
+    found: dict[str, Stretch] = {}
+    for name, group in groupby(runs, key=itemgetter(0)):
+        inside = list(group)
+        found[name] = Stretch(inside[0][1], inside[-1][1], sum(frames for *_, frames in inside))
+    return found
 
 
 def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
@@ -129,10 +136,12 @@ class Gathered:
     """The pieces of one question, put together.
 
     Attributes:
+        question: Its fingerprint.
         files: Their files, in order.
         funnel: Their counts, added up.
     """
 
+    question: str
     files: tuple[Path, ...]
     funnel: Funnel
 
@@ -184,7 +193,7 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
     total = Funnel()
     for path in found:
         _add(total, _lines(path)[-1]["funnel"])
-    return Gathered(tuple(found), total)
+    return Gathered(chosen, tuple(found), total)
 
 
 def _add(total: Funnel, counts: Mapping[str, Any]) -> None:

@@ -6,19 +6,21 @@ nothing: every connection is an in-memory database with views over the manifest'
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import duckdb
+import numpy as np
 
-from scenicq.errors import DataError, Diagnostic
+from scenicq.errors import DataError, Diagnostic, ScenicqError
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.store.frame_index import find_rows
 from scenicq.store.labels import Label
-from scenicq.store.manifest import Manifest, Part, read_manifest
+from scenicq.store.manifest import Manifest, read_manifest
+from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
 from scenicq.store.sql import sql_text
@@ -31,22 +33,53 @@ class Dataset:
     """An opened dataset.
 
     Attributes:
-        path: Its folder.
+        place: Where its files are.
         manifest: What `dataset.json` says.
     """
 
-    path: Path
+    place: Place
     manifest: Manifest
+
+    @property
+    def name(self) -> str:
+        """Its path or address, as the user gave it."""
+        return self.place.name
+
+    @property
+    def address(self) -> str:
+        """What opens the dataset in any process that sees the same files."""
+        return self.place.address
+
+    @property
+    def folder(self) -> Path | None:
+        """Its folder, if it is on this machine."""
+        return self.place.path if isinstance(self.place, LocalFolder) else None
+
+    @property
+    def path(self) -> Path:
+        """Its folder.
+
+        Raises:
+            DataError: option-invalid: it is not on this machine.
+        """
+        if self.folder is None:
+            message = f"{self.name} can only be read: this needs a dataset on this machine"
+            raise DataError(Diagnostic("option-invalid", message))
+        return self.folder
+
+    def release(self) -> None:
+        """Let writers remove the files of this version once there is a newer one."""
+        if isinstance(self.place, LocalFolder):
+            self.place.release()
 
     @property
     def maps(self) -> tuple[str, ...]:
         """Names of the maps, sorted; also of those that labels name but the source has not."""
         return tuple(sorted({*self.manifest.maps, *self.manifest.by_map}))
 
-    def files(self, table: str) -> tuple[Path, ...]:
-        """Absolute paths of a table's Parquet files, in the order of their rows."""
-        root = self.path.resolve()
-        return tuple(root / part.path for part in self.manifest.tables[table])
+    def files(self, table: str) -> tuple[StoreFile, ...]:
+        """A table's Parquet files, in the order of their rows; absolute paths where they are on this machine."""
+        return tuple(map(self.place.file, self.manifest.tables[table]))
 
     def connect(self, *, threads: int | None = None, memory_limit: str | None = None) -> duckdb.DuckDBPyConnection:
         """An in-memory DuckDB with one view a table, that can read the dataset's files and nothing else.
@@ -64,6 +97,7 @@ class Dataset:
         if memory_limit is not None:
             config["memory_limit"] = memory_limit
         connection = duckdb.connect(":memory:", config=config)
+        self.place.admit(connection, (part for parts in self.manifest.tables.values() for part in parts))
         every: list[str] = []
         for table in self.manifest.tables:
             paths = [str(path) for path in self.files(table)]
@@ -75,7 +109,8 @@ class Dataset:
 
     def features(self, map_name: str) -> tuple[MapFeature, ...]:
         """The elements of a map in its own order; none where the source has no such map."""
-        return read_features(self.files("regions"), map_name)
+        with self.blamed():
+            return read_features(self.files("regions"), map_name)
 
     def network(self, map_name: str) -> Network:
         """The road network of a map; empty where the source has no such map."""
@@ -91,8 +126,44 @@ class Dataset:
         """
         wanted = None if frames is None else frozenset(frames)
         parts = list(zip(*(self.files(table) for table in ("labels", "objects", "sensors")), strict=True))
-        rows = None if wanted is None else find_rows(self.files("frame_index"), wanted)
-        return read_labels(parts, rows, wanted)
+        with self.blamed():
+            rows = None if wanted is None else find_rows(self.files("frame_index"), wanted)
+            yield from read_labels(parts, rows, wanted)
+
+    @contextmanager
+    def blamed(self) -> Generator[None]:
+        """Makes what fails because a file has changed say which.
+
+        What decodes a damaged file fails in many ways, and later code in many more; so the files are looked at when
+        something has failed, and only then.
+
+        Raises:
+            DataError: `store-damaged` in place of another error, where a file is not as it was written.
+        """
+        try:
+            yield
+        except ScenicqError:
+            raise
+        except Exception as error:
+            if self.folder is not None:
+                self.verify()
+            elif isinstance(error, (duckdb.Error, OSError, ValueError)):
+                message = f"{self.name} cannot be read: {' '.join(str(error).split())}"
+                hint = f"`scenicq info {self.name} --verify` reads all of it and names the files that have changed"
+                raise DataError(Diagnostic("store-damaged", message, hints=(hint,))) from error
+            raise
+
+    def labels_at(self, part: int, first: int, end: int) -> Iterator[Label]:
+        """Labels of one part, in order.
+
+        Args:
+            part: Number of the part.
+            first: Row of its labels to begin with.
+            end: Row to end before.
+        """
+        labels, objects, sensors = (self.files(table)[part] for table in ("labels", "objects", "sensors"))
+        with self.blamed():
+            yield from read_labels([(labels, objects, sensors)], np.arange(first, end), None)
 
     def verify(self) -> None:
         """Compare every file with its checksum.
@@ -104,42 +175,29 @@ class Dataset:
             Diagnostic("store-damaged", f"{part.path} has changed since it was written")
             for parts in self.manifest.tables.values()
             for part in parts
-            if _checksum(self.path / part.path) != part.sha256
+            if self.place.checksum(part) != part.sha256
         ]
         if problems:
             raise DataError(problems)
 
 
-def open_dataset(path: str | Path) -> Dataset:
-    """Open a dataset folder.
+def open_dataset(address: str | Path) -> Dataset:
+    """Open a dataset.
+
+    Args:
+        address: A folder, or what fsspec understands, such as `s3://bucket/dataset`.
 
     Raises:
-        DataError: `store-missing`, `store-version`, or `store-damaged` where a file is missing or has another size.
+        DataError: `store-missing`, `store-version`, or `store-damaged` where a file is missing or has another size;
+            `option-invalid` where a package for the address is not installed.
     """
-    folder = Path(path)
-    manifest = read_manifest(folder)
-    parts = [part for parts in manifest.tables.values() for part in parts]
-    problems = [problem for part in parts if (problem := _problem(folder, part))]
+    place = find_place(address)
+    manifest = read_manifest(place.name, place.manifest())
+    problems = place.problems(part for parts in manifest.tables.values() for part in parts)
     if problems:
         raise DataError(problems)
-    return Dataset(folder, manifest)
-
-
-def _problem(folder: Path, part: Part) -> Diagnostic | None:
-    try:
-        size = (folder / part.path).stat().st_size
-    except OSError:
-        return Diagnostic("store-damaged", f"{part.path} is missing", hints=("ingest the source again",))
-    if size == part.bytes:
-        return None
-    message = f"{part.path} has {size} bytes, not {part.bytes}"
-    return Diagnostic("store-damaged", message, hints=("ingest the source again",))
+    return Dataset(place, manifest)
 
 
 def _sql_list(texts: Iterable[str]) -> str:
     return "[" + ", ".join(map(sql_text, texts)) + "]"
-
-
-def _checksum(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

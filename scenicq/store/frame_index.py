@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Iterable, Sequence
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowTable
 
 __all__ = ["find_rows", "frame_hashes", "index_rows", "repeated_rows"]
@@ -42,7 +41,7 @@ def repeated_rows(hashes: NDArray[np.uint64]) -> NDArray[np.int64]:
     return np.unique(np.concatenate((order[1:][same], order[:-1][same])))
 
 
-def find_rows(files: Sequence[Path], frames: Collection[str]) -> NDArray[np.int64]:
+def find_rows(files: Sequence[StoreFile], frames: Collection[str]) -> NDArray[np.int64]:
     """Rows of the labels that may be those of some frames, in order: all that are, and hardly any other.
 
     Args:
@@ -52,7 +51,7 @@ def find_rows(files: Sequence[Path], frames: Collection[str]) -> NDArray[np.int6
     wanted = np.sort(frame_hashes(frames))
     found: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
     for path in files if len(wanted) else ():
-        with pq.ParquetFile(path) as file:
+        with open_parquet(path) as file:
             for group in range(file.num_row_groups):
                 statistics = file.metadata.row_group(group).column(0).statistics
                 low, high = np.uint64(statistics.min), np.uint64(statistics.max)

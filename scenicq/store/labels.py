@@ -52,7 +52,8 @@ class Label:
         recording: The series of labels that the frame belongs to.
         timestamp_us: Microseconds.
         map: Name of the map in the dataset.
-        ego: The vehicle that records.
+        ego: The vehicle that records. Where a source has none it is only a point to look from, without a class: it
+            plays no role; see `has_ego`.
         objects: The other annotated objects, in the order of the source.
         params: Global parameters (weather, time of day ...).
         sensors: Path of the sensor file of each channel, as the source gives it.
@@ -66,6 +67,11 @@ class Label:
     objects: tuple[LabelObject, ...] = ()
     params: Mapping[str, str | float | bool] = field(default_factory=dict[str, str | float | bool])
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    @property
+    def has_ego(self) -> bool:
+        """Whether the source has an ego in this frame."""
+        return self.ego.category != ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ Everything but `provenance` is a function of the source alone, so two runs over 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -20,6 +21,8 @@ MANIFEST = "dataset.json"
 """Name of the manifest's file."""
 
 _FORMAT = "scenicq"
+_PLAIN = re.compile(r"[a-z_]+/[A-Za-z0-9][A-Za-z0-9._-]*\.parquet", re.ASCII)
+"""Paths of files: no way out of the dataset, no address, no pattern."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,37 +106,38 @@ class Manifest:
 
 def is_dataset(folder: Path) -> bool:
     """Whether a folder is a dataset of ours, of any version, sound or not."""
+    file = folder / MANIFEST
     try:
-        content = json.loads((folder / MANIFEST).read_bytes())
+        # A pipe would never end.
+        content = json.loads(file.read_bytes()) if file.is_file() else None
     except (OSError, ValueError, RecursionError):
         return False
     return isinstance(content, dict) and cast(dict[str, object], content).get("format") == _FORMAT
 
 
-def read_manifest(folder: Path) -> Manifest:
+def read_manifest(name: str, data: bytes) -> Manifest:
     """Read a dataset's manifest.
+
+    Args:
+        name: Of the dataset, for messages.
+        data: Content of its `dataset.json`.
 
     Raises:
         DataError: `store-missing`, `store-version` or `store-damaged`.
     """
-    path = folder / MANIFEST
+    path = f"{name}/{MANIFEST}"
     try:
-        text = path.read_text(encoding="utf-8")
+        content = json.loads(data.decode())
     except UnicodeDecodeError as error:
         raise _damaged(path, "is not UTF-8 text") from error
-    except OSError as error:
-        hint = "`scenicq ingest SOURCE DATASET` makes a dataset"
-        raise DataError(Diagnostic("store-missing", f"{folder} has no {MANIFEST}", hints=(hint,))) from error
-    try:
-        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise _damaged(path, f"is not JSON: {error}") from error
     if not isinstance(content, dict) or cast(dict[str, object], content).get("format") != _FORMAT:
         hint = "`scenicq ingest SOURCE DATASET` makes a dataset from a source"
-        raise DataError(Diagnostic("store-missing", f"{folder} is not a dataset of scenicq", hints=(hint,)))
+        raise DataError(Diagnostic("store-missing", f"{name} is not a dataset of scenicq", hints=(hint,)))
     fields = cast(dict[str, Any], content)
     if (found := fields.get("schema")) != SCHEMA_VERSION:
-        message = f"{folder} has tables of version {found}; this program reads version {SCHEMA_VERSION}"
+        message = f"{name} has tables of version {found}; this program reads version {SCHEMA_VERSION}"
         raise DataError(Diagnostic("store-version", message, hints=("ingest the source again",)))
     try:
         return _manifest(fields)
@@ -141,15 +145,14 @@ def read_manifest(folder: Path) -> Manifest:
         raise _damaged(path, f"lacks or has an unsound {error}") from error
 
 
-def _damaged(path: Path, what: str) -> DataError:
+def _damaged(path: str, what: str) -> DataError:
     return DataError(Diagnostic("store-damaged", f"{path} {what}", hints=("ingest the source again",)))
 
 
 def _manifest(content: dict[str, Any]) -> Manifest:
     tables = {name: tuple(Part(**part) for part in content["tables"][name]) for name in SCHEMAS}
     for part in (part for parts in tables.values() for part in parts):
-        steps = Path(part.path)
-        if steps.is_absolute() or ".." in steps.parts:
+        if not _PLAIN.fullmatch(part.path):
             raise ValueError(f"path {part.path}")
     span = content["span_us"]
     return Manifest(

@@ -24,16 +24,19 @@ _DISTINCT = ("id", "properties")
 """Columns of texts that hardly repeat: a dictionary of them would only cost."""
 
 
-def part_path(table: str, number: int) -> str:
-    """Path of a part of a table, relative to the dataset."""
-    return f"{table}/part-{number:05}.parquet"
+def part_path(table: str, number: int, sha256: str) -> str:
+    """Path of a part of a table, relative to the dataset.
+
+    Another content has another name, so whoever reads by an old manifest never meets new rows.
+    """
+    return f"{table}/part-{number:05}-{sha256[:12]}.parquet"
 
 
 class TableWriter:
     """Collects rows of a table and writes them in row groups of one size, however they come in."""
 
     def __init__(self, folder: Path, table: str, number: int = 0) -> None:
-        """Open the file `part_path(table, number)` under a temporary name.
+        """Open a file under a temporary name.
 
         Args:
             folder: Of the dataset.
@@ -45,10 +48,9 @@ class TableWriter:
         """
         metadata = {"scenicq_schema": str(SCHEMA_VERSION)} | ({"geo": GEO_METADATA} if table == "regions" else {})
         self._schema = SCHEMAS[table].with_metadata(metadata)
-        self._folder = folder
-        self._path = folder / part_path(table, number)
-        self._temporary = self._path.with_name(f"{self._path.name}.{os.getpid()}.tmp")
-        self._path.parent.mkdir(exist_ok=True)
+        self._folder, self._table, self._number = folder, table, number
+        self._temporary = folder / table / f"part-{number:05}.{os.getpid()}.tmp"
+        self._temporary.parent.mkdir(exist_ok=True)
         self._pending: list[ArrowTable] = []
         self._pending_rows = 0
         self._rows = 0
@@ -79,10 +81,11 @@ class TableWriter:
         with self._temporary.open("rb+") as file:
             os.fsync(file.fileno())
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-        self._temporary.replace(self._path)
-        sync_folder(self._path.parent)
-        relative = self._path.relative_to(self._folder).as_posix()
-        return Part(relative, self._path.stat().st_size, digest, self._rows)
+            size = os.fstat(file.fileno()).st_size
+        relative = part_path(self._table, self._number, digest)
+        self._temporary.replace(self._folder / relative)
+        sync_folder(self._temporary.parent)
+        return Part(relative, size, digest, self._rows)
 
     @property
     def rows(self) -> int:

@@ -2,12 +2,16 @@
 
 `.NAME.partial` belongs to the process that holds its lock, which the system takes away with the process. After a hard
 kill the folder stays, with the segments that were complete, for the next ingest of that target.
+
+A dataset that is there already gets the new files beside its own, which have other names, and then the new manifest in
+one step. Files that the new manifest does not name go when nobody reads the dataset, or else with the next ingest.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
@@ -15,6 +19,7 @@ from typing import IO
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.manifest import is_dataset
 from scenicq.store.parquet import sync_folder
+from scenicq.store.reading import nobody_reads
 
 try:
     import fcntl
@@ -31,13 +36,13 @@ class Partial:
 
     def __init__(self, target: Path) -> None:
         """Name the folders; nothing happens yet."""
-        self.target = target
-        self.folder = target.with_name(f".{target.name}.partial")
-        self._aside = target.with_name(f".{target.name}.replaced")
+        self.target = Path(os.path.realpath(target))
+        self.folder = self.target.with_name(f".{self.target.name}.partial")
+        self._kept: list[Path] = []
         self._lock: IO[bytes] | None = None
 
     def open(self) -> None:
-        """Make or take over the folder, and undo a replacement that was killed in the middle.
+        """Make or take over the folder.
 
         Raises:
             OSError: The place cannot be written.
@@ -50,11 +55,6 @@ class Partial:
         except KeyboardInterrupt:
             self._abandon()
             raise
-        if self._aside.exists():
-            if os.path.lexists(self.target):
-                shutil.rmtree(self._aside)
-            else:
-                self._aside.rename(self.target)
 
     def _locked(self) -> IO[bytes] | None:
         path = self.folder / _LOCK
@@ -95,49 +95,65 @@ class Partial:
             shutil.rmtree(self.folder, ignore_errors=True)
             self._unlock()
 
-    def keep(self, files: set[Path]) -> None:
+    def keep(self, files: Sequence[Path]) -> None:
         """Remove everything but some files.
 
         Args:
-            files: Relative to the folder.
+            files: Relative to the folder; the manifest last.
 
         Raises:
             OSError: The folder cannot be written.
         """
-        for path in sorted(self.folder.rglob("*"), reverse=True):
-            relative = path.relative_to(self.folder)
-            if path.is_dir():
-                with suppress(OSError):
-                    path.rmdir()
-            elif relative not in files and relative != Path(_LOCK):
-                path.unlink()
+        self._kept = list(files)
+        _remove_others(self.folder, {*files, Path(_LOCK)})
 
     def put_in_place(self) -> None:
-        """Give the folder the target's name.
+        """Give the folder the target's name, or its files to the dataset that is there.
 
         Raises:
             OSError: The place cannot be written.
         """
-        if fcntl is None:
-            self._unlock()  # elsewhere a folder with an open file cannot be renamed
-        replaces = self.target.exists()
-        if replaces:
-            self.target.rename(self._aside)
-        try:
+        if os.path.lexists(self.target):
+            self._hand_over()
+        else:
+            if fcntl is None:
+                self._unlock()  # elsewhere a folder with an open file cannot be renamed
             self.folder.rename(self.target)
-        except BaseException:
-            if replaces:
-                self._aside.rename(self.target)
-            raise
-        (self.target / _LOCK).unlink(missing_ok=True)
-        self._unlock()
-        sync_folder(self.target.parent)
-        shutil.rmtree(self._aside, ignore_errors=True)
+            (self.target / _LOCK).unlink(missing_ok=True)
+            self._unlock()
+            sync_folder(self.target.parent)
+
+    def _hand_over(self) -> None:
+        folders = sorted({path.parent for path in self._kept})
+        for name in folders:
+            (self.target / name).mkdir(exist_ok=True)
+        *files, manifest = self._kept
+        for file in files:
+            (self.folder / file).replace(self.target / file)
+        for name in folders:
+            sync_folder(self.target / name)
+        (self.folder / manifest).replace(self.target / manifest)
+        sync_folder(self.target)
+        # the new dataset is complete: what fails from here on is left for the next ingest
+        with suppress(OSError), nobody_reads(self.target) as free:
+            if free:
+                _remove_others(self.target, set(self._kept))
+        self.remove()
 
     def _unlock(self) -> None:
         if self._lock is not None:
             self._lock.close()
             self._lock = None
+
+
+def _remove_others(folder: Path, files: set[Path]) -> None:
+    """Remove everything in a folder but some files, given relative to it."""
+    for path in sorted(folder.rglob("*"), reverse=True):
+        if path.is_dir() and not path.is_symlink():
+            with suppress(OSError):
+                path.rmdir()
+        elif path.relative_to(folder) not in files:
+            path.unlink()
 
 
 def check_target(target: Path, *, force: bool = False, update: bool = False) -> None:

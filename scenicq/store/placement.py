@@ -47,16 +47,24 @@ class MapIndex:
         self._network = Network(name, features)
         self._shapes = np.array([feature.shape for feature in features], dtype=object)
         self._tree = shapely.STRtree(self._shapes)
+        shapely.prepare(self._shapes)
         self._is_lane = np.array([kind == "lane" for kind in self.kinds], dtype=bool)
         self._centerlines = np.array([_centerline(feature) for feature in features], dtype=object)
 
     def memberships(self, xy: NDArray[np.float64]) -> Memberships:
         """Regions within `MEMBERSHIP_RADIUS_M` of positions of shape (n, 2)."""
-        points = np.asarray(shapely.points(xy))
-        point, feature = self._tree.query(points, predicate="dwithin", distance=MEMBERSHIP_RADIUS_M)
+        x, y = np.ascontiguousarray(xy.T)
+        reach = MEMBERSHIP_RADIUS_M
+        point, feature = self._tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach))
         order = np.lexsort((feature, point))
         point, feature = point[order], feature[order]
-        return Memberships(point, feature, _distance(points[point], self._shapes[feature]))
+        # most are inside, which prepared shapes tell at once
+        distance = np.zeros(len(point))
+        outside = np.flatnonzero(~shapely.intersects_xy(self._shapes[feature], x[point], y[point]))
+        points = np.asarray(shapely.points(xy[point[outside]]))
+        distance[outside] = _distance(points, self._shapes[feature[outside]])
+        near = distance <= reach
+        return Memberships(point[near], feature[near], distance[near])
 
     def lanes(self, xy: NDArray[np.float64], near: Memberships) -> ArrowArray:
         """The lane that contains each position; of several, as in intersections, that with the nearest centreline."""

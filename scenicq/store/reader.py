@@ -12,31 +12,32 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from scenicq.store.labels import Label, LabelObject
+from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import ArrowTable
 
-__all__ = ["read_labels"]
+__all__ = ["EGO_COLUMNS", "LABEL_COLUMNS", "OBJECT_COLUMNS", "assemble", "read_labels"]
 
 _BATCH = 2048
-_OBJECT_COLUMNS = ["id", "class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy"]
-_OBJECT_COLUMNS.extend(("track", "attributes"))
-_EGO_COLUMNS = [f"ego_{name}" for name in _OBJECT_COLUMNS[1:]]
+OBJECT_COLUMNS = ["id", "class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy"]
+OBJECT_COLUMNS.extend(("track", "attributes"))
+EGO_COLUMNS = [f"ego_{name}" for name in OBJECT_COLUMNS[1:]]
 _REPEATED = ("class", "track", "recording", "map", "channel", "attributes", "params")
 """Ends of the names of columns with few distinct texts in many rows: decoding each once is several times faster."""
-_LABEL_COLUMNS = ["frame", "recording", "timestamp_us", "map", "params", "object_count", "sensor_count"]
-_LABEL_COLUMNS.extend(("first_object", "first_sensor"))
+LABEL_COLUMNS = ["frame", "recording", "timestamp_us", "map", "params", "object_count", "sensor_count"]
+LABEL_COLUMNS.extend(("first_object", "first_sensor"))
 
 
 def read_labels(
-    parts: Sequence[tuple[Path, Path, Path]], rows: NDArray[np.int64] | None, wanted: Collection[str] | None
+    parts: Sequence[tuple[StoreFile, StoreFile, StoreFile]],
+    rows: NDArray[np.int64] | None,
+    wanted: Collection[str] | None,
 ) -> Iterator[Label]:
     """Labels in the order of the store.
 
@@ -49,7 +50,7 @@ def read_labels(
     for labels, objects, sensors in parts:
         if rows is not None and not len(rows):
             return
-        with _Rows(labels, [*_LABEL_COLUMNS, *_EGO_COLUMNS]) as frame_rows:
+        with _Rows(labels, [*LABEL_COLUMNS, *EGO_COLUMNS]) as frame_rows:
             size = len(frame_rows)
             if rows is None:
                 chosen = np.arange(size)
@@ -58,7 +59,7 @@ def read_labels(
                 chosen, rows = rows[:inside] - first, rows[inside:]
             first += size
             if len(chosen):
-                with _Rows(objects, _OBJECT_COLUMNS) as object_rows, _Rows(sensors, ["channel", "path"]) as sensor_rows:
+                with _Rows(objects, OBJECT_COLUMNS) as object_rows, _Rows(sensors, ["channel", "path"]) as sensor_rows:
                     for start in range(0, len(chosen), _BATCH):
                         table = frame_rows.take(chosen[start : start + _BATCH])
                         if wanted is not None:
@@ -68,7 +69,7 @@ def read_labels(
                             _members(object_rows, table, "object"),
                             _members(sensor_rows, table, "sensor"),
                         )
-                        yield from _labels(table, others, channels)
+                        yield from assemble(table, others, channels)
 
 
 def _members(rows: _Rows, frames: ArrowTable, what: str) -> ArrowTable:
@@ -82,10 +83,10 @@ def _members(rows: _Rows, frames: ArrowTable, what: str) -> ArrowTable:
 class _Rows:
     """The rows of a file as one range of numbers, decoded one row group at a time."""
 
-    def __init__(self, path: Path, columns: list[str]) -> None:
+    def __init__(self, file: StoreFile, columns: list[str]) -> None:
         self._columns = columns
         shared = [name for name in columns if name.endswith(_REPEATED)]
-        self._file = pq.ParquetFile(path, read_dictionary=shared)
+        self._file = open_parquet(file, read_dictionary=shared)
         sizes = [self._file.metadata.row_group(group).num_rows for group in range(self._file.num_row_groups)]
         self._starts = np.cumsum([0, *sizes])
         self._decoded: tuple[int, ArrowTable] | None = None
@@ -117,12 +118,19 @@ class _Rows:
         return self._decoded[1]
 
 
-def _labels(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> Iterator[Label]:
-    others = _objects([_values(objects, name) for name in _OBJECT_COLUMNS])
-    egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in _EGO_COLUMNS)])
+def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> Iterator[Label]:
+    """Labels from rows.
+
+    Args:
+        frames: `LABEL_COLUMNS` and `EGO_COLUMNS` of each label; its counts say how many rows of the others are its own.
+        objects: `OBJECT_COLUMNS`, label by label.
+        sensors: Channels and paths, label by label.
+    """
+    others = _objects([_values(objects, name) for name in OBJECT_COLUMNS])
+    egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)])
     channels = zip(_values(sensors, "channel"), _values(sensors, "path"), strict=True)
     first = 0
-    columns = [_values(frames, name) for name in _LABEL_COLUMNS]
+    columns = [_values(frames, name) for name in LABEL_COLUMNS]
     for ego, (frame, recording, time, map_name, params, count, sensor_count, *_) in zip(
         egos, zip(*columns, strict=True), strict=True
     ):
@@ -158,6 +166,8 @@ def _values(table: ArrowTable, name: str) -> list[Any]:
     """A column as Python values: null becomes None, JSON what it says; equal JSON texts share one value."""
     column: Any = table[name]
     is_json = name.endswith(("attributes", "params"))
+    if is_json and not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
     if pa.types.is_dictionary(column.type):
         values: list[Any] = []
         for chunk in column.chunks:

@@ -42,7 +42,8 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
     """
     before = dataset.manifest
     segments = read_segments(dataset.path)
-    if sorted(segments) != list(range(len(before.tables["labels"]))):
+    labels = tuple(segments[number].part("labels", number) for number in sorted(segments))
+    if labels != before.tables["labels"]:
         message = f"{dataset.path} lacks descriptions of its parts"
         raise DataError(Diagnostic("store-damaged", message, hints=("ingest the source again",)))
     maps = {name: dataset.features(name) for name in before.maps}
@@ -50,7 +51,10 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
     with DatasetWriter(dataset.path, maps, update=True) as writer:
         try:
             for number, old in segments.items():
-                files = (dataset.files(table)[number] for table in ("labels", "objects", "sensors"))
+                files = (
+                    dataset.path.resolve() / before.tables[table][number].path
+                    for table in ("labels", "objects", "sensors")
+                )
                 part = SegmentWriter(writer.folder, number)
                 try:
                     part.open()
@@ -65,6 +69,7 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
                     part.abandon()
         except OSError as error:
             raise writer.unwritable(error) from error
+        dataset.release()
         return writer.finish(
             name=before.name, importer=before.importer, left_out=before.left_out, provenance=before.provenance
         )

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 import shapely
 
 from scenicq.geometry.features import MapFeature, names
+from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowTable
 
 __all__ = ["GEO_METADATA", "lane_rows", "read_features", "region_rows"]
@@ -65,11 +64,12 @@ def lane_rows(maps: Mapping[str, Sequence[MapFeature]]) -> ArrowTable:
     )
 
 
-def read_features(files: Iterable[Path], map_name: str) -> tuple[MapFeature, ...]:
+def read_features(files: Iterable[StoreFile], map_name: str) -> tuple[MapFeature, ...]:
     """The elements of one map, equal to those that were written."""
     features: list[MapFeature] = []
     for file in files:
-        table = pq.ParquetFile(file).read().filter(pc.field("map") == map_name)
+        with open_parquet(file) as parquet:
+            table = parquet.read().filter(pc.field("map") == map_name)
         shapes = shapely.from_wkb(table["geometry"].to_pylist())
         columns = (table[name].to_pylist() for name in ("id", "kind", "properties"))
         features += [

@@ -85,7 +85,7 @@ class Segment:
     def part(self, table: str, number: int) -> Part:
         """Its file of a table, where the segment has that number."""
         file = self.files[table]
-        return Part(part_path(table, number), file.bytes, file.sha256, file.rows)
+        return Part(part_path(table, number, file.sha256), file.bytes, file.sha256, file.rows)
 
 
 def segments_of(weights: Sequence[tuple[str, int]], largest: int = SEGMENT_OBJECTS) -> Iterator[list[str]]:
@@ -217,13 +217,16 @@ def read_segments(folder: Path) -> dict[int, Segment]:
     return found
 
 
-def take_over(source: Path, number: int, target: Path, new_number: int) -> None:
+def take_over(segment: Segment, source: Path, number: int, target: Path, new_number: int) -> None:
     """Put the files of a segment into another dataset, without copying where the system can.
 
     Raises:
         OSError: A file cannot be read or written.
     """
-    pairs = [(source / part_path(t, number), target / part_path(t, new_number)) for t in SEGMENT_TABLES]
+    pairs = [
+        (source / segment.part(table, number).path, target / segment.part(table, new_number).path)
+        for table in SEGMENT_TABLES
+    ]
     for old, new in [*pairs, (_description(source, number), _description(target, new_number))]:
         new.parent.mkdir(exist_ok=True)
         new.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Writing a dataset: beside its target, then renamed, so that a target is a whole dataset or nothing.
+"""Writing a dataset: beside its target, then moved there, so that a target is a whole dataset or nothing.
 
 The same recordings and maps give byte-identical files but for the manifest's `provenance`.
 """
@@ -23,7 +23,7 @@ from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.frame_index import frame_hashes, index_rows, repeated_rows
 from scenicq.store.labels import Recording
 from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest
-from scenicq.store.parquet import TableWriter, part_path, write_synced
+from scenicq.store.parquet import TableWriter, write_synced
 from scenicq.store.partial import Partial, check_target
 from scenicq.store.placement import MapIndex
 from scenicq.store.regions import lane_rows, region_rows
@@ -157,7 +157,7 @@ class DatasetWriter:
         """
         if source is not None:
             try:
-                take_over(*source, self.folder, number)
+                take_over(segment, *source, self.folder, number)
             except OSError as error:
                 raise self.unwritable(error) from error
         self._segments[number] = segment
@@ -216,9 +216,9 @@ class DatasetWriter:
                 **_totals(segments),
             )
             write_synced(self.folder / MANIFEST, manifest.to_json())
-            parts = {Path(part.path) for files in tables.values() for part in files}
-            about = {Path("segments") / f"part-{number:05}.json" for number in range(len(segments))}
-            self._partial.keep({*parts, *about, Path(MANIFEST)})
+            parts = [Path(part.path) for files in tables.values() for part in files]
+            about = [Path("segments") / f"part-{number:05}.json" for number in range(len(segments))]
+            self._partial.keep([*parts, *about, Path(MANIFEST)])
             check_target(self._target, force=self._force, update=self._update)
             self._partial.put_in_place()
         except OSError as error:
@@ -246,7 +246,7 @@ class DatasetWriter:
         return np.concatenate([np.empty(0, np.uint64), *hashes])
 
     def _read(self, number: int, columns: list[str]) -> ArrowTable:
-        with pq.ParquetFile(self.folder / part_path("labels", number)) as file:
+        with pq.ParquetFile(self.folder / self._segments[number].part("labels", number).path) as file:
             return file.read(columns=columns)
 
 

@@ -13,8 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, box
 
-from scenicq.errors import DataError
+from scenicq.errors import DataError, Source
 from scenicq.geometry.features import MapFeature
+from scenicq.query.run import Query
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.manifest import MANIFEST, Counts
@@ -251,7 +252,7 @@ def test_what_a_killed_process_left_is_removed(tmp_path: Path) -> None:
     (tmp_path / ".d.partial" / "lock").write_text("")
     dataset = write(tmp_path / "d", label("f"))
     assert [path.name for path in tmp_path.iterdir()] == ["d"]
-    assert [path.name for path in (dataset.path / "objects").iterdir()] == ["part-00000.parquet"]
+    assert list((dataset.path / "objects").iterdir()) == list(dataset.files("objects"))
     assert not (dataset.path / "lock").exists()
 
 
@@ -265,13 +266,18 @@ def test_two_processes_do_not_write_one_target(tmp_path: Path) -> None:
     assert [entry.frame for entry in open_dataset(tmp_path / "d").labels()] == ["f"]
 
 
-def test_a_replacement_that_was_killed_is_undone(tmp_path: Path) -> None:
-    write(tmp_path / "d", label("old")).path.rename(tmp_path / ".d.replaced")
-    with pytest.raises(DataError) as error:
-        write(tmp_path / "d", label("new"))
-    assert codes(error) == {"target-exists"}
-    assert [entry.frame for entry in open_dataset(tmp_path / "d").labels()] == ["old"]
+def test_a_reader_keeps_the_version_that_it_began_with(tmp_path: Path) -> None:
+    write(tmp_path / "d", label("old"))
+    reader = open_dataset(tmp_path / "d")
+    other = reader.connect()
+    write(tmp_path / "d", label("new"), force=True)
+    assert [entry.frame for entry in reader.labels()] == ["old"]
+    assert other.sql("SELECT frame FROM labels").fetchall() == [("old",)]
+    assert [entry.frame for entry in open_dataset(tmp_path / "d").labels()] == ["new"]
     assert [path.name for path in tmp_path.iterdir()] == ["d"]
+    reader.release()
+    write(tmp_path / "d", label("newer"), force=True)
+    assert list((tmp_path / "d" / "labels").iterdir()) == list(open_dataset(tmp_path / "d").files("labels"))
 
 
 def test_opening_what_is_no_dataset(tmp_path: Path) -> None:
@@ -311,6 +317,18 @@ def test_opening_a_damaged_dataset(tmp_path: Path, damage: str) -> None:
     with pytest.raises(DataError) as error:
         open_dataset(tmp_path / "d")
     assert codes(error) == {"store-damaged"}
+
+
+@pytest.mark.parametrize("table", ["labels", "objects", "sensors", "memberships", "regions", "frame_index"])
+def test_a_file_that_cannot_be_read_any_more_is_named(tmp_path: Path, table: str) -> None:
+    dataset = write(tmp_path / "d", label("f"))
+    (path,) = dataset.files(table)
+    path.write_bytes(bytes(path.stat().st_size))
+    program = Source("any.scenic", "model scenic.domains.driving.model\nego = new Car on road\n")
+    with pytest.raises(DataError, match=f"{table}/part-00000-.* has changed") as error:
+        list(Query(open_dataset(tmp_path / "d"), program).results())
+    assert codes(error) == {"store-damaged"}
+    assert len(error.value.diagnostics) == 1
 
 
 def test_verify_notices_a_changed_byte(tmp_path: Path) -> None:

@@ -1,0 +1,84 @@
+"""What a query has found goes where it is wanted: as results, as an export and as a report."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import shlex
+import sys
+import time
+from collections.abc import Generator, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenicq.query.export import Exporter
+from scenicq.query.results import Result, record
+from scenicq.query.run import Query
+from scenicq.report.write import check_target, write_report
+
+from .formats import make_writer
+from .output import ProgressBar, destination, writing
+from .report import show_few
+
+__all__ = ["Wanted", "deliver"]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Where results go.
+
+    Attributes:
+        file: A file; standard output if None.
+        form: Name of the format.
+        export: Form and folder of an export.
+        report: Folder of a report.
+        work: Folder for what is not complete yet; beside the file by default.
+    """
+
+    file: Path | None
+    form: str
+    export: tuple[str, Path] | None = None
+    report: Path | None = None
+    work: Path | None = None
+
+
+def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar) -> None:
+    """Take results, and then those that come close, and hand them on.
+
+    Raises:
+        DataError: target-exists or target-unwritable.
+    """
+    started = time.perf_counter()
+    file, report = wanted.file, wanted.report
+    exporter = None
+    if wanted.export is not None:
+        exporter = Exporter(wanted.export[0], query.dataset, wanted.export[1], Path(query.source.name).stem)
+    if report is not None:
+        check_target(report)
+    shown: list[Result] | None = None if report is None else []
+    close: list[Result] | None = None if report is None else []
+    with destination(file, wanted.work) as sink, bar, contextlib.closing(results):
+        with writing(file):
+            writer = make_writer(wanted.form, sink)
+        for result in itertools.chain(_kept(results, shown), _kept(near, close)):
+            with bar.aside(), writing(file):
+                writer.write(record(result))
+            if exporter is not None:
+                exporter.add(result)
+        with bar.aside(), writing(file):
+            writer.finish()
+        if exporter is not None:
+            with bar.aside():
+                show_few(exporter.finish().left_out)
+    if report is not None:
+        command = shlex.join(["scenicq", *sys.argv[1:]])
+        elapsed_s = time.perf_counter() - started
+        write_report(query, shown or (), report, near=close or (), command=command, elapsed_s=elapsed_s)
+
+
+def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Result]:
+    """The results, kept for a report if there is to be one."""
+    for result in results:
+        if into is not None:
+            into.append(result)
+        yield result

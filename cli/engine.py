@@ -1,0 +1,24 @@
+"""Who runs a query: this process, or an engine that runs it in pieces."""
+
+from __future__ import annotations
+
+import click
+
+from scenicq.query.dask_engine import dask_engine
+from scenicq.query.pieces import Engine
+
+__all__ = ["parse_engine"]
+
+
+def parse_engine(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Engine | None:
+    """Read `dask` or `dask=ADDRESS`.
+
+    Raises:
+        DataError: option-invalid: Dask is not installed.
+    """
+    if text is None:
+        return None
+    name, equals, address = text.partition("=")
+    if name != "dask" or (equals and not address):
+        raise click.BadParameter("write dask, or dask=ADDRESS of a scheduler, as in dask=tcp://10.0.0.1:8786")
+    return dask_engine(address or None)

@@ -1,0 +1,257 @@
+"""Processes that work side by side and may die: what one of them was doing is done again by another.
+
+`concurrent.futures` gives up for good when one process is killed; a run of hours must not. The answers come in the
+order of the tasks, so that nothing depends on how many processes there are or which of them died.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
+from dataclasses import dataclass, field
+from itertools import islice
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from types import TracebackType
+from typing import Any, Generic, Self, TypeVar
+
+from scenicq.errors import DataError, Diagnostic
+
+__all__ = ["Lost", "Work", "Workers"]
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+Work = Callable[[Task, Callable[[Any], None]], Answer]
+"""Does a task in a worker; the second argument sends a value to whoever waits for the answer."""
+
+_STARTS = 3
+"""Processes in a row that may end before they have started."""
+_END_S = 2.0
+"""Seconds that a worker has to end by itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """In place of an answer: every process that took the task died.
+
+    Attributes:
+        tries: How many.
+    """
+
+    tries: int
+
+
+@dataclass(eq=False, slots=True)
+class _Piece(Generic[Task]):
+    """A task on its way."""
+
+    task: Task
+    told: Callable[[Any], None] | None
+    most: int
+    tries: int = 0
+    given_up: bool = False
+    outcome: list[Any] = field(default_factory=list[Any])
+    """Its answer, `Lost` or `_Failure`; empty until there is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Failure:
+    error: BaseException
+
+
+@dataclass(eq=False, slots=True)
+class _Worker:
+    process: SpawnProcess
+    connection: Connection[Any, Any]
+    piece: _Piece[Any] | None = None
+    ready: bool = False
+
+
+class Workers(Generic[Task, Answer]):
+    """Processes with a state of their own; a context manager that ends them.
+
+    Processes start when there is something to do, and ignore an interrupt: the caller, who is interrupted too, ends
+    them.
+    """
+
+    def __init__(self, count: int, start: Callable[..., Work[Task, Answer]], setup: tuple[Any, ...] = ()) -> None:
+        """Prepare; no process starts yet.
+
+        Args:
+            count: Processes at most.
+            start: Called once in each process; what it returns does the tasks. To be found by name.
+            setup: Its arguments.
+        """
+        self._count = max(1, count)
+        self._call = (start, setup)
+        self._workers: list[_Worker] = []
+        self._waiting: deque[_Piece[Task]] = deque()
+        self._stillborn = 0
+
+    def __enter__(self) -> Self:
+        """Nothing is started yet."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """End all processes; at once where the block failed."""
+        workers, self._workers = self._workers, []
+        for worker in workers:
+            if kind is None and worker.piece is None:
+                with contextlib.suppress(OSError):
+                    worker.connection.send(None)
+            else:
+                worker.process.kill()
+        for worker in workers:
+            worker.process.join(_END_S)
+            _end(worker)
+
+    def run(
+        self, tasks: Iterable[Task], told: Callable[[Any], None] | None = None, *, tries: int = 3
+    ) -> Generator[tuple[Task, Answer | Lost]]:
+        """Do tasks side by side, taking a bounded number ahead; may be called while another run waits.
+
+        Args:
+            tasks: Taken when there is room.
+            told: Called in this process with what the work sends. A task that is done again sends again.
+            tries: Processes that a task may cost before it counts as lost.
+
+        Yields:
+            Each task with its answer, in order.
+
+        Raises:
+            Exception: What the work raised.
+            DataError: engine-failed: processes end before they have started.
+        """
+        source = iter(tasks)
+        pending: deque[_Piece[Task]] = deque()
+        try:
+            while True:
+                for task in islice(source, max(0, 2 * self._count + 1 - len(pending))):
+                    pending.append(_Piece(task, told, tries))
+                    self._waiting.append(pending[-1])
+                if not pending:
+                    return
+                self._hand_out()
+                while not pending[0].outcome:
+                    self._listen()
+                    self._hand_out()
+                piece = pending.popleft()
+                (outcome,) = piece.outcome
+                if isinstance(outcome, _Failure):
+                    raise outcome.error
+                yield piece.task, outcome
+        finally:
+            for piece in pending:
+                piece.given_up = True
+
+    def _hand_out(self) -> None:
+        while self._waiting:
+            idle = next((worker for worker in self._workers if worker.piece is None), None)
+            if idle is None and len(self._workers) >= self._count:
+                return
+            piece = self._waiting.popleft()
+            if piece.given_up:
+                continue
+            worker = idle or self._begin()
+            worker.piece = piece
+            try:
+                worker.connection.send(piece.task)
+            except OSError:
+                self._bury(worker)
+
+    def _begin(self) -> _Worker:
+        context = multiprocessing.get_context("spawn")
+        mine, theirs = context.Pipe()
+        process = context.Process(target=_serve, args=(theirs, *self._call), daemon=False)
+        process.start()
+        theirs.close()  # so that the end of the process is the end of the pipe
+        self._workers.append(_Worker(process, mine))
+        return self._workers[-1]
+
+    def _listen(self) -> None:
+        """Wait until a worker says something or dies."""
+        by_connection = {worker.connection: worker for worker in self._workers}
+        for ready in wait(list(by_connection)):
+            worker = by_connection[ready]  # pyright: ignore[reportArgumentType]
+            try:
+                kind, value = worker.connection.recv()
+            except (EOFError, OSError, pickle.UnpicklingError):
+                self._bury(worker)
+                continue
+            piece = worker.piece
+            if kind == "ready":
+                worker.ready, self._stillborn = True, 0
+            if kind == "ready" or piece is None:
+                continue
+            if kind != "told":
+                worker.piece = None
+                piece.outcome.append(_Failure(value) if kind == "failed" else value)
+            elif piece.told is not None and not piece.given_up:
+                piece.told(value)
+
+    def _bury(self, worker: _Worker) -> None:
+        """Take a dead worker away; its task goes first to the next one."""
+        self._workers.remove(worker)
+        _end(worker)
+        piece = worker.piece
+        if piece is None:
+            return
+        piece.tries += worker.ready
+        self._stillborn += not worker.ready
+        if self._stillborn >= _STARTS:
+            message = "worker processes end before they have started"
+            raise DataError(Diagnostic("engine-failed", message, hints=("`--jobs 1` needs none",)))
+        if piece.tries >= piece.most:
+            piece.outcome.append(Lost(piece.tries))
+        else:
+            self._waiting.appendleft(piece)
+
+
+def _end(worker: _Worker) -> None:
+    worker.process.kill()
+    worker.process.join()
+    worker.process.close()
+    worker.connection.close()
+
+
+def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]], setup: tuple[Any, ...]) -> None:
+    """The life of a worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+    work: Work[Any, Any] | None = None
+    with contextlib.suppress(EOFError, OSError):
+        connection.send(("ready", None))
+        while (task := connection.recv()) is not None:
+            try:
+                work = work or start(*setup)
+                answer = work(task, lambda value: connection.send(("told", value)))
+            except Exception as error:  # noqa: BLE001 - the caller raises it
+                connection.send(("failed", _portable(error)))
+            else:
+                connection.send(("done", answer))
+
+
+def _end_with(sentinel: int) -> None:
+    """A parent that is killed says nothing."""
+    wait([sentinel])
+    os._exit(1)
+
+
+def _portable(error: Exception) -> Exception:
+    """The error, or one that says the same where it cannot be sent."""
+    try:
+        copy: Exception = pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
+    except Exception:  # noqa: BLE001 - whatever pickling raises
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return copy

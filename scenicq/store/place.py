@@ -1,0 +1,166 @@
+"""Where a dataset's files are: a folder of this machine, or any address that fsspec understands.
+
+Everything that reads a dataset reads through here, and only files of the dataset: names come from the manifest, which
+may be a stranger's.
+"""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol, Self
+from urllib.parse import unquote, urlsplit
+
+import duckdb
+import pyarrow.parquet as pq
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.store.manifest import MANIFEST, Part
+from scenicq.store.reading import Reading
+from scenicq.store.remote import RemoteFile, RemoteFolder
+
+__all__ = ["LocalFolder", "Place", "StoreFile", "find_place", "open_parquet"]
+
+StoreFile = Path | RemoteFile
+"""A file of a table."""
+
+
+class Place(Protocol):
+    """A folder that holds a dataset."""
+
+    @property
+    def name(self) -> str:
+        """What it is called in messages: as the user gave it."""
+        ...
+
+    @property
+    def address(self) -> str:
+        """What finds it from any process that sees the same files."""
+        ...
+
+    def manifest(self) -> bytes:
+        """The content of `dataset.json`.
+
+        Raises:
+            DataError: store-missing.
+        """
+        ...
+
+    def problems(self, parts: Iterable[Part]) -> list[Diagnostic]:
+        """What is wrong with files, as far as a glance can tell."""
+        ...
+
+    def file(self, part: Part) -> StoreFile:
+        """A file of the dataset."""
+        ...
+
+    def checksum(self, part: Part) -> str:
+        """SHA-256 of a file, in hexadecimal."""
+        ...
+
+    def admit(self, connection: duckdb.DuckDBPyConnection, parts: Iterable[Part]) -> None:
+        """Make files of the dataset readable for a connection."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class LocalFolder:
+    """A folder of this machine.
+
+    Attributes:
+        path: As the user gave it.
+    """
+
+    path: Path
+    _root: Path = field(repr=False)
+    _reading: Reading = field(repr=False, compare=False)
+
+    @classmethod
+    def at(cls, path: Path) -> Self:
+        """The folder, which is read from now on."""
+        return cls(path, path.resolve(), Reading(path))
+
+    def release(self) -> None:
+        """Let writers remove the files of a version that has been replaced."""
+        self._reading.end()
+
+    @property
+    def name(self) -> str:
+        """The path."""
+        return str(self.path)
+
+    @property
+    def address(self) -> str:
+        """The absolute path."""
+        return str(self._root)
+
+    def manifest(self) -> bytes:
+        """The content of `dataset.json`."""
+        try:
+            return (self._root / MANIFEST).read_bytes()
+        except OSError as error:
+            hint = "`scenicq ingest SOURCE DATASET` makes a dataset"
+            raise DataError(Diagnostic("store-missing", f"{self.path} has no {MANIFEST}", hints=(hint,))) from error
+
+    def problems(self, parts: Iterable[Part]) -> list[Diagnostic]:
+        """Files that are missing, have another size, or lead out of the folder."""
+        return [problem for part in parts if (problem := _problem(self._root, part))]
+
+    def file(self, part: Part) -> Path:
+        """Its absolute path."""
+        return self._root / part.path
+
+    def checksum(self, part: Part) -> str:
+        """SHA-256 of a file."""
+        with (self._root / part.path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+
+    def admit(self, connection: duckdb.DuckDBPyConnection, parts: Iterable[Part]) -> None:
+        """Nothing to do: DuckDB knows files."""
+
+
+def _problem(root: Path, part: Part) -> Diagnostic | None:
+    hints = ("ingest the source again",)
+    path = root / part.path
+    try:
+        if not path.resolve().is_relative_to(root):
+            return Diagnostic("store-damaged", f"{part.path} is a link out of the dataset", hints=hints)
+        size = path.stat().st_size
+    except OSError:
+        return Diagnostic("store-damaged", f"{part.path} is missing", hints=hints)
+    if size == part.bytes:
+        return None
+    return Diagnostic("store-damaged", f"{part.path} has {size} bytes, not {part.bytes}", hints=hints)
+
+
+def find_place(address: str | Path) -> Place:
+    """The place of a path, or of an address such as `s3://bucket/dataset`.
+
+    Raises:
+        DataError: option-invalid: what the address needs is not installed.
+    """
+    text = str(address)
+    if isinstance(address, Path) or "://" not in text:
+        return LocalFolder.at(Path(address))
+    if text.startswith("file://"):
+        return LocalFolder.at(Path(unquote(urlsplit(text).path)))
+    return RemoteFolder.at(text)
+
+
+def open_parquet(file: StoreFile, **options: Any) -> Any:
+    """A `pyarrow.parquet.ParquetFile` of a file, to be closed.
+
+    Args:
+        file: The file.
+        options: Of `ParquetFile`.
+    """
+    if isinstance(file, Path):
+        return pq.ParquetFile(file, **options)
+    source: BinaryIO = file.open()
+    # neighbouring columns come in one request
+    return pq.ParquetFile(source, pre_buffer=True, **options)

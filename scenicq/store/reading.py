@@ -1,0 +1,81 @@
+"""Who reads a dataset: a shared lock on its folder, so that files of an older version stay as long as they are read.
+
+The lock is a courtesy. Where there is none (other systems, some network file systems) a reader whose files go away ends
+with an error, never with rows of two versions: a file's name depends on its content.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:
+    fcntl = None
+
+__all__ = ["Reading", "nobody_reads"]
+
+_TRIES, _PAUSE_S = 100, 0.01
+"""How long a reader waits for a writer that removes old files."""
+
+
+class Reading:
+    """Says that a dataset is read, from the moment it is made until `end`, or until nobody refers to it."""
+
+    def __init__(self, folder: Path) -> None:
+        """Begin; without a lock where there is none to be had.
+
+        Args:
+            folder: Of the dataset.
+        """
+        self._handle: int | None = None
+        if fcntl is None:
+            return
+        try:
+            self._handle = os.open(folder, os.O_RDONLY)
+        except OSError:
+            return
+        for _ in range(_TRIES):
+            try:
+                fcntl.flock(self._handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                time.sleep(_PAUSE_S)
+            except OSError:
+                return
+            else:
+                return
+
+    def end(self) -> None:
+        """End."""
+        handle, self._handle = self._handle, None
+        if handle is not None:
+            os.close(handle)
+
+    def __del__(self) -> None:
+        self.end()
+
+
+@contextmanager
+def nobody_reads(folder: Path) -> Generator[bool]:
+    """Whether nobody reads a dataset; then nobody begins to, either, while the block runs.
+
+    Raises:
+        OSError: The folder cannot be locked.
+    """
+    if fcntl is None:
+        yield True
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
+    finally:
+        os.close(handle)

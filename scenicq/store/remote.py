@@ -1,0 +1,261 @@
+"""Datasets on object storage, or wherever else fsspec reads: the extra `scenicq[s3]`.
+
+Only ranges of bytes are asked for, never whole files: the end of a Parquet file, where it says what is where, and the
+columns of row groups that are needed. DuckDB and pyarrow read through the same files. Credentials are the affair of the
+package for the protocol; for S3 they come from the usual variables and files of AWS.
+"""
+
+# fsspec is optional and has no types.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportMissingImports=false, reportUntypedBaseClass=false
+# pyright: reportUnknownParameterType=false, reportIncompatibleMethodOverride=false
+
+from __future__ import annotations
+
+import hashlib
+import io
+import threading
+from collections import OrderedDict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import cache
+from importlib.util import find_spec
+from typing import Any, BinaryIO, Self, cast
+
+import duckdb
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.store.manifest import MANIFEST, Part
+
+__all__ = ["RemoteFile", "RemoteFolder"]
+
+_TAIL = 1 << 17
+"""Bytes at the end of a file that are fetched when it is first opened, and kept: enough for almost any footer."""
+_TAILS = 512
+"""Files whose ends are kept."""
+_BLOCK = 1 << 24
+_SCHEME = "scenicq"
+"""Of addresses in SQL, whatever the real ones are."""
+_INSTALL = {
+    "s3": "`pip install 'scenicq[s3]'` adds it",
+    "gs": "`pip install 'scenicq[s3]' gcsfs` adds it",
+    "abfs": "`pip install 'scenicq[s3]' adlfs` adds it",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class RemoteFile:
+    """A file of a dataset elsewhere.
+
+    Attributes:
+        folder: Where it is.
+        part: What the manifest says of it.
+    """
+
+    folder: RemoteFolder
+    part: Part
+
+    def __str__(self) -> str:
+        """Its address in SQL."""
+        return f"{_SCHEME}://{self.part.path}"
+
+    def open(self) -> BinaryIO:
+        """The file for reading, from any number of threads."""
+        return cast("BinaryIO", _Reading(self.folder, self.part))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RemoteFolder:
+    """A dataset elsewhere.
+
+    Attributes:
+        name: Its address, as the user gave it.
+        files: The file system of fsspec.
+        root: The dataset's folder in it.
+    """
+
+    name: str
+    files: Any = field(repr=False)
+    root: str
+    _tails: OrderedDict[str, bytes] = field(default_factory=OrderedDict[str, bytes], init=False, repr=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False)
+
+    @classmethod
+    def at(cls, address: str) -> Self:
+        """The folder at an address.
+
+        Raises:
+            DataError: option-invalid: the package for the protocol is not installed, or there is no such protocol.
+        """
+        protocol = address.partition("://")[0]
+        if find_spec("fsspec") is None:
+            message = f"{address} needs the package fsspec, which is not installed"
+            raise DataError(Diagnostic("option-invalid", message, hints=(_INSTALL["s3"],)))
+        from fsspec.core import url_to_fs  # noqa: PLC0415 - optional
+
+        try:
+            files, root = url_to_fs(address)
+        except (ImportError, ValueError) as error:
+            hints = (_INSTALL[protocol],) if protocol in _INSTALL else ()
+            message = f"{address} cannot be read: {_line(error)}"
+            raise DataError(Diagnostic("option-invalid", message, hints=hints)) from error
+        return cls(address, files, root.rstrip("/"))
+
+    @property
+    def address(self) -> str:
+        """The address."""
+        return self.name
+
+    def manifest(self) -> bytes:
+        """The content of `dataset.json`, as it is now."""
+        try:
+            return bytes(self.files.cat_file(f"{self.root}/{MANIFEST}"))
+        except FileNotFoundError as error:
+            hint = "`scenicq ingest SOURCE DATASET` makes a dataset, to be copied there as a folder"
+            raise DataError(Diagnostic("store-missing", f"{self.name} has no {MANIFEST}", hints=(hint,))) from error
+        except Exception as error:
+            # every protocol has exceptions of its own
+            raise DataError(Diagnostic("store-missing", f"{self.name} cannot be read: {_line(error)}")) from error
+
+    def problems(self, parts: Iterable[Part]) -> list[Diagnostic]:
+        """Nothing: each file would cost a request; what is wrong with one shows when it is read."""
+        return []
+
+    def file(self, part: Part) -> RemoteFile:
+        """A file of the dataset."""
+        return RemoteFile(self, part)
+
+    def checksum(self, part: Part) -> str:
+        """SHA-256 of a file; nothing where it is missing or has another size."""
+        digest = hashlib.sha256()
+        try:
+            if self.files.size(f"{self.root}/{part.path}") != part.bytes:
+                return ""
+            for start in range(0, part.bytes, _BLOCK):
+                digest.update(self.fetch(part, start, min(start + _BLOCK, part.bytes)))
+        except (FileNotFoundError, DataError):
+            return ""
+        return digest.hexdigest()
+
+    def admit(self, connection: duckdb.DuckDBPyConnection, parts: Iterable[Part]) -> None:
+        """Let a connection read files of the dataset, and no others, by their names in SQL."""
+        connection.register_filesystem(_mount()(self, {part.path: part for part in parts}))
+
+    def fetch(self, part: Part, start: int, end: int) -> bytes:
+        """A range of bytes of a file.
+
+        Raises:
+            DataError: store-damaged: the file is missing or shorter.
+        """
+        try:
+            data = bytes(self.files.cat_file(f"{self.root}/{part.path}", start=start, end=end))
+        except FileNotFoundError as error:
+            raise DataError(Diagnostic("store-damaged", f"{self.name} lacks {part.path}", hints=_AGAIN)) from error
+        except Exception as error:
+            message = f"{part.path} in {self.name} cannot be read: {_line(error)}"
+            raise DataError(Diagnostic("store-damaged", message)) from error
+        if len(data) != end - start:
+            message = f"{part.path} in {self.name} has not the size that it should have"
+            raise DataError(Diagnostic("store-damaged", message, hints=_AGAIN))
+        return data
+
+    def tail(self, part: Part) -> bytes:
+        """The end of a file."""
+        with self._lock:
+            if (known := self._tails.get(part.path)) is not None:
+                self._tails.move_to_end(part.path)
+                return known
+        data = self.fetch(part, max(0, part.bytes - _TAIL), part.bytes)
+        with self._lock:
+            self._tails[part.path] = data
+            while len(self._tails) > _TAILS:
+                self._tails.popitem(last=False)
+        return data
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+_AGAIN = ("copy the dataset there again, its `dataset.json` last",)
+
+
+class _Reading(io.RawIOBase):
+    """A file that is read by ranges.
+
+    Every thread has a position of its own: DuckDB reads one file from several, moving and reading in two steps.
+    """
+
+    def __init__(self, folder: RemoteFolder, part: Part) -> None:
+        super().__init__()
+        self._folder, self._part = folder, part
+        self._here = threading.local()
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return cast("int", getattr(self._here, "position", 0))
+
+    def seek(self, offset: int, whence: int = 0, /) -> int:
+        self._here.position = offset + (0, self.tell(), self._part.bytes)[whence]
+        return self.tell()
+
+    def read(self, size: int = -1, /) -> bytes:
+        start = self.tell()
+        end = self._part.bytes if size < 0 else min(start + size, self._part.bytes)
+        if start >= end:
+            return b""
+        first = self._part.bytes - _TAIL
+        if start >= first:
+            tail = self._folder.tail(self._part)
+            data = tail[start - max(0, first) : end - max(0, first)]
+        else:
+            data = self._folder.fetch(self._part, start, end)
+        self._here.position = end
+        return data
+
+    def readall(self) -> bytes:
+        return self.read()
+
+    def readinto(self, buffer: Any, /) -> int:
+        data = self.read(len(buffer))
+        buffer[: len(data)] = data
+        return len(data)
+
+
+@cache
+def _mount() -> type[Any]:
+    """The class by which DuckDB sees the files of one dataset."""
+    from fsspec.spec import AbstractFileSystem  # noqa: PLC0415 - optional
+
+    class Mount(AbstractFileSystem):
+        protocol = _SCHEME
+        cachable = False
+
+        def __init__(self, folder: RemoteFolder, parts: Mapping[str, Part]) -> None:
+            super().__init__()
+            self._folder, self._parts = folder, parts
+
+        def _part(self, path: str) -> Part:
+            return self._parts[path.removeprefix(f"{_SCHEME}://")]
+
+        def open(self, path: str, mode: str = "rb", **_: Any) -> BinaryIO:
+            if mode != "rb":
+                raise PermissionError(f"{path} is only to be read")
+            return RemoteFile(self._folder, self._part(path)).open()
+
+        def info(self, path: str, **_: Any) -> dict[str, Any]:
+            return {"name": path, "size": self._part(path).bytes, "type": "file"}
+
+        def glob(self, path: str, **_: Any) -> list[str]:
+            return [path]
+
+        def modified(self, path: str) -> datetime:
+            return datetime.fromtimestamp(0, UTC)
+
+    return Mount
