@@ -1,5 +1,5 @@
-# `make` lists the targets. Everything goes into .venv; nothing is installed elsewhere but by `make dreal`, and by
-# `make setup` where a Debian system lacks Python's venv.
+# `make` lists the targets. Everything goes into .venv; nothing is installed elsewhere but by `make browser`, by
+# `make dreal`, and by `make setup` where a Debian system lacks Python's venv.
 
 PYTHON ?= python3
 WORKERS ?= 2
@@ -10,11 +10,11 @@ LINTED := scenicq cli tests sample_data
 FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/test_search.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check test test-all golden bench conformance dreal clean
+.PHONY: help setup demo check test test-all golden bench bench-scale conformance browser dreal clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
-		printf '  make %-9s %s\n' "$$name" "$$text"; done
+		printf '  make %-12s %s\n' "$$name" "$$text"; done
 
 setup: $(READY) ## Make .venv with scenicq and all that its development needs
 
@@ -45,13 +45,22 @@ test-all: $(READY) ## All tests
 golden: $(READY) ## Rewrite the golden files that tests compare with
 	$(PYTEST) --update-golden -m 'not slow'
 
-bench: $(READY) ## Measure queries, start-up and ingest; numbers go to bench-results/
+bench: $(READY) ## Measure queries, start-up, ingest and pictures; numbers go to bench-results/
 	$(BIN)/python tests/bench/queries.py
-	$(BIN)/python tests/bench/scalability.py --quick
+	$(BIN)/python tests/bench/jointly.py
+	$(BIN)/python tests/bench/scalability.py --patience 5
+	$(BIN)/python tests/bench/pictures.py
+
+FRAMES ?= 10000 100000
+bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=1000000 is the largest bar)
+	$(BIN)/python tests/bench/scale.py --frames $(FRAMES)
 
 MAP ?= Town01.xodr
 conformance: $(READY) ## Compare with Scenic 3.1.1: scenes that it draws must match (MAP=an OpenDRIVE file)
 	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP)
+
+browser: ## Install the Chromium that the tests of reports are driven in, where the system has it
+	@$(call install_browser)
 
 dreal: $(READY) ## Install what dReal needs besides its package, where the system has it
 	@$(call install_dreal)
@@ -75,6 +84,18 @@ define ensure_venv
 	fi; \
 	$(BIN)/python -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || { \
 		rm -rf .venv; echo "scenicq needs Python 3.11 to 3.13: make PYTHON=python3.11 setup" >&2; exit 1; }
+endef
+
+# The tests that need a browser skip without one, so that a missing one is told, but is no failure.
+define install_browser
+	if command -v chromedriver >/dev/null && { command -v chromium || command -v google-chrome; } >/dev/null; then exit 0; fi; \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		apt-get update -q && apt-get install -y -q --no-install-recommends chromium chromium-driver fonts-dejavu-core && exit 0; \
+		echo "apt-get cannot install Chromium: the tests of reports in a browser will be skipped" >&2; \
+	else \
+		echo "not root, or not Debian: the tests of reports in a browser need chromium and chromedriver on PATH" >&2; \
+		echo "(on Debian: apt-get install chromium chromium-driver fonts-dejavu-core)" >&2; \
+	fi
 endef
 
 # dReal's own fork of IBEX is in no registry but its package archive for Ubuntu.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,14 +16,15 @@ from scenicq.errors import DataError, Diagnostic, ScenarioError, ScenicqError, S
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.show import show_forest
 from scenicq.geometry.network import Network
-from scenicq.importers.base import read_maps
-from scenicq.importers.report import Report
 from scenicq.match.constraints import build_groups, describe_constraint
 from scenicq.match.options import MatchOptions
+from scenicq.query.maps import program_network, read_network
 from scenicq.query.run import beside, read_program
 from scenicq.store.dataset import open_dataset
 
+from .cache import user_cache
 from .main import ERROR
+from .manual import Manual
 from .report import as_json, count, show
 
 __all__ = ["check", "networks_of", "read_version"]
@@ -35,8 +37,17 @@ def read_version(text: str | None) -> Literal[1, 2, 3] | None:
     return None if text is None else _VERSIONS[text]
 
 
-def networks_of(dataset: Path | None, map_file: Path | None) -> Iterator[Network]:
-    """The maps to compile against: of the dataset, the one given, or the built-in street."""
+def networks_of(
+    dataset: str | None,
+    map_file: Path | None,
+    program: Path,
+    version: Literal[1, 2, 3] | None,
+    warnings: list[Diagnostic] | None = None,
+) -> Iterator[Network]:
+    """The maps to compile against: of the dataset, the one given, the one that the program names, or the street.
+
+    With a list for warnings, the street also stands in for a map that the program names and that cannot be had.
+    """
     if dataset is not None and map_file is not None:
         hint = "give one of them"
         raise DataError(
@@ -46,10 +57,17 @@ def networks_of(dataset: Path | None, map_file: Path | None) -> Iterator[Network
         opened = open_dataset(dataset)
         yield from (opened.network(name) for name in opened.maps)
     elif map_file is not None:
-        features = read_maps({map_file.stem: map_file}, Report())
-        yield Network(map_file.stem, features[map_file.stem])
+        yield read_network(map_file, user_cache() / "maps")
     else:
-        yield street()
+        try:
+            named = program_network(read_program(program), program.parent, version, user_cache() / "maps")
+        except DataError as error:
+            if warnings is None:
+                raise
+            more = ("until then, the built-in street stands in",)
+            warnings += [replace(each, hints=(*each.hints, *more), severity="warning") for each in error.diagnostics]
+            named = None
+        yield named or street()
 
 
 def _told(scenario: Scenario) -> str:
@@ -108,14 +126,20 @@ def _found(
 
 
 @click.command(
+    cls=Manual,
+    arguments={
+        "SCENARIO": "A Scenic program, as a file.",
+        "DATASET": "A folder that `scenicq ingest` made: the program is read on each of its maps.",
+    },
+    exits={0: "the program is sound"},
     epilog="\b\nExamples:\n"
     "  scenicq check crossing.scenic\n"
     "  scenicq check crossing.scenic dataset\n"
-    "  scenicq check crossing.scenic --map town.geojson --format json"
+    "  scenicq check crossing.scenic --map town.geojson --format json",
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path(path_type=Path), required=False)
-@click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON map.")
+@click.argument("dataset", type=click.Path(), required=False)
+@click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("--forest", is_flag=True, help="Print the expression forest.")
@@ -128,17 +152,20 @@ def _found(
     help="json gives the diagnostics as a list.",
 )
 @click.pass_context
-def check(ctx: click.Context, scenario: Path, dataset: Path | None, *, map_file: Path | None,
+def check(ctx: click.Context, scenario: Path, dataset: str | None, *, map_file: Path | None,
           scenic: str | None, initial: bool, forest: bool, groups: bool, format_: str) -> None:  # fmt: skip
     """Say whether a scenario is sound, and how it is read.
 
-    It is compiled against each map of the dataset, the map that is given, or else a small built-in street.
+    It is compiled against each map of the dataset, the map that is given, the one that the program names with `param
+    map = localPath('FILE')`, or else a small built-in street.
     """
     lines: list[str] = []
     details: Details = [show_forest] * forest + [_groups] * groups
     try:
-        networks, version = networks_of(dataset, map_file), read_version(scenic)
+        version, warnings = read_version(scenic), list[Diagnostic]()
+        networks = networks_of(dataset, map_file, scenario, version, warnings)
         lines, diagnostics = _found(read_program(scenario), networks, version, initial, details)
+        diagnostics += warnings
     except ScenicqError as error:
         if format_ == "text":
             raise

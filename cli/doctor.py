@@ -12,6 +12,7 @@ import click
 from scenicq.smt.solver import available
 
 from .main import ERROR
+from .manual import Manual
 from .report import columns
 
 __all__ = ["doctor"]
@@ -26,14 +27,19 @@ def _version(package: str) -> str | None:
         return None
 
 
-@click.command(epilog="\b\nExample:\n  scenicq doctor --format json")
+@click.command(
+    cls=Manual,
+    arguments={},
+    exits={0: "at least one solver loads"},
+    epilog="\b\nExamples:\n  scenicq doctor\n  scenicq doctor --format json",
+)
 @click.option("--format", "format_", type=click.Choice(["text", "json"]), default="text",
               help="json is for programs.")  # fmt: skip
 @click.pass_context
 def doctor(ctx: click.Context, *, format_: str) -> None:
     """Say which solvers load here and what is missing.
 
-    Exit code 0: at least one solver loads. dReal is preferred where it loads; the portable solver needs nothing.
+    dReal is preferred where it loads; the portable solver needs nothing.
     """
     versions = {"python": platform.python_version(), **{package: _version(package) for package in _PACKAGES}}
     solvers = available()

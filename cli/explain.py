@@ -18,8 +18,10 @@ from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label
 
 from .main import NOTHING
+from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
+from .report import plain
 
 __all__ = ["explain", "find_label"]
 
@@ -37,30 +39,38 @@ def find_label(dataset: Dataset, frame: str) -> Label:
 
 
 @click.command(
+    cls=Manual,
+    arguments={
+        "SCENARIO": "A Scenic program, as a file.",
+        "DATASET": "A folder that `scenicq ingest` made.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it.",
+    },
+    exits={0: "the frame matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
+    topics={"What counts as a match": SHARED},
     epilog="\b\nExamples:\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c\n"
-    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.25,heading=5deg --smt2 formulas"
+    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.25,heading=5deg --smt2 formulas",
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path(path_type=Path))
+@click.argument("dataset", type=click.Path())
 @click.argument("frame")
 @click.option("--smt2", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write the formula of each group as SMT-LIB 2 into a folder.")  # fmt: skip
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where the frame does not match.")
 @click.pass_context
 def explain(
-    ctx: click.Context, scenario: Path, dataset: Path, frame: str, *, smt2: Path | None, exit_zero: bool, **given: Any
+    ctx: click.Context, scenario: Path, dataset: str, frame: str, *, smt2: Path | None, exit_zero: bool, **given: Any
 ) -> None:
     """Say why one frame matches, or what keeps it from it and which tolerance would do.
 
-    The options of `match` that say what a match is apply. Exit code 0: it matches; 1: it does not; 2: an error.
+    The explanation names the feature or requirement, its place in the program, and the label's value.
     """
     query = Query(open_dataset(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
     label = find_label(query.dataset, frame)
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)
-    click.echo(show_explanation(explanation))
+    click.echo(plain(show_explanation(explanation)))
     if smt2 is not None:
         try:
             smt2.mkdir(parents=True, exist_ok=True)

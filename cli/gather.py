@@ -6,27 +6,60 @@ from pathlib import Path
 
 import click
 
-from .formats import FORMATS
+from scenicq.query.export import EXPORTS
+from scenicq.query.partitions import Gathered
+from scenicq.query.partitions import gather as find_pieces
+from scenicq.query.restore import noted_question, restore
+
+from .deliver import Wanted, deliver
+from .formats import FORMATS, make_writer
 from .main import NOTHING
-from .output import choose_format
-from .pieces import write_gathered
+from .manual import Manual
+from .output import ProgressBar, choose_format, destination, writing
 
 __all__ = ["gather"]
 
 
-@click.command(epilog="\b\nExample:\n  scenicq gather pieces -o matches.parquet")
+@click.command(
+    cls=Manual,
+    arguments={"FOLDER": "Where `scenicq match --shard` put the pieces."},
+    exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
+    epilog="\b\nExample:\n  scenicq gather pieces -o matches.parquet",
+)
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, parquet or ids.  [default: as for `match`]")  # fmt: skip
 @click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write to a file.")
+@click.option("--export", metavar="FORM DIR", type=(click.Choice(list(EXPORTS)), click.Path(path_type=Path)),
+              help="Hand the matching frames on, too, in a new folder DIR; as for `match`.")  # fmt: skip
+@click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
+              help="Write a page with pictures of the matches, too: DIR/index.html.")  # fmt: skip
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches.")
 @click.pass_context
-def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Path | None, exit_zero: bool) -> None:
+def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Path | None,
+           export: tuple[str, Path] | None, report: Path | None, exit_zero: bool) -> None:  # fmt: skip
     """Put the shards of a query together, in the order of the dataset.
 
-    A shard that is missing or damaged is named. Exit codes as of `match`.
+    A shard that is missing or damaged is named. For an export or a report, dataset and scenario are read where they
+    were when the shards were run. Exit codes as of `match`.
     """
     file = None if output is None or str(output) == "-" else output
-    funnel = write_gathered(folder, None, file, choose_format(format_, file))
-    if funnel.matches == 0 and not exit_zero:
+    form = choose_format(format_, file)
+    gathered = find_pieces(folder)
+    if export is None and report is None:
+        _write(gathered, file, form)
+    else:
+        query = noted_question(folder, gathered.question)
+        query.funnel = gathered.funnel
+        results = (restore(each, query.source) for each in gathered.records())
+        deliver(query, results, (), Wanted(file, form, export, report), ProgressBar(quiet=True))
+    if gathered.funnel.matches == 0 and not exit_zero:
         ctx.exit(NOTHING)
+
+
+def _write(gathered: Gathered, file: Path | None, form: str) -> None:
+    with destination(file) as sink, writing(file):
+        writer = make_writer(form, sink)
+        for each in gathered.records():
+            writer.write(each)
+        writer.finish()

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from scenicq.store.dataset import open_dataset
 from scenicq.store.rebuild import rebuild
 
+from .manual import Manual
 from .output import ProgressBar
 from .report import count
 
 __all__ = ["index"]
 
 
-@click.command(epilog="\b\nExample:\n  scenicq index demo/crossroads")
-@click.argument("dataset", type=click.Path(path_type=Path))
+@click.command(
+    cls=Manual,
+    arguments={"DATASET": "A folder that `scenicq ingest` made."},
+    epilog="\b\nExample:\n  scenicq index demo/crossroads",
+)
+@click.argument("dataset", type=click.Path())
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
-def index(dataset: Path, *, quiet: bool) -> None:
+def index(dataset: str, *, quiet: bool) -> None:
     """Compute anew what a dataset holds beside the labels.
 
     Lanes, road directions, memberships, positions relative to the ego and counts are replaced, all at once. Labels,

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
-from pathlib import Path
 
 import click
 
 from scenicq.store.dataset import open_dataset
 from scenicq.store.manifest import Counts, Manifest
+from scenicq.store.schema import SCHEMAS
 
 from .ingest import defects
-from .report import columns, count, moment
+from .manual import Manual
+from .report import columns, count, moment, plain
 
 __all__ = ["info"]
 
@@ -36,7 +38,15 @@ def _tables(manifest: Manifest) -> list[str]:
     for name, parts in manifest.tables.items():
         size = sum(part.bytes for part in parts) / 1e6
         rows.append((name, f"{sum(part.rows for part in parts):,}", f"{len(parts):,}", f"{size:,.2f}"))
-    return [*columns(rows, right=frozenset({1, 2, 3}), indent=""), ""]
+    every = [part for parts in manifest.tables.values() for part in parts]
+    rows.append(("all", "", f"{len(every):,}", f"{sum(part.bytes for part in every) / 1e6:,.2f}"))
+    width = max(map(len, SCHEMAS)) + 2
+    named: list[str] = []
+    for name in manifest.tables:
+        indent = " " * width
+        named += textwrap.wrap(", ".join(SCHEMAS[name].names), 110, initial_indent=name.ljust(width),
+                               subsequent_indent=indent, break_on_hyphens=False)  # fmt: skip
+    return [*columns(rows, right=frozenset({1, 2, 3}), indent=""), "", f"{'TABLE'.ljust(width)}columns", *named, ""]
 
 
 def _lines(manifest: Manifest) -> list[str]:
@@ -60,12 +70,16 @@ def _lines(manifest: Manifest) -> list[str]:
     ]
 
 
-@click.command(epilog="\b\nExample:\n  scenicq info dataset --verify")
-@click.argument("dataset", type=click.Path(path_type=Path))
+@click.command(
+    cls=Manual,
+    arguments={"DATASET": "A folder that `scenicq ingest` made."},
+    epilog="\b\nExample:\n  scenicq info dataset --verify",
+)
+@click.argument("dataset", type=click.Path())
 @click.option("--verify", is_flag=True, help="Compare every file with its checksum.")
 @click.option("--format", "format_", type=click.Choice(["text", "json"]), default="text",
               help="json gives the whole manifest.")  # fmt: skip
-def info(dataset: Path, *, verify: bool, format_: str) -> None:
+def info(dataset: str, *, verify: bool, format_: str) -> None:
     """Say what a dataset holds and what was left out of it."""
     opened = open_dataset(dataset)
     if verify:
@@ -73,4 +87,4 @@ def info(dataset: Path, *, verify: bool, format_: str) -> None:
     if format_ == "json":
         click.echo(opened.manifest.to_json(), nl=False)
     else:
-        click.echo("\n".join([*_lines(opened.manifest), *(["every checksum is right"] if verify else [])]))
+        click.echo(plain("\n".join([*_lines(opened.manifest), *(["every checksum is right"] if verify else [])])))

@@ -12,6 +12,7 @@ from scenicq.importers.ingest import ingest as make_dataset
 from scenicq.store.manifest import LeftOut
 
 from .cache import user_cache
+from .manual import Manual
 from .output import ProgressBar
 from .report import columns, count, show_few
 
@@ -41,9 +42,14 @@ def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
 
 
 @click.command(
+    cls=Manual,
+    arguments={
+        "SOURCE": "A folder or file of recordings; its format is recognised.",
+        "DATASET": "The folder to be made.",
+    },
     epilog="\b\nExamples:\n"
     "  scenicq ingest sample_data/crossroads dataset\n"
-    "  scenicq ingest recordings dataset --map town=town.geojson --jobs 4"
+    "  scenicq ingest recordings dataset --map town=town.geojson --jobs 4",
 )
 @click.argument("source", type=click.Path(path_type=Path))
 @click.argument("dataset", type=click.Path(path_type=Path))
@@ -64,7 +70,8 @@ def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
 @click.option(
     "--ego",
     metavar="ID|nearest|none",
-    help="Which track is the ego where the source has none; `nearest`: in each frame the vehicle in the middle.",
+    help="Which track is the ego where the source has none; `nearest`: in each frame the vehicle in the middle; "
+    "`none`: there is none, so match with `--ego any`.",
 )
 @click.option("--strict", is_flag=True, help="Stop at the first problem of the source.")
 @click.option(

@@ -19,6 +19,7 @@ import click
 
 from scenicq.errors import ScenicqError
 
+from .manual import write_examples, write_exit_codes
 from .report import show
 
 __all__ = ["COMMANDS", "NOTHING", "cli", "main"]
@@ -65,6 +66,11 @@ class Commands(click.Group):
         """List the subcommands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
+        write_exit_codes(formatter, {0: "something matched, or the command did its work", 1: "nothing matched"})
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples."""
+        write_examples(formatter, self.epilog)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -127,8 +133,8 @@ def _written() -> str:
 def cli() -> None:
     """Find the recorded frames that match a Scenic scenario.
 
-    Exit codes: 0 something matched, or the command did its work; 1 `match` found nothing; 2 an error.
-    Every option can also be given as an environment variable, such as SCENICQ_MATCH_JOBS=4.
+    A source of recordings becomes a dataset once (`ingest`); then scenarios are matched with it (`match`). Every option
+    can also be given as an environment variable, such as SCENICQ_MATCH_JOBS=4.
     """
 
 

@@ -3,42 +3,36 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
-import shlex
+import os
+import shutil
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
-from scenicq.query.export import EXPORTS, Exporter
+from scenicq.query.export import EXPORTS
 from scenicq.query.near import near_results
-from scenicq.query.results import Result, record
+from scenicq.query.pieces import Engine, in_order, kept, pieces_of, run_here
+from scenicq.query.results import Result
 from scenicq.query.run import Query, read_program
-from scenicq.report.write import check_target, write_report
 from scenicq.store.dataset import open_dataset
 
-from .formats import FORMATS, make_writer
+from .deliver import Wanted, deliver
+from .engine import parse_engine
+from .formats import FORMATS
 from .funnel import show_funnel
 from .main import NOTHING
-from .options import DEFAULTS, query_options
-from .output import ProgressBar, choose_format, destination, writing
-from .pieces import Shard, parse_shard, run_resumable, run_shard
+from .manual import Manual
+from .options import DEFAULTS, TOPICS, query_options
+from .output import ProgressBar, choose_format
+from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
-from .report import show_few
 
 __all__ = ["match"]
-
-
-def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Result]:
-    """The results, kept for a report if there is to be one."""
-    for result in results:
-        if into is not None:
-            into.append(result)
-        yield result
 
 
 def _near(query: Query, count: int | None) -> Iterator[Result]:
@@ -49,6 +43,13 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 
 # fmt: off
 @click.command(
+    cls=Manual,
+    arguments={
+        "SCENARIO": "A Scenic program, as a file.",
+        "DATASET": "A folder that `scenicq ingest` made.",
+    },
+    exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
+    topics=TOPICS,
     epilog="\b\nExamples:\n"
     "  scenicq match crossing.scenic dataset --tolerance position=0.25,heading=5deg\n"
     "  scenicq match crossing.scenic dataset --format ids | head\n"
@@ -56,7 +57,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
     "  seq 16 | xargs -P 4 -I{} scenicq match crossing.scenic dataset --shard {}/16 -o pieces --exit-zero"
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path(path_type=Path))
+@click.argument("dataset", type=click.Path())
 @click.option("--tolerance", metavar="LIST",
               help="How far labels may be off: position=0.25,heading=5deg, or x=, y=, heading=. Lengths in metres, "
               "angles in deg or rad.  [default: 1e-3 m, 1e-3 rad]")
@@ -93,6 +94,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               help="Write to a file, which appears when it is complete; `-` is standard output.")
 @click.option("--shard", metavar="I/N", callback=parse_shard, help="Match only piece I of N; -o names the folder for "
               "the pieces, which `scenicq gather` puts together.")
+@click.option("--engine", metavar="dask[=ADDRESS]", callback=parse_engine, help="Match in pieces on Dask: in processes "
+              "on this machine (--jobs of them, or one a processor), or on the cluster whose scheduler is at ADDRESS.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run with the same -o FILE stopped.")
 @click.option("--export", metavar="FORM DIR", type=(click.Choice(list(EXPORTS)), click.Path(path_type=Path)),
               help="Hand the matching frames on, too, in a new folder DIR: nuscenes-tokens, argoverse2, paths (of "
@@ -108,13 +111,14 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
-def match(ctx: click.Context, scenario: Path, dataset: Path, *, format_: str | None, output: Path | None,
+def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | None, output: Path | None,
           export: tuple[str, Path] | None, near: int | None, report: Path | None, shard: Shard | None, resume: bool,
-          explain: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
+          engine: Engine | None, explain: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
 
-    Results go to standard output. Exit code 0: something matched; 1: nothing; 2: an error.
+    Results go to standard output, one a line; progress and summary to standard error. Each match comes with the label
+    object of every role and with values of the random variables that prove it.
     """
     started = time.perf_counter()
     file = None if output is None or str(output) == "-" else output
@@ -123,50 +127,40 @@ def match(ctx: click.Context, scenario: Path, dataset: Path, *, format_: str | N
     if explain:
         show_plan(query)
         return
-    if shard or resume:
-        _in_pieces(ctx, query, shard, file, chosen, quiet=quiet)
+    if shard is not None:
+        _in_shard(ctx, query, shard, file, quiet=quiet)
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
-    exporter = None if export is None else Exporter(export[0], query.dataset, export[1], scenario.stem)
-    if report is not None:
-        check_target(report)
-    shown: list[Result] | None = None if report is None else []
-    close: list[Result] | None = None if report is None else []
+    pieces = None
+    if resume:
+        if file is None:
+            raise click.UsageError("--resume needs -o FILE, beside which it keeps what is done", ctx)
+        real = Path(os.path.realpath(file))
+        pieces = real.with_name(f".{real.name}.pieces")
+        engine = kept(engine or run_here, pieces)
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
-    results = query.results(bar.advance)
-    with destination(file) as sink, bar, contextlib.closing(results):
-        with writing(file):
-            writer = make_writer(chosen, sink)
-        for result in itertools.chain(_kept(results, shown), _kept(_near(query, near), close)):
-            with bar.aside(), writing(file):
-                writer.write(record(result))
-            if exporter is not None:
-                exporter.add(result)
-        with bar.aside(), writing(file):
-            writer.finish()
-        if exporter is not None:
-            with bar.aside():
-                show_few(exporter.finish().left_out)
-    elapsed_s = time.perf_counter() - started
-    if report is not None:
-        command = shlex.join(["scenicq", *sys.argv[1:]])
-        write_report(query, shown or (), report, near=close or (), command=command, elapsed_s=elapsed_s)
-    _conclude(ctx, query, elapsed_s, summary=summary, quiet=quiet, exit_zero=exit_zero)
+    results = in_order(query, engine, pieces_of(query, 16), bar.advance) if engine else query.results(bar.advance)
+    try:
+        deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces), bar)
+    except BaseException:
+        if pieces is not None:
+            with contextlib.suppress(OSError):
+                pieces.rmdir()  # if nothing is done yet
+        raise
+    if pieces is not None:
+        shutil.rmtree(pieces, ignore_errors=True)
+    _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 
-def _in_pieces(
-    ctx: click.Context, query: Query, shard: Shard | None, file: Path | None, chosen: str, *, quiet: bool
-) -> None:
-    """Run one shard, or all pieces with a place to go on from."""
-    single = [name for name in ("near", "report", "export", "limit") if ctx.params.get(name) is not None]
-    if single or file is None:
-        what = "need -o" if file is None else f"cannot be had with --{single[0]}"
-        raise click.UsageError(f"--shard and --resume {what}", ctx)
-    if shard is None:
-        run = run_resumable(query, file, chosen, quiet=quiet)
-    else:
-        run = run_shard(query, shard, file, quiet=quiet)
-    query.funnel = replace(run, warnings=query.funnel.warnings)
+def _in_shard(ctx: click.Context, query: Query, shard: Shard, folder: Path | None, *, quiet: bool) -> None:
+    """Run one shard into a folder."""
+    if folder is None:
+        raise click.UsageError("--shard needs -o FOLDER, which the shards of a query share", ctx)
+    for name in ("near", "limit", "resume", "engine", "report", "export"):
+        if ctx.params.get(name):
+            later = ": give it to `scenicq gather`" if name in ("report", "export") else ""
+            raise click.UsageError(f"--shard cannot be had with --{name}{later}", ctx)
+    query.funnel = replace(run_shard(query, shard, folder, quiet=quiet), warnings=query.funnel.warnings)
 
 
 def _conclude(

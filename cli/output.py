@@ -56,8 +56,12 @@ def writing(file: Path | None) -> Generator[None]:
 
 
 @contextlib.contextmanager
-def destination(file: Path | None) -> Generator[BinaryIO]:
-    """Standard output, or a file that is written beside its place and renamed at the end.
+def destination(file: Path | None, folder: Path | None = None) -> Generator[BinaryIO]:
+    """Standard output, or a file that is written elsewhere and renamed at the end.
+
+    Args:
+        file: The file; standard output if None.
+        folder: Where it is written, made if need be; beside its place by default.
 
     Raises:
         DataError: target-unwritable.
@@ -70,21 +74,26 @@ def destination(file: Path | None) -> Generator[BinaryIO]:
         with device:
             yield device
     else:
-        yield from _complete(file, Path(os.path.realpath(file)))
+        yield from _complete(file, Path(os.path.realpath(file)), folder)
 
 
-def _complete(name: Path, file: Path) -> Generator[BinaryIO]:
-    beside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
+def _complete(name: Path, file: Path, folder: Path | None) -> Generator[BinaryIO]:
+    beside = (folder or file.parent) / f".{file.name}.{os.getpid()}.tmp"
     try:
         with writing(name):
             if file.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            if folder is not None:
+                folder.mkdir(exist_ok=True)
             sink = beside.open("wb")
-        with sink:
+        try:
             yield sink
             with writing(name):
                 sink.flush()
                 os.fsync(sink.fileno())
+        finally:
+            with writing(name):
+                sink.close()
         with writing(name):
             beside.replace(file)
     finally:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-
 import click
 
 from scenicq.query.run import Query
+from scenicq.query.survey import survey
 
 from .report import columns
 
@@ -14,14 +13,19 @@ __all__ = ["show_plan"]
 
 
 def show_plan(query: Query) -> None:
-    """Print the prefilter of each map: its conditions in order, with the frames left after each, and its SQL."""
-    for plan in query.plans():
-        with contextlib.closing(query.dataset.connect()) as connection:
-            left = plan.left(connection)
+    """Print the prefilter of each map: its conditions in order, with the frames left after each, and its SQL.
+
+    The estimate is that of a sample; every step is then counted.
+    """
+    for found in survey(query):
+        plan, left = found.plan, found.left
         rows = [
-            (f"{frames:,}", step.what, step.span.place if step.span else "")
-            for frames, step in zip(left[1:], plan.steps, strict=True)
+            (f"{estimated:,}", f"{frames:,}", step.what, step.span.place if step.span else "")
+            for estimated, frames, step in zip(found.estimated[1:], left[1:], plan.steps, strict=True)
         ]
         click.echo(f"map {plan.map}: {left[0]:,} frames, {left[-1]:,} left for the matcher")
-        lines = columns([("left", "after", "place"), *rows], right=frozenset({0}))
-        click.echo("\n".join([*lines, "", f"  {plan.sql}", ""]))
+        lines = columns([("estimated", "left", "after", "place"), *rows], right=frozenset({0, 1}))
+        click.echo("\n".join([*lines, ""]))
+        for statement in (statement for stage in plan.stages for statement in stage.statements):
+            click.echo(f"  {statement};")
+        click.echo()

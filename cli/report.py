@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
@@ -11,16 +12,25 @@ import click
 
 from scenicq.errors import Diagnostic, Span, render
 
-__all__ = ["as_json", "columns", "count", "moment", "show", "show_few"]
+__all__ = ["as_json", "columns", "count", "moment", "plain", "show", "show_few"]
 
 _FEW = 5
 """Diagnostics of one code shown at most, where there may be many."""
 
 
+_CONTROL = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+"""What moves a terminal's cursor, changes its colours or turns text round, except a new line."""
+
+
+def plain(text: str) -> str:
+    """A text of somebody else's as it is safe on a terminal: control characters are shown, not obeyed."""
+    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
 def show(diagnostics: Iterable[Diagnostic]) -> None:
     """Print diagnostics on standard error, with the headline in colour."""
     for diagnostic in diagnostics:
-        headline, _, rest = render(diagnostic).partition("\n")
+        headline, _, rest = plain(render(diagnostic)).partition("\n")
         kind, colon, message = headline.partition(":")
         colour = "red" if diagnostic.severity == "error" else "yellow"
         text = click.style(kind, fg=colour, bold=True) + click.style(colon + message, bold=True)
@@ -61,6 +71,7 @@ def columns(rows: Sequence[Sequence[str]], *, right: frozenset[int] = frozenset(
         right: Indices of the columns that are aligned to the right.
         indent: What every line starts with.
     """
+    rows = [[plain(cell).replace("\n", "\\n") for cell in row] for row in rows]
     widths = [max(len(row[number]) for row in rows) for number in range(len(rows[0]))] if rows else []
     return [
         indent

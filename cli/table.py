@@ -62,7 +62,8 @@ class Table:
 
 def _cells(record: Mapping[str, Any]) -> tuple[str, ...]:
     cause = record.get("cause", {})
-    why = cause.get("reason") or cause.get("what", "")
+    near = cause.get("what") == "tolerance"
+    why = cause.get("reason") or cause.get("detail" if near else "what", "")
     objects = [f"{role}={label}" for role, label in record["correspondence"].items() if (role, label) != ("ego", "ego")]
     sensors = sorted(record["sensors"].items(), key=lambda item: (not item[0].startswith("CAM_FRONT"), item))
     return (

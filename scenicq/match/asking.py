@@ -10,6 +10,7 @@ from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
 from scenicq.match.options import MatchOptions
 from scenicq.smt.answer import Sat, Solver, Unknown, Unsat
 from scenicq.smt.encode import Encoding, Target, UnsupportedError, encode
+from scenicq.smt.splitting import check_by_cases
 
 __all__ = ["ask", "encoded", "target_of"]
 
@@ -17,13 +18,19 @@ _ATTEMPTS = 3
 _REFINED = 100.0
 
 
-def encoded(items: Sequence[Sequence[Item]], options: MatchOptions) -> Encoding:
+def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: bool = True) -> Encoding:
     """Groups as one problem for a solver.
+
+    Args:
+        items: The groups after conditioning.
+        options: The options.
+        borders: As of `encode`.
 
     Raises:
         UnsupportedError: A construct has no formula.
     """
-    return encode([[(target_of(c, options), node, value) for c, node, value in group] for group in items])
+    targets = [[(target_of(c, options), node, value) for c, node, value in group] for group in items]
+    return encode(targets, borders=borders)
 
 
 def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None) -> Outcome:
@@ -37,14 +44,17 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
     flat = [item for group in items for item in group]
     blame = flat[0][0]
     try:
-        encoding = encoded(items, options)
+        encoding = encoded(items, options, borders=False)
     except UnsupportedError as error:
         return Maybe(blame, f"unsupported: {error}")
     if solver is None:
         return Maybe(blame, "no solver")
     precision = options.precision
-    for _ in range(_ATTEMPTS):
-        answer = solver.check(encoding.problem, precision=precision, timeout_s=options.timeout_s)
+    for attempt in range(_ATTEMPTS):
+        if attempt == 1:
+            # what was left out to keep the question small may be what the witness breaks
+            encoding = encoded(items, options)
+        answer = check_by_cases(solver, encoding.problem, precision=precision, timeout_s=options.timeout_s)
         match answer:
             case Unsat():
                 return No(blame)

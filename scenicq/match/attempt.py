@@ -7,6 +7,7 @@ answers are kept by the shape of the group and the label objects in its roles.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -19,9 +20,14 @@ from scenicq.match.casting import Cast
 from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes, condition_group, decide
 from scenicq.match.options import MatchOptions
 from scenicq.match.planning import GroupPlan, MatchPlan
-from scenicq.match.search import Answer, Reporter, Slot, find_assignments
+from scenicq.match.quick import Places
+from scenicq.match.search import Answer, Exhausted, Reporter, Slot, find_assignments
 from scenicq.match.surroundings import within_radius
 from scenicq.match.thinning import thinned
+
+_FEW = 64
+"""Decisions in closed form that cost less than arrays; steps of a search that cost hardly anything."""
+_FEW_SLOTS = 8
 
 __all__ = ["Asker", "Attempt", "Failure", "Solution"]
 
@@ -74,6 +80,7 @@ class Attempt:
         cast: The label and who may play whom.
         ask: The solver.
         reporter: Watches the search.
+        places: What is known of places of the map.
         failure: What excluded the correspondence that came furthest.
         undecided: What kept a correspondence that was not excluded from being a match.
     """
@@ -83,6 +90,7 @@ class Attempt:
     cast: Cast
     ask: Asker
     reporter: Reporter | None = None
+    places: Places = field(default_factory=Places)
     failure: Failure | None = None
     undecided: Failure | None = None
     _cache: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
@@ -124,9 +132,21 @@ class Attempt:
         key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
         known = self._cache.get(key)
         if known is None:
-            known = self._cache[key] = (plan.group, self._decide_now(plan.group, assignment))
+            known = self._cache[key] = (
+                plan.group,
+                self._quick(plan, assignment) or self._decide_now(plan.group, assignment),
+            )
         group, outcome = known
         return outcome if group is plan.group else _translated(outcome, group, plan.group)
+
+    def _quick(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
+        """What a closed form says, if it is clear."""
+        if plan.quick is None or self.options.method != "auto":
+            return None
+        seen = self.cast.seen
+        return plan.quick.decide(
+            lambda index, name: seen[assignment[index]][name], self.cast.disc, self.options.tolerance, self.places
+        )
 
     def _decide_now(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
         try:
@@ -166,7 +186,7 @@ class Attempt:
         found = False
         if Answer.UNKNOWN not in answers:
             firm = [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in doubtful)) for s in slots]
-            for assignment in self._search(plan, firm, ego, accept_unknown=False):
+            for assignment in self._firm(plan, firm, ego):
                 found = True
                 yield self._solution(plan, assignment)
         if not found and self.undecided is None:
@@ -180,7 +200,7 @@ class Attempt:
     ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
         """Candidates that pass the groups about them and the ego alone, and which of them are doubtful."""
         wanted = {index: numbers for index, numbers in candidates.items() if index != self.scenario.ego}
-        if self.options.method == "auto":
+        if self.options.method == "auto" and not _easy(plan, wanted):
             wanted, failed = thinned(plan, wanted, self.cast, self.scenario.ego, self.options.tolerance)
             if failed is not None:
                 self._blame_thinning(*failed, candidates, ego)
@@ -226,8 +246,33 @@ class Attempt:
             answer = one if one is Answer.UNKNOWN else answer
         return answer
 
+    def _firm(self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int]) -> Iterator[dict[int, int]]:
+        """Correspondences that satisfy all groups.
+
+        Few objects are searched for in the order of the program: then the first correspondence does not depend on how
+        many candidates are known not to pass.
+        """
+        given: list[dict[int, int]] = []
+        if len(slots) <= _FEW_SLOTS:
+            try:
+                for assignment in self._search(plan, slots, ego, accept_unknown=False, budget=_FEW):
+                    given.append(assignment)
+                    yield assignment
+                return
+            except Exhausted:
+                pass
+        for assignment in self._search(plan, slots, ego, accept_unknown=False):
+            if assignment not in given:
+                yield assignment
+
     def _search(
-        self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int], *, accept_unknown: bool
+        self,
+        plan: MatchPlan,
+        slots: list[Slot],
+        ego: Mapping[int, int],
+        *,
+        accept_unknown: bool,
+        budget: int | None = None,
     ) -> Iterator[dict[int, int]]:
         due: dict[int, list[tuple[GroupPlan, frozenset[int]]]] = {}
         for group in plan.joint:
@@ -249,8 +294,9 @@ class Attempt:
             fixed=ego,
             twins={one: other for one, other in plan.twins.items() if options[one] == options[other]},
             links=plan.links,
-            budget=self.options.budget,
+            budget=self.options.budget if budget is None else min(budget, self.options.budget),
             reporter=self.reporter,
+            in_order=budget is not None,
         )
 
     def _solution(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Solution:
@@ -288,6 +334,16 @@ class Attempt:
             return self.ask([self.items(each.group, assignment) for each in plan.groups])
         except CannotEvaluate as error:
             return Maybe(plan.groups[0].group.constraints[0], f"unsupported: {error}")
+
+
+def _easy(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
+    """Whether all pairs of candidates are decided faster than they are thinned out."""
+    pairs = 0
+    for group in plan.groups:
+        if group.quick is None:
+            return False
+        pairs += math.prod(len(candidates[index]) for index in group.roles)
+    return pairs <= _FEW
 
 
 def _accept(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:

@@ -16,7 +16,10 @@ from scenicq.match.verdict import Cause
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label
 
-__all__ = ["Cast", "cast_roles", "egos"]
+__all__ = ["Among", "Cast", "cast_roles", "egos"]
+
+Among = Mapping[int, tuple[int, ...]]
+"""For objects of the scenario, the numbers of the things that may play them: all others are known to be excluded."""
 
 _MOST_SIGNATURES = 1024
 
@@ -54,7 +57,9 @@ class Cast:
             by_set: dict[frozenset[str], list[int]] = {}
             for number in self.candidates.get(index, (self.ego,)):
                 by_set.setdefault(names.intersection(self.seen[number]), []).append(number)
-            choices.append([(names_, tuple(numbers)) for names_, numbers in by_set.items()])
+            # what is observed most completely first: the order must not depend on candidates that drop out anyway
+            ordered = sorted(by_set.items(), key=_completeness) if len(by_set) > 1 else by_set.items()
+            choices.append([(names_, tuple(numbers)) for names_, numbers in ordered])
         params = frozenset(self.params)
         for count, chosen in enumerate(itertools.product(*choices)):
             if count >= _MOST_SIGNATURES:
@@ -62,18 +67,28 @@ class Cast:
             yield (*(names for names, _ in chosen), params), {i: numbers for i, (_, numbers) in enumerate(chosen)}
 
 
+def _completeness(entry: tuple[frozenset[str], list[int]]) -> tuple[int, list[str]]:
+    return -len(entry[0]), sorted(entry[0])
+
+
 def egos(scenario: Scenario, label: Label, options: MatchOptions) -> list[int]:
-    """Numbers of the things that may play the ego: the label's own, or any of its class."""
+    """Numbers of the things that may play the ego: the label's own, or any of its class; none where there is none."""
+    own = [0] if label.has_ego else []
     if options.ego == "label":
-        return [0]
+        return own
     wanted = scenario.objects[scenario.ego].category
-    return [0] + [
+    return own + [
         number for number, each in enumerate(label.objects, 1) if class_matches(wanted, each.category, options.classes)
     ]
 
 
 def cast_roles(
-    scenario: Scenario, label: Label, ego: int, options: MatchOptions, given: Mapping[str, str]
+    scenario: Scenario,
+    label: Label,
+    ego: int,
+    options: MatchOptions,
+    given: Mapping[str, str],
+    among: Among | None = None,
 ) -> Cast | Cause:
     """The cast for one choice of ego, or what is lacking.
 
@@ -83,6 +98,7 @@ def cast_roles(
         ego: Number of the thing that plays the ego.
         options: The options.
         given: Ids of label objects that are known to play objects, by the objects' names.
+        among: What is known of who may play whom, for the label's own ego.
     """
     things = (label.ego, *label.objects)
     center = (things[ego].x, things[ego].y)
@@ -90,7 +106,7 @@ def cast_roles(
     near = [
         reach is None or (thing.x - center[0]) ** 2 + (thing.y - center[1]) ** 2 <= reach * reach for thing in things
     ]
-    first = 1 if options.ego == "label" else 0
+    first = 1 if options.ego == "label" or not label.has_ego else 0
     free = [number for number in range(first, len(things)) if number != ego and near[number]]
     of_class: dict[str, tuple[int, ...]] = {}
     candidates: dict[int, tuple[int, ...]] = {}
@@ -104,11 +120,13 @@ def cast_roles(
         found = of_class[thing.category]
         if thing.name in given:
             found = tuple(number for number in found if things[number].id == given[thing.name])
+        if among is not None and thing.index in among:
+            found = tuple(number for number in among[thing.index] if number in found)
         candidates[thing.index] = found
     short = _short(candidates)
     if short is not None:
         thing, count = scenario.objects[short], len(candidates[short])
-        detail = f"{count} of this class, too few" if count else f"no {thing.category}"
+        detail = f"only {count} {thing.category}" if count else f"no {thing.category}"
         return Cause(f"{thing.name}.class", detail, thing.span, (short,))
     spare = len(free) - len(candidates)
     if options.exact and spare:

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import itertools
 
+from scenicq.forest.collisions import apart, boxes
 from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
-from scenicq.forest.nodes import Feature, Intersects, Logic, LogicOp, Node, RectangleAt
-from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
+from scenicq.forest.nodes import Feature, Node
+from scenicq.forest.scenario import BuiltIn, Scenario, ScenarioObject
 from scenicq.match.options import MatchOptions
 
 __all__ = ["Signature", "build_groups", "describe_constraint"]
@@ -24,7 +25,7 @@ _ALWAYS = ("position", "heading")
 def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, noisy: bool = False) -> Node | None:
     """The expression of a feature that is not observed (or, unless `noisy`, whose observed value has noise added)."""
     thing = scenario.objects[feature.object]
-    hidden = thing.mutated and feature.property in _ALWAYS and not noisy
+    hidden = feature.property in thing.mutated and not noisy
     if feature.property in signature[feature.object] and not hidden:
         return None
     return thing.properties[feature.property].value
@@ -32,7 +33,7 @@ def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, n
 
 def compared(thing: ScenarioObject, seen: frozenset[str]) -> list[str]:
     """The properties of an object that are compared with the label, in the order in which they are checked."""
-    always = [name for name in _ALWAYS if name in seen and not thing.mutated]
+    always = [name for name in _ALWAYS if name in seen and name not in thing.mutated]
     others = sorted(
         name for name, given in thing.properties.items() if name in seen and name not in _ALWAYS and given.explicit
     )
@@ -70,24 +71,11 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
         elif requirement.built_in in options.enforce:
             found.append(Condition(requirement, after_noise(requirement.condition)))
     if BuiltIn.COLLISION in options.enforce:
+        frames = boxes(scenario)
         for first, second in itertools.combinations(scenario.solid, 2):
-            requirement = _apart(scenario, first, second)
+            requirement = apart(scenario, frames, first, second)
             found.append(Condition(requirement, after_noise(requirement.condition)))
     return group_constraints(found)
-
-
-def _apart(scenario: Scenario, first: int, second: int) -> Requirement:
-    """That two boxes do not overlap (language paper, section 5.4)."""
-    boxes = [
-        RectangleAt(
-            Feature(index, "position", "vector"),
-            *(Feature(index, name, "scalar") for name in ("heading", "width", "length")),
-        )
-        for index in (first, second)
-    ]
-    span = scenario.objects[second].span
-    apart = Logic(LogicOp.NOT, (Intersects(*boxes, span=span),), span=span)
-    return Requirement(apart, span, BuiltIn.COLLISION, (first, second))
 
 
 def describe_constraint(scenario: Scenario, constraint: Constraint) -> str:

@@ -21,7 +21,7 @@ from scenicq.forest.evaluate import Observation
 from scenicq.forest.groups import Comparison, Constraint, Group
 from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Leaf, Node, Undefined, Value
 from scenicq.forest.walk import leaves, postorder
-from scenicq.geometry.fields import VectorField
+from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.match.affine import AffineVector, affine_scalar, affine_vector
 from scenicq.match.ground import holds, replay, show_value
 from scenicq.match.interval import Reach, reach_heading, reach_number, reach_position
@@ -208,7 +208,7 @@ class _Ladder:
                 more = [*rows, *inside(place, cell.polygon)]
                 outcome = self.decide(fixed, given, more)
                 if not cell.exact and not isinstance(outcome, No) and not self._confirmed(items, outcome):
-                    outcome = self._refine(items, fixed, given, more, place, cell.polygon)
+                    outcome = self._refine(items, fixed, given, more, place, cell)
                 yield outcome
 
         return self._branch(constraint, outcomes())
@@ -233,15 +233,17 @@ class _Ladder:
         given: dict[Identity, Value],
         rows: list[Row],
         place: AffineVector,
-        cell: np.ndarray,
+        cell: FieldCell,
     ) -> Outcome:
         """A cell that covers too much, halved again and again: until a witness holds, or no part is left."""
-        (x0, y0), (x1, y1) = cell.min(axis=0).tolist(), cell.max(axis=0).tolist()
+        (x0, y0), (x1, y1) = cell.polygon.min(axis=0).tolist(), cell.polygon.max(axis=0).tolist()
         todo: deque[Box] = deque([((x0, x1), (y0, y1))])
         for _ in range(_MOST_PARTS):
             if not todo:
                 return No(items[0][0])
             x, y = todo.popleft()
+            if cell.part((x[0], y[0], x[1], y[1])) is None:
+                continue
             here = [*rows, Row(place[0], *x), Row(place[1], *y)]
             outcome = self.decide(fixed, given, here)
             if self._confirmed(items, outcome):

@@ -10,19 +10,23 @@ no: a group that nothing decides leaves the label undecided unless another corre
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
 from scenicq.forest.groups import Comparison
+from scenicq.forest.nodes import Leaf
 from scenicq.forest.scenario import Scenario
+from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.asking import ask
 from scenicq.match.attempt import Attempt, Failure, Solution
-from scenicq.match.casting import cast_roles, egos
+from scenicq.match.casting import Among, cast_roles, egos
 from scenicq.match.constraints import Signature, describe_constraint
+from scenicq.match.direct import Casting, Direct, direct_of, signature_of
 from scenicq.match.ladder import Item, No, Outcome
 from scenicq.match.options import MatchOptions
 from scenicq.match.planning import MatchPlan, make_plan, relevant_properties
+from scenicq.match.quick import Places, Quick
 from scenicq.match.search import Exhausted, Reporter
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.smt.answer import Solver
@@ -63,6 +67,8 @@ class Matcher:
     solver: Solver | None = None
     _plans: dict[Signature, MatchPlan] = field(default_factory=dict["Signature", "MatchPlan"], repr=False)
     _kinds: dict[Hashable, int] = field(default_factory=dict["Hashable", int], repr=False)
+    _directs: dict[MatchPlan, Direct | None] = field(default_factory=dict["MatchPlan", "Direct | None"], repr=False)
+    _places: dict[Leaf, str] = field(default_factory=dict["Leaf", "str"], repr=False)
     _relevant: tuple[frozenset[str], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -70,7 +76,13 @@ class Matcher:
         self._relevant = relevant_properties(self.scenario, self.options)
 
     def match(
-        self, label: Label, reporter: Reporter | None = None, *, given: Mapping[str, str] | None = None
+        self,
+        label: Label,
+        reporter: Reporter | None = None,
+        *,
+        given: Mapping[str, str] | None = None,
+        among: Among | None = None,
+        places: Places | None = None,
     ) -> Verdict:
         """Decide one label.
 
@@ -78,8 +90,35 @@ class Matcher:
             label: The label, of the map that the scenario was compiled for.
             reporter: Watches the correspondence search.
             given: Ids of label objects that are known to play objects, by the objects' names.
+            among: What is known of who may play whom.
+            places: What is known of places of the map; see `look_up`.
         """
-        return next(self._findings(label, reporter, given or {})).verdict
+        if among is not None and places is not None and not given and reporter is None:
+            found = self._direct(label, among, places)
+            if found is not None:
+                return found
+        return next(self._findings(label, reporter, given or {}, among, places)).verdict
+
+    def _direct(self, label: Label, among: Among, places: Places) -> Match | NoMatch | None:
+        """What is found without a search, if it is clear."""
+        options = self.options
+        if options.method != "auto" or options.exact or options.ego != "label" or not label.has_ego:
+            return None
+        ego = self.scenario.ego
+        signature = signature_of(label, ego, among, self._relevant)
+        if signature is None:
+            return None
+        plan = self.plan(signature)
+        if plan not in self._directs:
+            self._directs[plan] = direct_of(plan, self.scenario)
+        direct = self._directs[plan]
+        if direct is None:
+            return None
+        disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
+        found = Casting(direct, options, label, ego, among, disc, places).solve()
+        if isinstance(found, Failure):
+            return NoMatch(self._cause(found), self._names(label, 0, found.assignment))
+        return None if found is None else self._match(label, 0, found)
 
     def examine(self, label: Label) -> Finding:
         """Decide one label and keep what the verdict rests on."""
@@ -89,7 +128,45 @@ class Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared."""
         return Matcher(self.scenario, options, self.solver, self._plans, self._kinds)
 
-    def matches(self, label: Label, *, given: Mapping[str, str] | None = None) -> Iterator[Match]:
+    def look_up(self, labels: Iterable[tuple[Label, Among | None]]) -> Places:
+        """What the map says of the places of labels, as far as earlier labels have shown that it matters.
+
+        Args:
+            labels: Labels, each with what is known of who may play whom.
+        """
+        asked: dict[int, list[Quick]] = {}
+        for plan in self._plans.values():
+            for group in plan.groups:
+                if group.quick is not None and group.quick.index >= 0:
+                    asked.setdefault(group.quick.index, []).append(group.quick)
+        where: dict[int, list[tuple[float, float]]] = {index: [] for index in asked}
+        for label, among in labels:
+            for index, found in where.items():
+                if index == self.scenario.ego:
+                    found.append((label.ego.x, label.ego.y))
+                else:
+                    numbers = range(1, len(label.objects) + 1) if among is None else among.get(index, ())
+                    found += [(label.objects[number - 1].x, label.objects[number - 1].y) for number in numbers]
+        places = Places()
+        fields: dict[RoadDirection, list[tuple[float, float]]] = {}
+        for index, quicks in asked.items():
+            for quick in quicks:
+                if quick.field is not None:
+                    fields.setdefault(quick.field, []).extend(where[index])
+                if quick.region is not None:
+                    places.look_up((), (quick.region,), where[index])
+        for flow, positions in fields.items():
+            places.look_up((flow,), (), positions)
+        return places
+
+    def matches(
+        self,
+        label: Label,
+        *,
+        given: Mapping[str, str] | None = None,
+        among: Among | None = None,
+        places: Places | None = None,
+    ) -> Iterator[Match]:
         """Every correspondence by which a label matches; of interchangeable objects, one order only.
 
         Stops early where the budget of the options is used up.
@@ -97,8 +174,10 @@ class Matcher:
         Args:
             label: The label.
             given: As of `match`.
+            among: As of `match`.
+            places: As of `match`.
         """
-        found = (finding.verdict for finding in self._findings(label, None, given or {}))
+        found = (finding.verdict for finding in self._findings(label, None, given or {}, among, places))
         return (verdict for verdict in found if isinstance(verdict, Match))
 
     def plan(self, signature: Signature) -> MatchPlan:
@@ -111,16 +190,23 @@ class Matcher:
         """Decide groups together by the solver."""
         return ask(items, self.options, self.solver)
 
-    def _findings(self, label: Label, reporter: Reporter | None, given: Mapping[str, str]) -> Iterator[Finding]:
+    def _findings(
+        self,
+        label: Label,
+        reporter: Reporter | None,
+        given: Mapping[str, str],
+        among: Among | None = None,
+        places: Places | None = None,
+    ) -> Iterator[Finding]:
         """Matches, or else the one verdict that there is."""
         matched = False
         rest: list[tuple[int, Finding]] = []
         for ego in egos(self.scenario, label, self.options):
-            cast_ = cast_roles(self.scenario, label, ego, self.options, given)
+            cast_ = cast_roles(self.scenario, label, ego, self.options, given, among)
             if isinstance(cast_, Cause):
                 rest.append((0, Finding(NoMatch(cast_, self._names(label, ego, {})))))
                 continue
-            attempt = Attempt(self.scenario, self.options, cast_, self.ask, reporter)
+            attempt = Attempt(self.scenario, self.options, cast_, self.ask, reporter, places or Places())
             exhausted = False
             try:
                 for signature, candidates in cast_.signatures(self._relevant):
@@ -134,7 +220,12 @@ class Matcher:
             rest.append((weight, Finding(verdict, attempt)))
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest
-            yield max(rest, key=lambda each: each[0])[1]
+            yield max(rest, key=lambda each: each[0], default=(0, Finding(NoMatch(self._without_ego()))))[1]
+
+    def _without_ego(self) -> Cause:
+        thing = self.scenario.objects[self.scenario.ego]
+        detail = "the source has no ego" if self.options.ego == "label" else f"no {thing.category}"
+        return Cause(f"{thing.name}.class", detail, thing.span, (thing.index,))
 
     def _rest(self, label: Label, attempt: Attempt, *, exhausted: bool) -> tuple[int, Verdict]:
         """The verdict of an attempt without a match, and its weight."""
@@ -172,7 +263,9 @@ class Matcher:
             for leaf in group.group.variables:
                 value = outcome.values.get(leaf.identity)
                 if value is not None:
-                    place = leaf.span.place if leaf.span else type(leaf).__name__
+                    place = self._places.get(leaf)
+                    if place is None:
+                        place = self._places[leaf] = leaf.span.place if leaf.span else type(leaf).__name__
                     counts[place] = counts.get(place, 0) + 1
                     key = place if counts[place] == 1 else f"{place}#{counts[place]}"
                     witness[key] = cast("WitnessValue", value)

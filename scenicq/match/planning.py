@@ -10,6 +10,7 @@ from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.forest.walk import features
 from scenicq.match.constraints import Signature, build_groups
 from scenicq.match.options import MatchOptions
+from scenicq.match.quick import Quick, quick_of
 from scenicq.match.shape import Shape, interchangeable, shape_of
 
 __all__ = ["GroupPlan", "MatchPlan", "make_plan", "relevant_properties"]
@@ -23,14 +24,16 @@ class GroupPlan:
         group: The group.
         kind: Number of its shape: equal for groups that ask the same question of their roles.
         roles: The objects that it is about, the ego left out, in the order in which the question speaks of them.
+        quick: Its closed form, if it has one.
     """
 
     group: Group
     kind: int
     roles: tuple[int, ...]
+    quick: Quick | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class MatchPlan:
     """A scenario's groups for one signature, sorted by how many objects they are about.
 
@@ -83,7 +86,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
     for group in build_groups(scenario, signature, options):
         shape = shape_of(group, scenario.ego)
         shapes.append(shape)
-        groups.append(GroupPlan(group, kinds.setdefault(shape.key, len(kinds)), shape.roles))
+        groups.append(GroupPlan(group, kinds.setdefault(shape.key, len(kinds)), shape.roles, quick_of(group)))
         for index in shape.roles:
             links.setdefault(index, set()).update(shape.roles)
     unary: dict[int, list[GroupPlan]] = {}

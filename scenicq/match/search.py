@@ -158,6 +158,7 @@ def find_assignments(
     links: Mapping[int, Collection[int]] | None = None,
     budget: int = 1_000_000,
     reporter: Reporter | None = None,
+    in_order: bool = False,
 ) -> Iterator[dict[int, int]]:
     """Every assignment of distinct candidates to slots that passes the check, depth first with backjumping.
 
@@ -170,6 +171,7 @@ def find_assignments(
         links: For a slot, those that it shares conditions with: they are assigned soon after it.
         budget: Candidates to try at most.
         reporter: Watches.
+        in_order: Whether slots are assigned in the order of their names, not the most constrained first.
 
     Raises:
         Exhausted: The budget is used up.
@@ -178,7 +180,7 @@ def find_assignments(
     assignment = dict(fixed or {})
     used = {candidate: slot for slot, candidate in assignment.items()}
     twin_of = twins or {}
-    order = _order(slots, twin_of, links or {})
+    order = sorted(slots, key=lambda slot: slot.name) if in_order else _order(slots, twin_of, links or {})
     matching = _Matching([Slot(s.name, tuple(c for c in s.candidates if c not in used)) for s in order])
     if not matching.complete():
         return

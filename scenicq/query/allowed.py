@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from scenicq.errors import Span
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.condition import condition
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
-from scenicq.forest.nodes import Compare, Constant, Node, PointIn, Undefined, Value
+from scenicq.forest.nodes import Compare, Constant, Index, Node, PointIn, Undefined, Value
 from scenicq.forest.walk import features, leaves
 from scenicq.geometry.angles import normalize
 from scenicq.match.attempt import Attempt
@@ -20,10 +22,12 @@ from scenicq.match.ladder import Item, No, Yes, decide
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import Tolerance
 
-__all__ = ["Violation", "violations"]
+__all__ = ["Violation", "choices", "violations"]
 
 _FAR_M = 1000.0
 _STEPS = 40
+_MOST_CHOICES = 16
+_MOST_INTERVALS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,15 +125,28 @@ def _region_names(node: Node) -> list[str]:
     return list(dict.fromkeys(name for name in names if name))
 
 
+def choices(root: Node) -> Iterator[Node]:
+    """The expression for each way to choose among options; nothing if there are too many."""
+    indices = [leaf for leaf in leaves(root) if isinstance(leaf, Index)]
+    if math.prod(len(leaf.weights) for leaf in indices) > _MOST_CHOICES:
+        return
+    for picked in itertools.product(*(range(len(leaf.weights)) for leaf in indices)):
+        chosen = {leaf.identity: float(number) for leaf, number in zip(indices, picked, strict=True)}
+        yield condition(root, {}, chosen)
+
+
 def _interval(property_: str, node: Node) -> str:
-    low, high = scalar_bounds(node)
-    if property_ == "heading":
-        if not high - low < math.tau:
+    """The interval of each way to choose among options, or what holds them all."""
+    bounds = sorted({scalar_bounds(option) for option in choices(node)}) or [scalar_bounds(node)]
+    if len(bounds) > _MOST_INTERVALS:
+        bounds = [scalar_bounds(node)]
+    shown: list[str] = []
+    for low, high in bounds:
+        if (property_ == "heading" and not high - low < math.tau) or not (math.isfinite(low) or math.isfinite(high)):
             return ""
-        low, high = normalize(low), normalize(low) + (high - low)
-    if not (math.isfinite(low) or math.isfinite(high)):
-        return ""
-    return f"allowed: {show_value(property_, low)} to {show_value(property_, high)}"
+        turn = normalize(low) - low if property_ == "heading" else 0.0
+        shown.append(f"{show_value(property_, low + turn)} to {show_value(property_, high + turn)}")
+    return f"allowed: {' or '.join(shown)}"
 
 
 def _off(constraint: Comparison, node: Node, observed: Value) -> str:

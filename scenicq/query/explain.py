@@ -124,7 +124,8 @@ def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas
     if failure is not None and finding.attempt is not None and isinstance(finding.verdict, NoMatch):
         found = violations(matcher, finding.attempt, failure.group, failure.assignment)
     if not found:
-        found = (Violation(cause.what, cause.detail, "", cause.span),)
+        told = "is not met" if isinstance(finding.verdict, NoMatch) else "is not decided"
+        found = (Violation(cause.what, told, cause.detail, cause.span),)
     return Explanation(label.frame, finding.verdict, shown, violations=found)
 
 
@@ -220,7 +221,11 @@ def _show_proofs(proofs: Sequence[Proof]) -> list[str]:
 
 
 def _show_violation(violation: Violation) -> str:
-    message = f"`{violation.what}` {violation.value}".rstrip()
+    role, dot, end = violation.what.rpartition(".")
+    if dot and end == "class":
+        message = f"no label object can play `{role}`"
+    else:
+        message = f"`{violation.what}` {violation.value}".rstrip()
     if violation.span is None:
         return f"excluded: {message}" + (f"\n  {violation.allowed}" if violation.allowed else "")
     return render(Diagnostic("frame-excluded", message, violation.span, violation.allowed, severity="excluded"))

@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 from pyarrow import feather
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.match.verdict import Match
+from scenicq.match.verdict import Match, Unknown
 from scenicq.query.export_interchange import write_interchange
 from scenicq.query.export_openlabel import write_openlabel
 from scenicq.query.matched import Matched
@@ -67,6 +67,8 @@ class Exporter:
     target: Path
     scenario: str = ""
     _matched: dict[str, Matched] = field(default_factory=dict[str, Matched], init=False, repr=False)
+    _further: int = field(default=0, init=False, repr=False)
+    _unknown: int = field(default=0, init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.kind not in EXPORTS:
@@ -87,7 +89,9 @@ class Exporter:
         """Take a result; those that are no match are passed over, of several of one frame the first counts."""
         if isinstance(result.verdict, Match):
             roles = dict(result.verdict.correspondence)
+            self._further += result.frame in self._matched
             self._matched.setdefault(result.frame, Matched(result.frame, result.recording, roles, dict(result.sensors)))
+        self._unknown += isinstance(result.verdict, Unknown)
 
     def finish(self) -> ExportSummary:
         """Write the folder.
@@ -110,6 +114,15 @@ class Exporter:
             raise DataError(Diagnostic("target-unwritable", message)) from error
         finally:
             shutil.rmtree(beside, ignore_errors=True)
+        told = (
+            (self._further, "further matches of frames that are there already"),
+            (self._unknown, "frames that could not be decided"),
+        )
+        problems += [
+            Diagnostic("record-invalid", f"{count} {what} are left out", severity="warning")
+            for count, what in told
+            if count
+        ]
         return ExportSummary(self.target, tuple(files), len(self._matched), tuple(problems))
 
     @property

@@ -30,17 +30,14 @@ def write_interchange(dataset: Dataset, frames: Collection[str], folder: Path) -
     """
     maps: set[str] = set()
     classes: dict[str, str] = {}
-    skipped = skipped_frames = 0
+    egoless = False
     with (folder / "labels.jsonl").open("w", encoding="utf-8") as file:
         for label in dataset.labels(frames):
-            if label.ego.heading is None:
-                skipped_frames += 1
-                continue
-            sound = [member for member in label.objects if member.heading is not None]
-            skipped += len(label.objects) - len(sound)
-            classes.update((member.source_class, member.category) for member in (label.ego, *sound))
+            egoless |= not label.has_ego
+            members = (*([label.ego] if label.has_ego else []), *label.objects)
+            classes.update((member.source_class, member.category) for member in members)
             maps.add(label.map)
-            file.write(json.dumps(label_record(label, sound), ensure_ascii=False) + "\n")
+            file.write(json.dumps(label_record(label, list(label.objects)), ensure_ascii=False) + "\n")
     classes.pop("", None)
     known = sorted(maps.intersection(dataset.manifest.maps))
     # The name of a map is that of its file, so it must be one: a name with a slash could lead out of the folder.
@@ -48,14 +45,12 @@ def write_interchange(dataset: Dataset, frames: Collection[str], folder: Path) -
     for name in named:
         write_map(folder / "maps" / f"{name}.geojson", dataset.features(name))
     header = {"name": dataset.manifest.name, "interchange": 1, "angle": "heading", "classes": "classes.json"}
+    if egoless:
+        header["ego"] = "none"
     (folder / "dataset.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
     text = json.dumps(classes or {"car": "Car"}, indent=1, ensure_ascii=False, sort_keys=True)
     (folder / "classes.json").write_text(text + "\n", encoding="utf-8")
     return [
-        Diagnostic("record-invalid", f"{count} {what} without a heading are left out", severity="warning")
-        for count, what in ((skipped_frames, "frames with an ego"), (skipped, "objects"))
-        if count
-    ] + [
         Diagnostic("map-missing", f"map `{name}` is left out: no file can be called so", severity="warning")
         for name in sorted({*known} - {*named})
     ]
@@ -68,7 +63,7 @@ def label_record(label: Label, objects: list[LabelObject]) -> dict[str, Any]:
         "recording": label.recording,
         "timestamp_us": label.timestamp_us,
         "map": label.map,
-        "ego": _object(label.ego, named=False),
+        "ego": _object(label.ego, named=False) if label.has_ego else None,
         "objects": [_object(member, named=True) for member in objects],
     }
     if label.params:

@@ -1,7 +1,7 @@
 """Frames of a dataset as ASAM OpenLABEL 1.0: a file a recording, a tag a match, the role of each object.
 
-The frame of reference is the map's. It has no height, so boxes have z = 0 at their centre; an object whose size or
-heading is not known has a position and no box.
+The frame of reference is the map's. It has no height, so boxes have z = 0 at their centre. An object whose size or
+heading is not known has no box, but a position and what is known of the rest. Maps have no place in the format.
 """
 
 from __future__ import annotations
@@ -32,8 +32,10 @@ def write_openlabel(dataset: Dataset, matched: Mapping[str, Matched], folder: Pa
         scenario: What the tags call the scenario.
 
     Returns:
-        Warnings about what the format cannot hold; none so far.
+        Warnings about what the format cannot hold.
     """
+    boxless = 0
+    maps: set[str] = set()
     labels: list[Label] = []
     number = 0
     for label in dataset.labels(matched):
@@ -41,9 +43,18 @@ def write_openlabel(dataset: Dataset, matched: Mapping[str, Matched], folder: Pa
             _write(folder, number, labels, matched, scenario)
             labels, number = [], number + 1
         labels.append(label)
+        boxless += sum(_box(member) is None for member in _members(label))
+        maps.add(label.map)
     if labels:
         _write(folder, number, labels, matched, scenario)
-    return []
+    left_out = [f"{boxless} objects have no box: a size or the heading is not known"] if boxless else []
+    if mapped := [name for name in sorted(maps) if dataset.features(name)]:
+        left_out.append(f"maps are left out, which the format does not hold: {', '.join(mapped)}")
+    return [Diagnostic("record-invalid", message, severity="warning") for message in left_out]
+
+
+def _members(label: Label) -> tuple[LabelObject, ...]:
+    return (label.ego, *label.objects) if label.has_ego else label.objects
 
 
 def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str, Matched], scenario: str) -> None:
@@ -55,21 +66,23 @@ def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str,
         for role, member in matched[label.frame].roles.items():
             roles.setdefault(member, []).append(role)
         members: dict[str, Any] = {}
-        for member in (label.ego, *label.objects):
+        for member in _members(label):
             key = member.track or member.id if member.id != "ego" else "ego"
             objects.setdefault(key, {"name": key, "type": member.category})
             members[key] = {"object_data": _data(member, roles.get(member.id, []))}
-        frames[str(index)] = {
-            "objects": members,
-            "frame_properties": {"timestamp": f"{label.timestamp_us / 1e6:.6f}", "frame_id": label.frame},
-        }
+        properties: dict[str, Any] = {"timestamp": f"{label.timestamp_us / 1e6:.6f}", "frame_id": label.frame}
+        if label.sensors:
+            properties["streams"] = {channel: {"uri": path} for channel, path in label.sensors.items()}
+        frames[str(index)] = {"objects": members, "frame_properties": properties}
         texts = {"scenario": scenario, "frame": label.frame, "recording": label.recording, "map": label.map}
+        told = _values(label.params)
         tags[str(index)] = {
             "type": "ScenarioMatch",
             "ontology_uid": "0",
             "tag_data": {
-                "text": [{"name": name, "val": value} for name, value in texts.items()],
-                "num": [{"name": "frame_index", "val": index}],
+                **told,
+                "text": [*({"name": name, "val": value} for name, value in texts.items()), *told.get("text", ())],
+                "num": [{"name": "frame_index", "val": index}, *told.get("num", ())],
             },
         }
     content: dict[str, Any] = {
@@ -91,15 +104,38 @@ def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str,
 def _data(member: LabelObject, roles: list[str]) -> dict[str, Any]:
     texts = [{"name": "role", "val": role} for role in roles]
     texts.append({"name": "source_class", "val": member.source_class})
-    data: dict[str, Any] = {
-        "vec": [{"name": "position", "val": [member.x, member.y], "coordinate_system": _MAP}],
-        "text": texts,
-    }
+    data: dict[str, Any] = _values(member.attributes)
+    data["vec"] = [{"name": "position", "val": [member.x, member.y], "coordinate_system": _MAP}]
+    data["text"] = texts + data.get("text", [])
     if member.velocity is not None:
         data["vec"].append({"name": "velocity", "val": list(member.velocity), "coordinate_system": _MAP})
-    sizes = (member.length, member.width, member.height)
-    if member.heading is not None and all(size is not None for size in sizes):
-        yaw = math.remainder(member.heading + math.pi / 2, 2 * math.pi)
-        value = [member.x, member.y, 0.0, 0.0, 0.0, yaw, *sizes]
-        data["cuboid"] = [{"name": "box", "val": value, "coordinate_system": _MAP}]
+    if (box := _box(member)) is not None:
+        data["cuboid"] = [{"name": "box", "val": box, "coordinate_system": _MAP}]
+        return data
+    known = {"yaw": _yaw(member), "length": member.length, "width": member.width, "height": member.height}
+    numbers = [{"name": name, "val": value} for name, value in known.items() if value is not None]
+    if numbers:
+        data["num"] = numbers + data.get("num", [])
     return data
+
+
+def _yaw(member: LabelObject) -> float | None:
+    """Counted from +x, as the format does."""
+    return None if member.heading is None else math.remainder(member.heading + math.pi / 2, 2 * math.pi)
+
+
+def _box(member: LabelObject) -> list[float] | None:
+    """Centre, rotations and extents along the box's own axes; None where one is not known."""
+    yaw, length, width, height = _yaw(member), member.length, member.width, member.height
+    if yaw is None or length is None or width is None or height is None:
+        return None
+    return [member.x, member.y, 0.0, 0.0, 0.0, yaw, length, width, height]
+
+
+def _values(values: Mapping[str, str | float | bool]) -> dict[str, list[dict[str, Any]]]:
+    """Named values by the kinds that the format has."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for name, value in values.items():
+        kind = "text" if isinstance(value, str) else "boolean" if isinstance(value, bool) else "num"
+        found.setdefault(kind, []).append({"name": name, "val": value})
+    return found

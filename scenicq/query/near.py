@@ -10,13 +10,16 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, replace
+from itertools import islice
 
 from scenicq.errors import ScenarioError
 from scenicq.match.matcher import Finding, Matcher
 from scenicq.match.options import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch
-from scenicq.query.plan import make_plan
+from scenicq.query.plan import Plan, make_plan
+from scenicq.query.prefilter import names, sift
 from scenicq.query.results import Result
 from scenicq.query.run import Query
 from scenicq.query.solving import LazySolver
@@ -132,16 +135,21 @@ def _candidates(query: Query, most_frames: int) -> Iterator[tuple[Matcher, Label
                     continue
                 raise
             matcher = Matcher(scenario, options.match, solver)
-            connection = query.dataset.connect()
-            try:
-                rows = make_plan(scenario, network, wide).run(connection)
-                frames = [row.frame for row in rows if row.step is None][:left]
-            finally:
-                connection.close()
+            frames = list(islice(_frames(query, make_plan(scenario, network, wide)), left))
             left -= len(frames)
             for start in range(0, len(frames), _BATCH):
                 for label in query.dataset.labels(frames[start : start + _BATCH]):
                     yield matcher, label
+
+
+def _frames(query: Query, plan: Plan) -> Iterator[str]:
+    """The frames that a prefilter leaves."""
+    with closing(query.dataset.connect()) as connection:
+        for block in query.blocks(plan.map):
+            missed = sift(query.dataset, connection, plan, block).tolist()
+            if min(missed, default=0) < 0:
+                rows = zip(names(connection), missed, strict=True)
+                yield from (frame for (frame, _, _), number in rows if number < 0)
 
 
 def near_results(

@@ -84,10 +84,21 @@ class Funnel:
     reasons: Counter[str] = field(default_factory=Counter[str])
     warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
 
-    def exclude(self, what: str) -> None:
-        """Count a frame that the prefilter excludes."""
-        self.frames += 1
-        self.excluded[what] += 1
+    def add(self, other: Funnel) -> None:
+        """Count in what was found elsewhere."""
+        self.frames += other.frames
+        self.candidates += other.candidates
+        self.cast += other.cast
+        self.matches += other.matches
+        self.unknowns += other.unknowns
+        self.excluded.update(other.excluded)
+        self.reasons.update(other.reasons)
+        self.warnings += [warning for warning in other.warnings if warning not in self.warnings]
+
+    def exclude(self, what: str, frames: int = 1) -> None:
+        """Count frames that the prefilter excludes."""
+        self.frames += frames
+        self.excluded[what] += frames
 
     def count(self, verdict: Verdict) -> None:
         """Count a verdict of the matcher."""

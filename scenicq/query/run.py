@@ -1,36 +1,34 @@
 """Running a query: compile per map, prefilter, match the candidates, in the order of the store.
 
-Candidates go through the matcher in batches, in this process or in workers; results come out in order either way.
+The dataset is worked through block by block, in this process or in workers; results come out in order either way.
 """
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import ExitStack
-from dataclasses import dataclass, field
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import Any, Literal, cast
+
+import numpy as np
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
-from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
-from scenicq.query.plan import Excluded, Plan, frames_sql, make_plan
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
+from scenicq.processes import Lost, Workers
+from scenicq.query.deciding import Decided, Decider, World, every_label
+from scenicq.query.maps import about_dataset, map_remark
+from scenicq.query.plan import Plan
+from scenicq.query.prefilter import Block, Extent, blocks, extents
 from scenicq.query.results import Funnel, Result
-from scenicq.query.solving import LazySolver
 from scenicq.store.dataset import Dataset, open_dataset
-from scenicq.store.labels import Label
+from scenicq.store.manifest import Counts
 
-__all__ = ["Query", "QueryOptions", "read_program"]
-
-_BATCH = 256
+__all__ = ["Query", "QueryOptions", "Stretch", "read_program"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +87,28 @@ def beside(path: Path) -> Callable[[str], Source | None]:
     return load
 
 
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Recordings of a map that follow each other in the order of their names.
+
+    Attributes:
+        first, last: The same name for one recording.
+        frames: How many frames they have.
+    """
+
+    first: str
+    last: str
+    frames: int
+
+
+@dataclass(slots=True)
+class _Known:
+    """What a query has found out once, for it and its copies with other recordings."""
+
+    worlds: dict[str, World] = field(default_factory=dict["str", "World"])
+    extents: dict[str, list[Extent]] | None = None
+
+
 @dataclass(eq=False)
 class Query:
     """A scenario and a dataset, ready to run.
@@ -97,15 +117,18 @@ class Query:
         dataset: The dataset.
         source: The program.
         options: The options.
-        recordings: The first and the last recording to look at, in order of their names; None for all.
+        recordings: What to look at on which map; everything if None.
         funnel: Filled while results are taken.
+        file: Of the program, whose folder has the files that it imports; by its name if None.
     """
 
     dataset: Dataset
     source: Source
     options: QueryOptions = QueryOptions()
-    recordings: tuple[str, str] | None = None
+    recordings: Mapping[str, Stretch] | None = None
     funnel: Funnel = field(default_factory=Funnel)
+    file: Path | None = None
+    _known: _Known = field(default_factory=_Known, repr=False)
 
     def compile(self, map_name: str) -> tuple[Scenario, Network]:
         """The scenario over one of the dataset's maps.
@@ -115,13 +138,16 @@ class Query:
         """
         network = self.dataset.network(map_name)
         options = self.options
-        scenario = compile_scenario(
-            self.source,
-            network,
-            version=options.version,
-            initial=options.initial,
-            loader=beside(Path(self.source.name)),
-        )
+        try:
+            scenario = compile_scenario(
+                self.source,
+                network,
+                version=options.version,
+                initial=options.initial,
+                loader=beside(self.file or Path(self.source.name)),
+            )
+        except ScenarioError as error:
+            raise about_dataset(error, self.dataset, map_name) from None
         return scenario, network
 
     def _check_ego(self) -> None:
@@ -132,38 +158,87 @@ class Query:
             raise DataError(
                 Diagnostic(
                     "option-invalid",
-                    f"{self.dataset.path} was ingested without an ego",
+                    f"{self.dataset.name} was ingested without an ego",
                     hints=("`--ego any` lets the scenario's ego be any object of its class",),
                 )
             )
 
-    def _worlds(self) -> list[tuple[str, Scenario, Network]]:
+    def world(self, map_name: str) -> World:
+        """The scenario over one of the dataset's maps, with its prefilter; compiled once.
+
+        Raises:
+            ScenarioError: The program is wrong, or does not fit the map.
+        """
+        worlds = self._known.worlds
+        if map_name not in worlds:
+            options = self.options
+            worlds[map_name] = World.of(*self.compile(map_name), options.match, prefilter=options.prefilter)
+        return worlds[map_name]
+
+    def _worlds(self) -> list[tuple[str, World]]:
         """The scenario over each map that it fits; an error if it fits none."""
         self._check_ego()
-        found: list[tuple[str, Scenario, Network]] = []
+        found: list[tuple[str, World]] = []
         errors: list[ScenarioError] = []
         for name in self.dataset.maps:
             try:
-                found.append((name, *self.compile(name)))
+                found.append((name, self.world(name)))
             except ScenarioError as error:
                 if error.diagnostics[0].code != "map-lacks":
                     raise
                 errors.append(error)
-                frames = self.dataset.manifest.by_map.get(name)
-                count = frames.frames if frames else 0
+                count = self.dataset.manifest.by_map.get(name, Counts()).frames
                 message = f"{count} frames on map `{name}` cannot match: {error.diagnostics[0].message}"
                 self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
-                self.funnel.frames += count
-                self.funnel.excluded[f"map {name}"] += count
+                if here := self._frames(name):
+                    self.funnel.frames += here
+                    self.funnel.excluded[f"map {name}"] += here
         if errors and not found:
             raise errors[0]
         if found:
-            self.funnel.warnings += _remarks(found[0][1])
+            self.funnel.warnings += _remarks(found[0][1].scenario)
+            if remark := map_remark(self.source, self.options.version, self.dataset):
+                self.funnel.warnings.append(remark)
         return found
+
+    def _frames(self, map_name: str) -> int:
+        """How many frames of a map are looked at."""
+        if self.recordings is None:
+            return self.dataset.manifest.by_map.get(map_name, Counts()).frames
+        return self.recordings[map_name].frames if map_name in self.recordings else 0
+
+    def _between(self, map_name: str) -> tuple[str, str] | None:
+        """The first and the last recording of a map that are looked at; None for all."""
+        return None if self.recordings is None else (self.recordings[map_name].first, self.recordings[map_name].last)
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
-        return [make_plan(s, network, self.options.match, self.recordings) for _, s, network in self._worlds()]
+        return [world.plan for name, world in self._worlds() if self._frames(name)]
+
+    def blocks(self, map_name: str, least: int = 1) -> list[Block]:
+        """The frames of a map that are looked at, cut into blocks in the order of the store.
+
+        Args:
+            map_name: The map.
+            least: Blocks that there should be, unless they would become very small.
+        """
+        if self._known.extents is None:
+            with closing(self.dataset.connect()) as connection:
+                self._known.extents = extents(self.dataset, connection)
+        return blocks(self._known.extents, map_name, self._between(map_name), least=least, whole=self.options.prefilter)
+
+    def decider(self) -> Decider:
+        """What decides the blocks of this query in one process; to be used in a `with` statement."""
+        options = self.options
+        return Decider(
+            self.dataset,
+            options.match,
+            options.solver,
+            self.world,
+            threads=1 if options.jobs > 1 else None,
+            all_matches=options.all_matches,
+            every=options.every,
+        )
 
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.
@@ -177,53 +252,53 @@ class Query:
         worlds = self._worlds()
         left = self.options.limit
         with ExitStack() as stack:
+            stack.enter_context(self.dataset.blamed())
             pool = stack.enter_context(_Pool(self)) if self.options.jobs > 1 else None
-            solver = stack.enter_context(LazySolver(self.options.solver))
-            for name, scenario, network in worlds:
-                matcher = Matcher(scenario, self.options.match, solver)
-                for result, decided in self._on_map(name, matcher, network, pool):
-                    if progress is not None:
-                        progress(decided)
-                    if result is None:
-                        continue
+            decider = stack.enter_context(self.decider())
+            for name, world in worlds:
+                if not self._frames(name):
+                    continue
+                cut = self.blocks(name, 4 * self.options.jobs if pool else 1)
+                decided = pool.run(cut) if pool else map(decider.decide, cut)
+                for result in self._merge(world.plan, decided, progress or _ignore):
                     yield result
                     if isinstance(result.verdict, Match) and left is not None:
                         left -= 1
                         if left <= 0:
                             return
 
-    def _on_map(
-        self, name: str, matcher: Matcher, network: Network, pool: _Pool | None
-    ) -> Iterator[tuple[Result | None, int]]:
-        connection = self.dataset.connect()
-        try:
-            if self.options.prefilter:
-                plan = make_plan(matcher.scenario, network, self.options.match, self.recordings)
-                rows = plan.run(connection)
-            else:
-                rows = _all_frames(connection, name, self.recordings)
-            batches = _batches(rows)
-            decided = pool.run(name, batches) if pool else ((b, _decide(self, matcher, b)) for b in batches)
-            for batch, found in decided:
-                yield from self._merge(batch, found)
-        finally:
-            connection.close()
-
-    def _merge(self, batch: list[Excluded], found: dict[str, list[Result]]) -> Iterator[tuple[Result | None, int]]:
-        for row in batch:
-            if row.step is None:
-                first, *more = found[row.frame]
+    def _merge(self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]) -> Iterator[Result]:
+        for block in decided:
+            found = iter(block.found)
+            start = 0
+            for place in np.flatnonzero(block.missed < 0).tolist():
+                yield from self._excluded(plan, block, start, place)
+                first, *more = next(found)
                 self.funnel.count(first.verdict)
-                shown = self.options.every or isinstance(first.verdict, Match | Unknown)
-                yield (first if shown else None), 1
-                yield from ((result, 0) for result in more)
-            else:
-                self.funnel.exclude(row.step.what)
-                excluded = None
-                if self.options.every:
-                    cause = Cause(row.step.what, row.step.detail, row.step.span)
-                    excluded = Result(row.frame, row.recording, row.timestamp_us, NoMatch(cause))
-                yield excluded, 1
+                progress(place + 1 - start)
+                start = place + 1
+                if self.options.every or isinstance(first.verdict, Match | Unknown):
+                    yield first
+                yield from more
+            yield from self._excluded(plan, block, start, len(block.missed))
+            progress(len(block.missed) - start)
+
+    def _excluded(self, plan: Plan, block: Decided, start: int, end: int) -> Iterator[Result]:
+        """Count the frames between two candidates."""
+        if start == end:
+            return
+        missed = block.missed[start:end]
+        for step, count in zip(*np.unique(missed, return_counts=True), strict=True):
+            self.funnel.exclude(plan.steps[int(step)].what, int(count))
+        if self.options.every:
+            numbers: list[int] = missed.tolist()
+            for (frame, recording, time), number in zip(block.names[start:end], numbers, strict=True):
+                step = plan.steps[number]
+                yield Result(frame, recording, time, NoMatch(Cause(step.what, step.detail, step.span)))
+
+
+def _ignore(frames: int) -> None:
+    """No progress is shown."""
 
 
 def _remarks(scenario: Scenario) -> list[Diagnostic]:
@@ -237,99 +312,58 @@ def _remarks(scenario: Scenario) -> list[Diagnostic]:
             hints=("a scene that breaks it is still possible: write `require` for a condition that must hold",),
             severity="warning",
         )
-        for span in scenario.soft
+        for span in (requirement.span for requirement in scenario.soft)
     ]
     return [*scenario.warnings, *scenario.ignored, *soft]
 
 
-def _all_frames(connection: object, name: str, recordings: tuple[str, str] | None) -> Iterator[Excluded]:
-    sql = (
-        f"SELECT frame, recording, timestamp_us, NULL::INTEGER AS missed FROM ({frames_sql(name, recordings)}) "
-        "ORDER BY recording, timestamp_us, frame"
-    )
-    return Plan(name, (), sql).run(connection)
-
-
-def _batches(rows: Iterator[Excluded]) -> Iterator[list[Excluded]]:
-    """Rows in order, cut where enough candidates have come together."""
-    batch: list[Excluded] = []
-    candidates = 0
-    for row in rows:
-        batch.append(row)
-        candidates += row.step is None
-        if candidates >= _BATCH or len(batch) >= 100 * _BATCH:
-            yield batch
-            batch, candidates = [], 0
-    if batch:
-        yield batch
-
-
-def _decide(query: Query, matcher: Matcher, batch: Sequence[Excluded]) -> dict[str, list[Result]]:
-    frames = [row.frame for row in batch if row.step is None]
-    return {
-        label.frame: [
-            Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors)
-            for verdict in _verdicts(query, matcher, label)
-        ]
-        for label in (query.dataset.labels(frames) if frames else ())
-    }
-
-
-def _verdicts(query: Query, matcher: Matcher, label: Label) -> list[Match] | list[Verdict]:
-    """The verdict on a label, or one for each correspondence by which it matches."""
-    return (list(matcher.matches(label)) if query.options.all_matches else []) or [matcher.match(label)]
+_TRIES = 3
+"""Processes that a block, and then a frame alone, may cost."""
 
 
 class _Pool:
-    """Worker processes that each hold the compiled scenario; batches come back in order."""
+    """Worker processes that each hold the compiled scenario; blocks come back in order.
+
+    A process that dies costs nothing but its block's time. Of a block that kills every process which takes it, the
+    frames that do so are found by halving, and are unknown.
+    """
 
     def __init__(self, query: Query) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.jobs = query.options.jobs
-        state = (query.dataset.path, query.source, query.options)
-        self.pool = ProcessPoolExecutor(self.jobs, context, initializer=_start_worker, initargs=state)
+        self.query = query
+        setup = (query.dataset.address, query.source, query.options, query.file)
+        self.workers: Workers[Block, Decided] = Workers(query.options.jobs, _start_worker, setup)
 
     def __enter__(self) -> _Pool:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.pool.shutdown(wait=True, cancel_futures=True)
+    def __exit__(self, *error: Any) -> None:
+        self.workers.__exit__(*error)
 
-    def run(
-        self, name: str, batches: Iterator[list[Excluded]]
-    ) -> Iterator[tuple[list[Excluded], dict[str, list[Result]]]]:
-        """Decide batches side by side, a bounded number ahead."""
-        pending: deque[tuple[list[Excluded], Future[dict[str, list[Result]]]]] = deque()
-        for batch in batches:
-            frames = [row for row in batch if row.step is None]
-            pending.append((batch, self.pool.submit(_work, name, frames)))
-            if len(pending) > 2 * self.jobs:
-                first, future = pending.popleft()
-                yield first, future.result()
-        for first, future in pending:
-            yield first, future.result()
+    def run(self, blocks_: Iterable[Block], *, tries: int = _TRIES) -> Iterator[Decided]:
+        """Decide blocks side by side, a bounded number ahead."""
+        for block, found in self.workers.run(blocks_, tries=tries):
+            yield from self._halves(block) if isinstance(found, Lost) else (found,)
 
-
-@dataclass(slots=True)
-class _Worker:
-    """What a worker process keeps between batches."""
-
-    query: Query
-    solver: LazySolver
-    matchers: dict[str, Matcher] = field(default_factory=dict[str, Matcher])
+    def _halves(self, block: Block) -> Iterator[Decided]:
+        if block.end - block.first > 1:
+            for half in block.halves():
+                # a half is lost at once: only what is left to blame, a frame, gets more chances
+                yield from self.run([half], tries=1 if half.end - half.first > 1 else _TRIES)
+            return
+        for label in every_label(self.query.dataset, block):
+            lost = Unknown("crash", Cause("process", "every process that matched this frame died"))
+            result = Result(label.frame, label.recording, label.timestamp_us, lost, label.sensors)
+            yield Decided(np.full(1, -1, np.int16), [[result]], [])
 
 
-_worker: list[_Worker] = []
+def _start_worker(
+    dataset: str, source: Source, options: QueryOptions, file: Path | None
+) -> Callable[[Block, Callable[[object], None]], Decided]:
+    """What a worker process keeps between blocks."""
+    decider = Query(open_dataset(dataset), source, options, file=file).decider()
 
+    def work(block: Block, _tell: Callable[[object], None]) -> Decided:
+        decided = decider.decide(block)
+        return replace(decided, found=list(decided.found))
 
-def _start_worker(path: Path, source: Source, options: QueryOptions) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, too, and ends the workers
-    _worker[:] = [_Worker(Query(open_dataset(path), source, options), LazySolver(options.solver))]
-
-
-def _work(name: str, frames: Sequence[Excluded]) -> dict[str, list[Result]]:
-    (worker,) = _worker
-    query = worker.query
-    if name not in worker.matchers:
-        worker.matchers[name] = Matcher(query.compile(name)[0], query.options.match, worker.solver)
-    return _decide(query, worker.matchers[name], frames)
+    return work

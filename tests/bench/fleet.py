@@ -2,7 +2,7 @@
 
 `python tests/bench/fleet.py OUT --frames N [--interchange] [--needle] [--jobs N] [--seed N]`. The same arguments give
 the same traffic. With `--needle` one frame, called `needle`, has what no other has: a truck that stands across the
-ego's lane, 12 m ahead of the ego; `NEEDLE` is a scenario that asks for it.
+ego's lane, 12 m ahead of the ego; `NEEDLE` is a scenario that asks for it (with a tolerance of some degrees).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ FROM_M, TO_M, LANE_M = 10.0, 110.0, 3.5
 NEEDLE = """\
 model scenic.domains.driving.model
 ego = new Car on road
-truck = new Truck ahead of ego by Range(6, 14), facing Range(80, 100) deg relative to roadDirection
+truck = new Truck ahead of ego by Range(4, 8), facing Range(80, 100) deg relative to roadDirection
 """
 KINDS: tuple[tuple[str, str, float, tuple[float, float, float]], ...] = (
     # class, class of the source, share, (width, length, height)
@@ -108,14 +108,17 @@ class Fleet:
         sources = [KINDS[k][1] for k in kind]
         sizes = np.array([KINDS[k][3] for k in kind])
         labels = [f"{name}/{frame:02}" for frame in range(frames)]
+        ego_headings = np.repeat(ego_heading, frames)
         if self.needle and number == self.frames // FRAMES // 2:
             at = frames // 2
             labels[at] = "needle"
             truck = int(np.flatnonzero(kind == 1)[0]) if (kind == 1).any() else 0
-            forward = np.array((-math.sin(ego_heading[0]), math.cos(ego_heading[0])))
+            # both on the arm to the north, in the lane on the right, well clear of the crossing
             heading = np.tile(heading, (frames, 1))
-            xy[at, truck] = ego_xy[at, 0] + 12.0 * forward
-            heading[at, truck] = ego_heading[0] + math.pi / 2
+            ego_headings[at] = 0.0
+            ego_xy[at, 0] = np.add(tile, (LANE_M / 2, 40.0))
+            xy[at, truck] = np.add(tile, (LANE_M / 2, 52.0))
+            heading[at, truck] = math.pi / 2
             order[at] = [*categories[:truck], "Truck", *categories[truck + 1 :]]
             sizes = np.tile(sizes, (frames, 1, 1))
             sizes[at, truck] = KINDS[1][3]
@@ -131,7 +134,7 @@ class Fleet:
                 ["Car"] * frames,
                 [""] * frames,
                 ego_xy[:, 0],
-                np.repeat(ego_heading, frames),
+                ego_headings,
                 np.broadcast_to(np.array(KINDS[0][3]), (frames, 3)),
                 np.repeat(ego_speed, frames),
                 [None] * frames,

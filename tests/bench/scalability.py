@@ -2,41 +2,44 @@
 
 Two programs with a size, ten sampled labels of each size, in the program's order and shuffled. Measured are the matcher
 as it is, the same with every group sent to the solver (`smt`), with one formula per correspondence (`monolithic`), and
-the query paper's algorithm 1: all permutations, those that extend a partial correspondence known to fail skipped.
+the query paper's algorithm 1 in the variants of `algorithm1`. What is measured is processor time, this process and the
+solver's together, so that the numbers hold on a busy machine.
 
-    python tests/bench/scalability.py [--quick] [--solver NAME]
+    python tests/bench/scalability.py [--solver NAME]... [--map FILE] [--patience S] [--quick] [--alone]
 
-prints a table and writes `scalability.json` and `scalability.svg` to bench-results/.
+prints a table and whether each bar is met, and writes `scalability-<map>-<solver>.json` and `.svg` to bench-results/.
 """
 
 from __future__ import annotations
 
 import argparse
-import itertools
 import json
 import math
+import platform
 import random
+import statistics
 import sys
-import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "match"))
 
-from scenes import compiled, drawn, label_of  # noqa: E402
+from algorithm1 import VARIANTS, Variant, matches  # noqa: E402
+from clock import cpu_s  # noqa: E402
+from curves import Series, svg  # noqa: E402
+from scenes import STREET, compiled, drawn, label_of  # noqa: E402
 
-from scenicq.forest.groups import Group  # noqa: E402
+from scenicq.errors import SolverError  # noqa: E402
 from scenicq.forest.scenario import Scenario  # noqa: E402
-from scenicq.match.asking import ask  # noqa: E402
-from scenicq.match.constraints import build_groups  # noqa: E402
-from scenicq.match.ladder import Yes, condition_group  # noqa: E402
+from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
-from scenicq.match.observe import observe  # noqa: E402
-from scenicq.match.options import MatchOptions  # noqa: E402
+from scenicq.match.options import MatchOptions, Method  # noqa: E402
 from scenicq.match.verdict import Match  # noqa: E402
-from scenicq.smt.answer import Answer, Solver  # noqa: E402
-from scenicq.smt.formula import Problem  # noqa: E402
+from scenicq.smt.answer import Answer, SolverSession, Unknown  # noqa: E402
+from scenicq.smt.formula import TRUE, Problem  # noqa: E402
+from scenicq.smt.pool import WorkerSolver  # noqa: E402
 from scenicq.smt.solver import open_solver  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
 
@@ -60,56 +63,77 @@ for number in range({size}):
 PROGRAMS = {"bumper to bumper": BUMPER, "parade": PARADE}
 SIZES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 LABELS = 10
-PATIENCE_S = 60.0
-"""Seconds for all labels of one size after which larger sizes are not tried."""
+ROUNDS = 3
+"""How often the matcher itself is measured; the fastest counts."""
+KNOWN, SHUFFLED = "auto, known", "auto, shuffled"
 
 
 class OutOfTime(Exception):
-    """The query paper's algorithm took too long for one size."""
+    """A label took as long as the patience lasts."""
 
 
 class Patient:
-    """A solver that gives up on a label once it has had its time."""
+    """A solver that gives up on a label once it has had its time, and that can be started anew for each formula."""
 
-    def __init__(self, solver: Solver) -> None:
-        self.solver = solver
-        self.name = solver.name
+    def __init__(self, session: SolverSession, patience_s: float) -> None:
+        self.name = session.name
+        self.patience_s = patience_s
         self.deadline = math.inf
+        self.fresh: Callable[[], SolverSession] | None = None
+        self.alone = False
+        """Whether the matcher is measured alone, without what it is compared with."""
+        self._session = session
+        self._ticks = 0
+
+    def begin(self) -> None:
+        """Start the time of a label."""
+        self.deadline = cpu_s() + self.patience_s
+
+    def tick(self) -> None:
+        """End the label if it has had its time; looks at the clock now and then."""
+        self._ticks += 1
+        if self._ticks % 5000 == 0 and cpu_s() > self.deadline:
+            raise OutOfTime
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Pass the question on while there is time."""
-        if time.perf_counter() > self.deadline:
+        if cpu_s() > self.deadline:
             raise OutOfTime
-        return self.solver.check(problem, precision=precision, timeout_s=timeout_s)
-
-
-def paper_algorithm(scenario: Scenario, label: Label, solver: Solver) -> bool:
-    """Algorithm 1 as it is printed: permutations in order, bad prefixes skipped, each group sent to the solver."""
-    options = MatchOptions()
-    things = [label.ego, *label.objects]
-    seen = [observe(thing) for thing in things]
-    roles = [thing.index for thing in scenario.objects if thing.index != scenario.ego]
-    groups: tuple[Group, ...] = build_groups(
-        scenario, (*(frozenset(seen[0]) for _ in scenario.objects), frozenset()), options
-    )
-    bad: set[tuple[int, ...]] = set()
-    for chosen in itertools.permutations(range(1, len(things)), len(roles)):
-        if any(chosen[:size] in bad for size in range(1, len(chosen) + 1)):
-            continue
-        cast = {scenario.ego: 0, **dict(zip(roles, chosen, strict=True))}
-        if any(things[cast[i]].category != scenario.objects[i].category for i in roles):
-            wrong = next(n for n, i in enumerate(roles) if things[cast[i]].category != scenario.objects[i].category)
-            bad.add(chosen[: wrong + 1])
-            continue
-        for group in groups:
-            observed = {(i, name): value for i in group.objects for name, value in seen[cast[i]].items()}
-            if not isinstance(ask([condition_group(group, observed)], options, solver), Yes):
-                last = max((roles.index(i) for i in group.objects if i in roles), default=-1)
-                bad.add(chosen[: last + 1])
-                break
+        if self.fresh is None:
+            answer = self._session.check(problem, precision=precision, timeout_s=timeout_s)
         else:
-            return True
-    return False
+            with self.fresh() as solver:
+                answer = solver.check(problem, precision=precision, timeout_s=timeout_s)
+        if answer == Unknown("timeout"):
+            raise OutOfTime
+        return answer
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A way to decide labels.
+
+    Attributes:
+        name: What it is called.
+        decide: Whether a label matches.
+        known: Whether the correspondence is given.
+        rounds: How often it is measured.
+        fresh: Opens the solver for a formula, where each gets a process of its own.
+    """
+
+    name: str
+    decide: Callable[[Label], bool]
+    known: bool = False
+    rounds: int = 1
+    fresh: Callable[[], SolverSession] | None = None
+
+
+@dataclass(slots=True)
+class Results:
+    """Seconds of processor time a label, by way and size, and the size at which a way was cut off."""
+
+    seconds: dict[str, dict[int, float]] = field(default_factory=dict)
+    cut: dict[str, int] = field(default_factory=dict)
 
 
 def labels(scenario: Scenario, size: int) -> Iterator[tuple[Label, Label]]:
@@ -120,104 +144,168 @@ def labels(scenario: Scenario, size: int) -> Iterator[tuple[Label, Label]]:
         yield Label("frame", "recording", 0, "street", shuffled.ego, tuple(ordered)), shuffled
 
 
-def measured(work: Callable[[Label], bool], given: list[Label], solver: Patient) -> tuple[float, bool]:
-    """Mean seconds a label, and whether larger sizes take too long; what is cut off counts with the time it had."""
-    started = time.perf_counter()
-    solver.deadline = started + PATIENCE_S
+def measured(way: Way, given: list[Label], solver: Patient) -> tuple[float, bool]:
+    """Mean seconds a label, and whether one was cut off; no label is begun once the patience is used up."""
+    solver.fresh = way.fresh
+    started = cpu_s()
     for done, label in enumerate(given, 1):
+        solver.begin()
         try:
-            assert work(label), "a sampled label must match"
+            assert way.decide(label), "a sampled label must match"
         except OutOfTime:
-            return (time.perf_counter() - started) / done, True
-        if time.perf_counter() - started > PATIENCE_S:
-            return (time.perf_counter() - started) / done, True
-    return (time.perf_counter() - started) / len(given), False
+            return (cpu_s() - started) / done, True
+        if cpu_s() - started > solver.patience_s:
+            return (cpu_s() - started) / done, False
+    return (cpu_s() - started) / len(given), False
 
 
-def works(scenario: Scenario, solver: Solver) -> dict[str, Callable[[Label], bool]]:
-    """What decides a label, by method."""
+def ways(scenario: Scenario, solver: Patient) -> list[Way]:
+    """All the ways to decide labels of a scenario."""
     given = {thing.name: f"object-{thing.index}" for thing in scenario.objects if thing.index != scenario.ego}
-    methods = ("auto", "smt", "monolithic")
-    auto, smt, monolithic = (Matcher(scenario, MatchOptions(method=method), solver) for method in methods)
-    return {
-        "auto, known": lambda label: isinstance(auto.match(label, given=given), Match),
-        "auto, shuffled": lambda label: isinstance(auto.match(label), Match),
-        "smt, shuffled": lambda label: isinstance(smt.match(label), Match),
-        "monolithic, shuffled": lambda label: isinstance(monolithic.match(label), Match),
-        "paper, shuffled": lambda label: paper_algorithm(scenario, label, solver),
-    }
+
+    def matcher(method: Method) -> Matcher:
+        return Matcher(scenario, MatchOptions(method=method, timeout_s=solver.patience_s), solver)
+
+    def ours(method: Method) -> Way:
+        made = matcher(method)
+        return Way(f"{method}, shuffled", lambda label: isinstance(made.match(label), Match))
+
+    def published(variant: Variant) -> Way:
+        options = MatchOptions(timeout_s=solver.patience_s)
+
+        def decide(label: Label) -> bool:
+            return matches(scenario, label, variant, solver, options, solver.tick)
+
+        return Way(variant.name, decide, fresh=_opener(solver.name, variant) if variant.process else None)
+
+    auto = matcher("auto")
+    own = [
+        Way(KNOWN, lambda label: isinstance(auto.match(label, given=given), Match), known=True, rounds=ROUNDS),
+        Way(SHUFFLED, lambda label: isinstance(auto.match(label), Match), rounds=ROUNDS),
+    ]
+    return own if solver.alone else [*own, ours("smt"), ours("monolithic"), *map(published, VARIANTS)]
 
 
-def run(name: str, sizes: tuple[int, ...], solver: Patient) -> dict[str, dict[int, float]]:
-    """Seconds a label of each method at each size."""
-    results: dict[str, dict[int, float]] = {}
-    stopped: set[str] = set()
+def _opener(name: str, variant: Variant) -> Callable[[], SolverSession]:
+    """What starts a solver process for one formula; dReal takes formulas with the whole map as they are."""
+    if name == "dreal" and variant.whole:
+        return lambda: WorkerSolver("plain_dreal:check")
+    return lambda: open_solver(name)
+
+
+def run(name: str, sizes: tuple[int, ...], solver: Patient, network: Network) -> Results:
+    """Seconds a label of each way at each size."""
+    results = Results()
     for size in sizes:
-        scenario = compiled(HEADER + PROGRAMS[name].format(size=size))
+        scenario = compiled(HEADER + PROGRAMS[name].format(size=size), network)
         pairs = list(labels(scenario, size))
         ordered, shuffled = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-        for method, work in works(scenario, solver).items():
-            if method in stopped:
+        for way in ways(scenario, solver):
+            if way.name in results.cut:
                 continue
-            what = ordered if method.endswith("known") else shuffled
-            if method.startswith("auto"):
+            what = ordered if way.known else shuffled
+            if way.rounds > 1:
                 # the first label also pays for the analysis of the scenario
-                work(what[0])
-            seconds, late = measured(work, what, solver)
-            results.setdefault(method, {})[size] = seconds
-            if late:
-                stopped.add(method)
-        shown = "  ".join(f"{method} {found[size]:9.4f}" for method, found in results.items() if size in found)
-        sys.stdout.write(f"{name:18} {size:3}  {shown}\n")
-        sys.stdout.flush()
+                way.decide(what[0])
+            rounds = [measured(way, what, solver) for _ in range(way.rounds)]
+            seconds, late = min(rounds)
+            results.seconds.setdefault(way.name, {})[size] = seconds
+            if late or seconds > solver.patience_s:
+                results.cut[way.name] = size
+        _show(name, size, results)
     return results
 
 
-COLOURS = ("#1b6ca8", "#0f9d58", "#e37400", "#9334e6", "#c5221f")
+def _show(name: str, size: int, results: Results) -> None:
+    for way, found in results.seconds.items():
+        if size in found:
+            least = ">" if results.cut.get(way) == size else " "
+            sys.stdout.write(f"{name:18} {size:3}  {way:34} {least}{found[size]:10.4f} s\n")
+    sys.stdout.flush()
 
 
-def svg(results: dict[str, dict[str, dict[int, float]]]) -> str:
-    """Curves: seconds a label over size, both logarithmic."""
-    width, height, margin = 480, 320, 48
-    panels: list[str] = []
-    for column, (name, methods) in enumerate(results.items()):
-        left = column * width
+def bars(results: dict[str, Results]) -> Iterator[tuple[str, bool]]:
+    """What is asked of the matcher, and whether it was met."""
+    for name, found in results.items():
+        known, shuffled = found.seconds[KNOWN], found.seconds[SHUFFLED]
+        ratio, size = max((shuffled[size] / known[size], size) for size in known)
+        yield f"{name}: shuffled at most twice known: {ratio:.2f} at worst, at {size}", ratio <= 2.0
+        if 48 in shuffled:
+            yield f"{name}: 48 objects under 0.25 s: {shuffled[48]:.4f} s", shuffled[48] < 0.25
+            power = growth({size: seconds for size, seconds in shuffled.items() if size >= 8})
+            yield f"{name}: no worse than quadratic: exponent {power:.2f} from 8 objects on", power <= 2.0
+        for way, times in found.seconds.items():
+            if way in (KNOWN, SHUFFLED):
+                continue
+            cut = found.cut.get(way, math.inf)
+            size = 6 if 6 in times else max(times)
+            least = "at least " if cut == size else ""
+            times_faster = times[size] / shuffled[size]
+            text = f"{name}: 1,000 times faster than {way} at {size} objects: {least}{times_faster:,.0f}"
+            yield text, times_faster >= 1000.0
 
-        def place(size: float, seconds: float, left: int = left) -> str:
-            x = left + margin + (width - 2 * margin) * math.log(size) / math.log(SIZES[-1])
-            y = height - margin - (height - 2 * margin) * (math.log10(max(seconds, 1e-4)) + 4) / 6
-            return f"{x:.1f},{y:.1f}"
 
-        panels.append(f'<text x="{left + margin}" y="24" font-size="14">{name}: seconds a label</text>')
-        for power in range(-4, 3):
-            x, y = place(1, 10.0**power).split(",")
-            panels.append(f'<text x="{float(x) - 40}" y="{y}" font-size="10">1e{power}</text>')
-        for number, (method, found) in enumerate(methods.items()):
-            line = " ".join(place(size, seconds) for size, seconds in found.items())
-            colour = COLOURS[number % len(COLOURS)]
-            panels.append(f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2"/>')
-            panels.append(
-                f'<text x="{left + margin + 8}" y="{44 + 14 * number}" font-size="11" fill="{colour}">{method}</text>'
-            )
-    total = width * max(1, len(results))
-    body = "\n".join(panels)
-    return f'<svg xmlns="http://www.w3.org/2000/svg" width="{total}" height="{height}">\n{body}\n</svg>\n'
+def growth(times: dict[int, float]) -> float:
+    """The exponent of a power law through measurements, by least squares on logarithms."""
+    xs, ys = [math.log(size) for size in times], [math.log(seconds) for seconds in times.values()]
+    return statistics.linear_regression(xs, ys).slope
+
+
+def experiment(
+    name: str, sizes: tuple[int, ...], only: str | None, patience_s: float, network: Network, *, alone: bool
+) -> None:
+    """Run everything on one solver and keep it."""
+    with open_solver(name) as session:
+        solver = Patient(session, patience_s)
+        solver.alone = alone
+        results = {each: run(each, sizes, solver, network) for each in PROGRAMS if only in (None, each)}
+        started, count = cpu_s(), 5
+        for _ in range(count):
+            with open_solver(solver.name) as fresh:
+                fresh.check(Problem((), TRUE), precision=1e-3, timeout_s=10.0)
+        start_s = (cpu_s() - started) / count
+    met = list(bars(results))
+    for text, ok in met:
+        sys.stdout.write(f"{'ok  ' if ok else 'MISS'} {solver.name}: {text}\n")
+    target = ROOT / "bench-results"
+    target.mkdir(exist_ok=True)
+    stem = f"scalability-{network.name}-{solver.name}"
+    content = {
+        "solver": solver.name,
+        "map": network.name,
+        "python": platform.python_version(),
+        "unit": "seconds of processor time a label",
+        "patience_s": patience_s,
+        "start of a solver process": start_s,
+        "programs": {each: {"seconds": found.seconds, "cut off at": found.cut} for each, found in results.items()},
+        "bars": [{"bar": text, "met": ok} for text, ok in met],
+    }
+    (target / f"{stem}.json").write_text(json.dumps(content, indent=1) + "\n")
+    series = {each: [Series(way, times) for way, times in found.seconds.items()] for each, found in results.items()}
+    (target / f"{stem}.svg").write_text(svg(series, "objects besides the ego", "CPU seconds a label"))
+
+
+def _ignore(identifier: str, message: str) -> None:
+    """Pass over a feature that cannot be read."""
 
 
 def main() -> None:
-    """Run the experiment."""
+    """Run the experiment on each solver that is there."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="up to 8 objects")
-    parser.add_argument("--solver", default="auto")
+    parser.add_argument("--solver", action="append", help="default: portable, and dreal where it loads")
     parser.add_argument("--only", choices=PROGRAMS, help="one of the programs")
+    parser.add_argument("--patience", type=float, default=60.0, help="seconds after which a label is given up")
+    parser.add_argument("--alone", action="store_true", help="measure the matcher without what it is compared with")
+    parser.add_argument("--map", type=Path, help="GeoJSON of a road network; default: a made-up street")
     given = parser.parse_args()
+    network = STREET if given.map is None else Network(given.map.stem, read_geojson(given.map, _ignore))
     sizes = tuple(size for size in SIZES if not given.quick or size <= 8)
-    with open_solver(given.solver) as solver:
-        results = {name: run(name, sizes, Patient(solver)) for name in PROGRAMS if given.only in (None, name)}
-    target = ROOT / "bench-results"
-    target.mkdir(exist_ok=True)
-    (target / "scalability.json").write_text(json.dumps(results, indent=1))
-    (target / "scalability.svg").write_text(svg(results))
+    for name in given.solver or ("portable", "dreal"):
+        try:
+            experiment(name, sizes, given.only, given.patience, network, alone=given.alone)
+        except SolverError as error:
+            sys.stdout.write(f"{name} is left out: {error.diagnostics[0].message}\n")
 
 
 if __name__ == "__main__":

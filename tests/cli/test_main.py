@@ -156,3 +156,10 @@ def test_an_interrupted_match_leaves_no_file(command, crossroads, scenarios, tmp
         _, told = process.communicate(timeout=60)
     assert (process.returncode, told) == (130, "interrupted\n")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("solver", ["nope", "nope -in", "'"])
+def test_a_solver_that_is_not_there_is_told_at_once(run, crossroads, scenarios, solver):
+    result = run("match", scenarios / "02_crossing_cars.scenic", crossroads, "--solver", solver)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "error[solver-missing]" in result.stderr

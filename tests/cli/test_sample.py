@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
+import re
+
+import pytest
 
 
 def test_the_same_seed_gives_the_same_scenes(run, scenarios):
@@ -24,13 +28,57 @@ def test_drawn_scenes_can_be_ingested_and_all_match(run, scenarios, crossroads, 
         assert len(found.stdout.splitlines()) == 10, found.stderr
 
 
-def test_a_hopeless_program_ends_with_a_reason(run, tmp_path):
+def test_the_installed_command_draws_what_it_finds_again(installed, scenarios, tmp_path):
+    program = scenarios / "04_two_lane_traffic.scenic"
+    drawn = installed("sample", program, "-n", 6, "--seed", 3, "-o", "scenes", cwd=tmp_path)
+    assert drawn.returncode == 0, drawn.stderr
+    assert installed("ingest", "scenes", "set", cwd=tmp_path).returncode == 0
+    found = installed("match", program, "set", "--enforce", "containment,collision", "--format", "ids", cwd=tmp_path)
+    assert found.stdout.splitlines() == [f"scene-{number:04}" for number in range(6)], found.stderr
+
+
+def test_a_label_has_sizes_classes_velocities_and_what_the_program_sets(run, tmp_path):
+    program = tmp_path / "fast.scenic"
+    program.write_text(
+        "model scenic.domains.driving.model\nparam weather = Uniform('rain', 'fog')\nego = new Car with speed 3\n"
+        "new Pedestrian on road, with length Range(1, 2), with height 1.7, with clothes 'red', "
+        "with regionContainedIn None\n"
+    )
+    found = run("sample", program, "-n", 4)
+    assert found.exit_code == 0, found.stderr
+    for label in map(json.loads, found.stdout.splitlines()):
+        (walker,) = label["objects"]
+        assert math.hypot(*label["ego"]["velocity"]) == pytest.approx(3)
+        assert (label["ego"]["class"], label["ego"]["width"], label["ego"]["length"]) == ("Car", 2, 4.5)
+        assert (walker["class"], walker["height"], walker["attributes"]) == ("Pedestrian", 1.7, {"clothes": "red"})
+        assert 1 <= walker["length"] <= 2
+        assert label["params"]["weather"] in ("rain", "fog")
+
+
+def test_a_hopeless_program_ends_with_the_requirement_that_rejects_most(run, tmp_path):
     program = tmp_path / "hopeless.scenic"
-    program.write_text("ego = new Object at (Range(0, 1), 0)\nrequire ego.position.x > 0.9999999\n")
+    program.write_text(
+        "ego = new Object at (Range(0, 1), 0)\nrequire ego.position.x > 0.2\nrequire ego.position.x > 0.9999999\n"
+    )
     found = run("sample", program)
     assert found.exit_code == 2
     assert "impossible-requirement" in found.stderr
-    assert "hopeless.scenic:2" in found.stderr
+    assert "hopeless.scenic:3" in found.stderr
+    assert "no scene came up on map `street` in 20,000 attempts" in found.stderr
+    assert re.search(r"`require ego.position.x > 0.9999999` failed in 1[0-9],[0-9]{3} of them", found.stderr)
+    assert re.search(r"`require ego.position.x > 0.2` failed [34],[0-9]{3} times", found.stderr)
+
+
+def test_a_built_in_requirement_can_be_waived(run, tmp_path):
+    program = tmp_path / "overlapping.scenic"
+    program.write_text("ego = new Object at (0, 0)\nnew Object at (0.5, 0)\n")
+    found = run("sample", program)
+    assert found.exit_code == 2
+    assert "`--waive collision`" in found.stderr
+    assert run("sample", program, "--waive", "collision").exit_code == 0
+    wrong = run("sample", program, "--waive", "gravity")
+    assert wrong.exit_code == 2
+    assert "option-invalid" in wrong.stderr
 
 
 def test_an_existing_folder_is_left_alone(run, scenarios, tmp_path):

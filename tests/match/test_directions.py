@@ -1,0 +1,107 @@
+"""Hidden points on curved lanes: the direction there is that of one side of a border or the other, never undecided."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+from scenes import compiled
+from shapely import box
+
+from scenicq.errors import SolverError
+from scenicq.geometry.features import MapFeature
+from scenicq.geometry.network import Network
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.verdict import Match, NoMatch
+from scenicq.smt.solver import open_solver
+from scenicq.store.labels import Label, LabelObject
+
+LINE = [(-3.0, -6.0), (-3.0, 5.0), (2.0, 6.0), (4.0, -6.0)]
+HAIRPIN = Network(
+    "hairpin",
+    [
+        MapFeature("road", "road", box(-9, -6, 9, 9), {"forward": "group"}),
+        MapFeature("group", "lane_group", box(-9, -6, 9, 9), {"road": "road"}),
+        MapFeature("lane", "lane", box(-9, -6, 9, 9), {"road": "road", "group": "group", "centerline": [list(LINE)]}),
+    ],
+)
+FIELD = HAIRPIN.roadDirection
+PROGRAM = (
+    "model scenic.domains.driving.model\n"
+    "spot = new OrientedPoint on network.laneRegion, facing roadDirection\n"
+    "ego = new Car at spot offset by (0, Range(1, 3)), facing spot.heading\n"
+)
+
+
+def label(x, y, heading, ahead=2.0):
+    """An ego as if its spot were at a place with a heading there."""
+    place = x - ahead * math.sin(heading), y + ahead * math.cos(heading)
+    return Label("frame", "recording", 0, "hairpin", LabelObject("ego", "Car", "car", *place, heading, 2.0, 4.5), ())
+
+
+def beyond_borders(count):
+    """Points of a guarded cell that lie on the wrong side of its border, with the heading of the cell."""
+    rng, found = random.Random(7), []
+    cells = [cell for cell in FIELD.cells((-9, -6, 9, 9)) if not cell.exact]
+    while len(found) < count:
+        cell = rng.choice(cells)
+        weights = np.array([rng.random() ** 2 for _ in cell.polygon])
+        x, y = (weights / weights.sum()) @ cell.polygon
+        values = FIELD.values(x, y)
+        if all(abs(value - cell.heading) > 0.1 for value in values) and not -9 < x < -8.9:
+            found.append((float(x), float(y), cell.heading, values[0]))
+    return found
+
+
+@pytest.fixture(scope="module", params=["portable", "dreal"])
+def solver(request):
+    try:
+        opened = open_solver(request.param)
+    except SolverError as error:
+        pytest.skip(error.diagnostics[0].message)
+    with opened:
+        yield opened
+
+
+@pytest.mark.parametrize("method", ["auto", "smt"])
+def test_the_wrong_side_of_a_border_is_excluded_and_the_right_side_is_not(method, solver):
+    # along the spot's line of sight the border can be crossed: the expected answer is found by walking it
+    matcher = Matcher(compiled(PROGRAM, HAIRPIN), MatchOptions(method=method, timeout_s=20.0), solver)
+    seen = set()
+    for x, y, wrong, right in beyond_borders(6):
+        for heading in (wrong, right):
+            given = label(x, y, heading)
+            reaches = any(
+                any(abs(value - heading) < 1e-3 for value in FIELD.values(*spot))
+                for back in np.linspace(1.0, 3.0, 801)
+                if abs((spot := walked(given.ego, back))[0]) <= 9 and -6 <= spot[1] <= 9
+            )
+            verdict = matcher.match(given)
+            assert isinstance(verdict, Match if reaches else NoMatch), (x, y, heading, verdict)
+            seen.add(type(verdict))
+    assert seen == {Match, NoMatch}
+
+
+def walked(ego, back):
+    """The spot from which an ego stands a number of metres ahead."""
+    return ego.x + back * math.sin(ego.heading), ego.y - back * math.cos(ego.heading)
+
+
+@pytest.mark.parametrize("offset", [-0.02, -0.002, 0.0, 0.002, 0.02])
+def test_the_cell_across_the_border_counts_where_the_tolerance_reaches_it(offset):
+    # at y = 1 the border between the first leg and the rest lies where the direction changes
+    xs = np.linspace(-3, 4, 70_001)
+    values = FIELD.values_many(np.column_stack([xs, np.full_like(xs, 1.0)]))
+    number = next(i for i in range(len(xs) - 1) if values[i] != values[i + 1])
+    left, right = values[number][0], values[number + 1][0]
+    program = (
+        "model scenic.domains.driving.model\nspot = new OrientedPoint on network.laneRegion, facing roadDirection\n"
+    )
+    scenario = compiled(program + "ego = new Car at spot offset by (0, 0), facing spot.heading", HAIRPIN)
+    matcher = Matcher(scenario, MatchOptions(tolerance=Tolerance(position=0.01, heading=1e-3)))
+    for heading, near in ((left, offset <= 0.01), (right, offset >= -0.01)):
+        verdict = matcher.match(label(xs[number] + offset, 1.0, heading, ahead=0.0))
+        assert isinstance(verdict, Match if near else NoMatch), (offset, heading, verdict)

@@ -1,0 +1,155 @@
+"""`scenicq match` with solvers that die, hang, talk nonsense or eat memory: each frame gets its verdict or a reason."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from scenicq.smt import pool, solver
+
+HERE = Path(__file__).parent
+
+# The angle is hidden and turns both the place and the heading: no step before the solver decides that.
+PROGRAM = """
+model scenic.domains.driving.model
+angle = Range(-60, 60) deg
+ego = new Car
+other = new Car offset along angle relative to ego.heading by (Range(-30, 30), Range(0, 40)),
+    facing angle relative to ego.heading
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    file = tmp_path / "hidden.scenic"
+    file.write_text(PROGRAM)
+    return file
+
+
+@pytest.fixture
+def verdicts(run, scenario, crossroads):
+    """Verdict and cause by frame, under options."""
+
+    def decide(*options):
+        told = run("match", scenario, crossroads, "--all", "--format", "jsonl", "--exit-zero", *options)
+        assert told.exit_code == 0, told.stderr
+        rows = [json.loads(line) for line in told.stdout.splitlines()]
+        return {row["frame"]: row for row in rows}
+
+    return decide
+
+
+def reason_of(row):
+    """Why a frame is unknown."""
+    return json.dumps(row.get("cause"))
+
+
+@pytest.fixture
+def honest(verdicts):
+    found = verdicts("--solver", "portable")
+    assert {row["verdict"] for row in found.values()} == {"match", "no_match"}
+    return found
+
+
+def test_frames_that_a_broken_solver_decides_are_as_ever_and_the_others_are_named(honest, verdicts, monkeypatch):
+    monkeypatch.syspath_prepend(str(HERE))
+    monkeypatch.setattr(solver, "PORTABLE", "mixed_checks:check")
+    monkeypatch.setattr(pool, "GRACE_S", 0.05)
+    found = verdicts("--solver", "portable", "--timeout", "0.5")
+    assert found.keys() == honest.keys()
+    unknown = {frame: reason_of(row) for frame, row in found.items() if row["verdict"] == "unknown"}
+    assert all(found[frame]["verdict"] == honest[frame]["verdict"] for frame in found.keys() - unknown.keys())
+    for reason in ("crash", "timeout", "garbage", "memory"):
+        assert any(reason in told for told in unknown.values()), (reason, unknown)
+    assert all(any(reason in told for reason in ("crash", "timeout", "garbage", "memory")) for told in unknown.values())
+    assert sum(row["verdict"] == "match" for row in found.values())
+
+
+COMMANDS = {
+    "crash": "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)",
+    "timeout": "import subprocess, time; subprocess.Popen(['sleep', '600']); time.sleep(600)",
+    "garbage": "while True: print('(' * 4096 + '\\x00\\u20ac sat)')",
+    "precision": "print('sat')",
+    "memory": "print('(error \"out of memory\")', bytearray(2**45))",
+}
+
+
+@pytest.mark.parametrize("reason", COMMANDS)
+def test_a_command_that_misbehaves_leaves_its_frames_unknown(reason, honest, verdicts, tmp_path):
+    stub = tmp_path / "stub.py"
+    stub.write_text(COMMANDS[reason])
+    found = verdicts("--solver", f"'{sys.executable}' -S '{stub}'", "--timeout", "0.3" if reason == "timeout" else "20")
+    assert found.keys() == honest.keys()
+    unknown = [row for row in found.values() if row["verdict"] == "unknown"]
+    assert unknown
+    # what eats memory fails under its limit
+    expected = "crash" if reason == "memory" else reason
+    assert all(expected in reason_of(row) for row in unknown), [reason_of(row) for row in unknown[:3]]
+    others = [frame for frame, row in found.items() if row["verdict"] != "unknown"]
+    assert others
+    assert all(found[frame]["verdict"] == honest[frame]["verdict"] for frame in others)
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="worker processes are found in /proc")
+def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work(honest, verdicts):
+    done = threading.Event()
+    killed, seen = [], []
+
+    def killer():
+        # one as soon as it is seen, that is at its start, the next when it is at work, and so on
+        while not done.wait(0.25):
+            for pid in _workers():
+                if pid in killed:
+                    continue
+                at_once = len(killed) % 2 == 1
+                if at_once or pid in seen:
+                    os.kill(pid, signal.SIGKILL)
+                    killed.append(pid)
+                seen.append(pid)
+
+    thread = threading.Thread(target=killer)
+    thread.start()
+    try:
+        found = verdicts("--solver", "portable", "--method", "smt")
+    finally:
+        done.set()
+        thread.join()
+    assert len(killed) >= 2
+    assert found.keys() == honest.keys()
+    for frame, row in found.items():
+        assert row["verdict"] == honest[frame]["verdict"] or "crash" in reason_of(row), (frame, row)
+    assert any(row["verdict"] != "unknown" for row in found.values())
+
+
+def _workers():
+    """Solver processes of this process."""
+    found = []
+    for thread in Path("/proc/self/task").iterdir():
+        try:
+            children = (thread / "children").read_text().split()
+        except OSError:
+            continue
+        for pid in children:
+            try:
+                if b"scenicq.smt.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                    found.append(int(pid))
+            except OSError:
+                continue
+    return found
+
+
+def test_the_time_of_a_run_is_bounded_by_its_timeouts(verdicts, honest, tmp_path):
+    stub = tmp_path / "stub.py"
+    stub.write_text("import time; time.sleep(600)")
+    began = time.monotonic()
+    found = verdicts("--solver", f"'{sys.executable}' -S '{stub}'", "--timeout", "0.05")
+    asked = sum(row["verdict"] == "unknown" for row in found.values())
+    assert asked
+    assert time.monotonic() - began < 10.0 + 3.0 * asked
