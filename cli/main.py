@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import difflib
 import os
-import signal
 import sys
 import tempfile
 import traceback
 from importlib import import_module
 from importlib.metadata import version
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
 from scenicq.errors import ScenicqError
 
+from .interrupts import Interrupts
 from .manual import write_examples, write_exit_codes
 from .report import show
 
@@ -45,6 +45,9 @@ _MODULES = {"report": "compare"}
 
 NOTHING, ERROR, INTERRUPTED = 1, 2, 130
 """Exit codes besides 0, in the manner of grep."""
+
+INTERRUPTS = Interrupts()
+"""Of this process."""
 
 
 class Commands(click.Group):
@@ -93,19 +96,28 @@ class Commands(click.Group):
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except ScenicqError as error:
+            if INTERRUPTS.noticed:
+                _interrupted(ctx)
             show(error.diagnostics)
             ctx.exit(ERROR)
         except KeyboardInterrupt:
-            click.echo("interrupted", err=True)
-            ctx.exit(INTERRUPTED)
+            _interrupted(ctx)
         except BrokenPipeError:
             # The reader has what it wanted. What is left in the buffer must not fail again when the interpreter ends.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             ctx.exit(0)
         except Exception:  # noqa: BLE001 - our own mistake, whatever it is
+            if INTERRUPTS.noticed:
+                _interrupted(ctx)
             click.echo(f"internal error: this is a mistake in scenicq; please report it with {_written()}", err=True)
             ctx.exit(ERROR)
         return result
+
+
+def _interrupted(ctx: click.Context) -> NoReturn:
+    INTERRUPTS.done()
+    click.echo("interrupted", err=True)
+    ctx.exit(INTERRUPTED)
 
 
 def _written() -> str:
@@ -141,5 +153,5 @@ def cli() -> None:
 def main() -> None:
     """Run the command line of this process."""
     # so that a terminated run leaves nothing half-written, like an interrupted one
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    INTERRUPTS.heed()
     cli(prog_name="scenicq")
