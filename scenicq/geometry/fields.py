@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -23,12 +23,19 @@ class FieldCell:
         heading: Radians.
         exact: Whether the field allows `heading` at every inner point; if not, the cell covers too much.
         guards: Of a cell that is not exact, which of its points are meant, if that is known: those that satisfy all.
+        bounds: The box around the polygon.
     """
 
     polygon: NDArray[np.float64]
     heading: float
     exact: bool
     guards: tuple[Guard, ...] = ()
+    bounds: Bounds = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Find the bounds: cells are asked for them more often than they are made."""
+        (west, south), (east, north) = self.polygon.min(axis=0).tolist(), self.polygon.max(axis=0).tolist()
+        object.__setattr__(self, "bounds", (west, south, east, north))
 
     def part(self, bounds: Bounds) -> FieldCell | None:
         """The same cell for points of a box only: fewer guards, exact if none is left; None if no point is meant."""

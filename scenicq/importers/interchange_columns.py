@@ -7,8 +7,8 @@ reads the recording label by label, which tells what is wrong.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from itertools import chain, repeat
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any, cast
 
 import numpy as np
@@ -16,17 +16,13 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
 from scenicq.importers.fields import InvalidError, parse_json
+from scenicq.importers.sound_columns import UNUSUAL, are, column, demand, vectors
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
 
 __all__ = ["read_columns"]
 
 _LARGEST = 2**63 - 1
-_GET = cast("Callable[[dict[str, Any], str], Any]", dict[str, Any].get)
 _SCALARS = frozenset((str, bool, int, float))
-
-
-class _UnusualError(Exception):
-    """The columns cannot be made here."""
 
 
 def read_columns(
@@ -45,7 +41,7 @@ def read_columns(
     """
     try:
         return _columns([_label(parse_json(line), recording) for line in lines], recording, classes, yaw=yaw)
-    except (InvalidError, _UnusualError, OverflowError, TypeError, ValueError):
+    except (InvalidError, *UNUSUAL):
         return None
 
 
@@ -55,23 +51,23 @@ def _columns(
     labels.sort(key=lambda label: (label["timestamp_us"], label["id"]))
     times = [label["timestamp_us"] for label in labels]
     maps = {label["map"] for label in labels}
-    _demand(len(set(times)) == len(times) and len(maps) == 1)
+    demand(len(set(times)) == len(times) and len(maps) == 1)
     lists: list[list[Any]] = [label["objects"] for label in labels]
     sensors: list[dict[str, Any]] = [label.get("sensors") or {} for label in labels]
     paths = [path for paths in sensors for path in paths.values()]
-    _demand(all(type(path) is str and path for path in paths))
+    demand(all(type(path) is str and path for path in paths))
     egos, objects = [label["ego"] for label in labels], list(chain.from_iterable(lists))
-    _demand(_are(objects, dict))
-    ids = _all(objects, "id")
-    _demand(_are(ids, str) and {"", "ego"}.isdisjoint(ids))
+    demand(are(objects, dict))
+    ids = column(objects, "id")
+    demand(are(ids, str) and {"", "ego"}.isdisjoint(ids))
     start = 0
     for entries in lists:
-        _demand(len(set(ids[start : start + len(entries)])) == len(entries))
+        demand(len(set(ids[start : start + len(entries)])) == len(entries))
         start += len(entries)
-    names = _all(objects, "class")
-    _demand(set(map(type, names)) <= {str} and all(name and name in classes for name in set(names)))
+    names = column(objects, "class")
+    demand(set(map(type, names)) <= {str} and all(name and name in classes for name in set(names)))
     ego_names = [entry.get("class") for entry in egos]
-    _demand(all(name in (None, "") or (type(name) is str and name in classes) for name in ego_names))
+    demand(all(name in (None, "") or (type(name) is str and name in classes) for name in ego_names))
     return RecordingColumns(
         name=recording,
         map=maps.pop(),
@@ -93,17 +89,12 @@ def _columns(
     )
 
 
-def _demand(sound: bool) -> None:
-    if not sound:
-        raise _UnusualError
-
-
 def _label(content: object, recording: str) -> dict[str, Any]:
     """A line, whose own fields are of the right types."""
-    _demand(type(content) is dict)
+    demand(type(content) is dict)
     line = cast(dict[str, Any], content)
     time = line.get("timestamp_us")
-    _demand(
+    demand(
         line.get("recording") == recording
         and type(time) is int
         and abs(time) <= _LARGEST
@@ -118,23 +109,19 @@ def _label(content: object, recording: str) -> dict[str, Any]:
 def _members(
     entries: Sequence[dict[str, Any]], ids: Sequence[str], category: Sequence[str], names: Sequence[str], *, yaw: bool
 ) -> MemberColumns:
-    places = _all(entries, "position")
-    _demand(_are(places, list) and set(map(len, places)) <= {2})
-    xy = _reals(list(chain.from_iterable(places))).reshape(-1, 2)
+    xy = vectors(column(entries, "position"), 2)
     key = "yaw" if yaw else "heading"
-    headings = _all(entries, key)
-    _demand(None not in headings or all(key in entry for entry in entries))
+    headings = column(entries, key)
+    demand(None not in headings or all(key in entry for entry in entries))
     angles = _optional_reals(headings)
     turn = -math.pi / 2 if yaw else 0.0
-    velocities = _all(entries, "velocity")
-    _demand(_are(velocities, list, type(None)))
+    velocities = column(entries, "velocity")
     known = [velocity for velocity in velocities if velocity is not None]
-    _demand(set(map(len, known)) <= {2})
     vxy = np.full((len(velocities), 2), math.nan)
     moving = [velocity is not None for velocity in velocities]
-    vxy[np.array(moving, dtype=bool)] = _reals(list(chain.from_iterable(known))).reshape(-1, 2)
-    tracks = _all(entries, "track")
-    _demand(_are(tracks, str, type(None)))
+    vxy[np.array(moving, dtype=bool)] = vectors(known, 2)
+    tracks = column(entries, "track")
+    demand(are(tracks, str, type(None)))
     return MemberColumns(
         id=ids,
         category=category,
@@ -148,48 +135,31 @@ def _members(
         vx=np.ascontiguousarray(vxy[:, 0]),
         vy=np.ascontiguousarray(vxy[:, 1]),
         track=[track or None for track in tracks],
-        attributes=_json(_all(entries, "attributes")),
+        attributes=_json(column(entries, "attributes")),
     )
 
 
-def _all(entries: Sequence[dict[str, Any]], key: str) -> list[Any]:
-    """The values of a key, None where an entry lacks it; not as a comprehension, which takes twice as long."""
-    return list(map(_GET, entries, repeat(key)))
-
-
-def _are(values: Sequence[Any], *types: type) -> bool:
-    """Whether the values are exactly of some types."""
-    return set(map(type, values)).issubset(types)
-
-
 def _sizes(entries: Sequence[dict[str, Any]], key: str) -> NDArray[np.float64]:
-    values = _optional_reals(_all(entries, key))
-    _demand(not np.any(values <= 0))
+    values = _optional_reals(column(entries, key))
+    demand(not np.any(values <= 0))
     return values
 
 
-def _reals(values: list[Any]) -> NDArray[np.float64]:
-    _demand(_are(values, float, int))
-    reals = np.array(values, dtype=np.float64)
-    _demand(bool(np.isfinite(reals).all()))
-    return reals
-
-
 def _optional_reals(values: list[Any]) -> NDArray[np.float64]:
-    _demand(_are(values, float, int, type(None)))
-    reals = np.array(values, dtype=np.float64)  # None becomes nan
-    _demand(int(np.isfinite(reals).sum()) == len(values) - values.count(None))
-    return reals
+    demand(are(values, float, int, type(None)))
+    found = np.array(values, dtype=np.float64)  # None becomes nan
+    demand(int(np.isfinite(found).sum()) == len(values) - values.count(None))
+    return found
 
 
 def _json(values: Sequence[Any]) -> list[str | None]:
     texts: list[str | None] = []
-    if _are(values, type(None)):
+    if are(values, type(None)):
         return [None] * len(values)
     for value in values:
         if value is None:
             texts.append(None)
             continue
-        _demand(type(value) is dict and _SCALARS.issuperset(map(type, value.values())))
+        demand(type(value) is dict and _SCALARS.issuperset(map(type, value.values())))
         texts.append(to_json(value))  # refuses what is not finite
     return texts

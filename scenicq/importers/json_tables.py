@@ -1,4 +1,4 @@
-"""Large JSON files that hold one list of objects, read one object at a time with its line number."""
+"""Large JSON files that hold one list of objects, read block by block, each element with its line number."""
 
 from __future__ import annotations
 
@@ -10,20 +10,56 @@ from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
 
-__all__ = ["read_list"]
+__all__ = ["Block", "read_list"]
 
 _CHUNK = 1 << 20
 _LONGEST = 1 << 23
+_TAIL = 1 << 16
+"""How far from the end of a chunk the end of an element is looked for."""
+
 _GAP = re.compile(r"[\s,]*")
+_BETWEEN = re.compile(r"\}\s{0,99},\s{0,99}\{")
+
+_decode = json.JSONDecoder().raw_decode
 
 
-def read_list(path: Path) -> Iterator[tuple[Any, int]]:
-    """The elements of a JSON list, each with the number of the line where it begins.
+class Block:
+    """Neighbouring elements of a list.
 
-    Memory is that of a chunk of the file and of one element.
+    Attributes:
+        elements: One or more.
+        text: What they were read from, from the beginning of the first to the end of the last.
+    """
+
+    __slots__ = ("_first", "_lines", "elements", "text")
+
+    def __init__(self, elements: list[Any], text: str, first: int) -> None:
+        """Take elements, their text and the line where it begins."""
+        self.elements = elements
+        self.text = text
+        self._first = first
+        self._lines: list[int] = []
+
+    def line(self, number: int) -> int:
+        """The line of the file where an element begins; found only when it is asked for, as few are."""
+        if not self._lines:
+            line, position = self._first, 0
+            for _ in self.elements:
+                line, position = _skip_gap(self.text, line, position)
+                self._lines.append(line)
+                _, end = _decode(self.text, position)
+                line += self.text.count("\n", position, end)
+                position = end
+        return self._lines[number]
+
+
+def read_list(path: Path) -> Iterator[Block]:
+    """The elements of a JSON list in order.
+
+    Memory is that of a chunk of the file and of what it holds, or of one element.
 
     Raises:
-        DataError: `file-missing`, or `file-invalid` with file and line.
+        DataError: `file-missing`, or `file-invalid` with file and line, after the elements before.
     """
     try:
         with path.open(encoding="utf-8") as file:
@@ -32,33 +68,55 @@ def read_list(path: Path) -> Iterator[tuple[Any, int]]:
             line = 1 + buffer.count("\n", 0, start)
             if buffer[start : start + 1] != "[":
                 raise _invalid(path, line, "does not begin with a list")
-            decode = json.JSONDecoder().raw_decode
-            position = start + 1
+            position, untried = start + 1, True
             while True:
-                gap = _GAP.match(buffer, position)
-                end = gap.end() if gap else position
-                line += buffer.count("\n", position, end)
-                position = end
+                line, position = _skip_gap(buffer, line, position)
                 if buffer.startswith("]", position):
                     return
-                try:
-                    element, end = decode(buffer, position)
-                except RecursionError as error:
-                    raise _invalid(path, line, "is nested too deeply") from error
-                except ValueError as error:
-                    # Either the file is unsound here or the chunk ends inside of the element.
-                    more = file.read(_CHUNK)
-                    if not more or len(buffer) - position > _LONGEST:
-                        raise _invalid(path, line, "is cut off or is not JSON here") from error
-                    buffer, position = buffer[position:] + more, 0
-                    continue
-                yield element, line
-                line += buffer.count("\n", position, end)
-                position = end
+                block = _at_once(buffer, position, line) if untried else None
+                untried = False
+                if block is None:
+                    try:
+                        element, end = _decode(buffer, position)
+                    except RecursionError as error:
+                        raise _invalid(path, line, "is nested too deeply") from error
+                    except ValueError as error:
+                        # Either the file is unsound here or the chunk ends inside of the element.
+                        more = file.read(_CHUNK)
+                        if not more or len(buffer) - position > _LONGEST:
+                            raise _invalid(path, line, "is cut off or is not JSON here") from error
+                        buffer, position, untried = buffer[position:] + more, 0, True
+                        continue
+                    block = Block([element], buffer[position:end], line)
+                yield block
+                line += block.text.count("\n")
+                position += len(block.text)
     except UnicodeDecodeError as error:
         raise DataError(Diagnostic("file-invalid", f"{path} is not UTF-8 text")) from error
     except OSError as error:
         raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror}")) from error
+
+
+def _skip_gap(text: str, line: int, position: int) -> tuple[int, int]:
+    gap = _GAP.match(text, position)
+    end = gap.end() if gap else position
+    return line + text.count("\n", position, end), end
+
+
+def _at_once(buffer: str, position: int, line: int) -> Block | None:
+    """All elements but what may be cut off; None where they must be read one by one.
+
+    Wherever the text is cut but between two elements of the list, it is left with an open string or bracket. So what
+    is JSON here would have been read the same one by one.
+    """
+    ends = [between.start() + 1 for between in _BETWEEN.finditer(buffer, max(position, len(buffer) - _TAIL))]
+    if not ends:
+        return None
+    text = buffer[position : ends[-1]]
+    try:
+        return Block(json.loads(f"[{text}]"), text, line)
+    except (RecursionError, ValueError):
+        return None
 
 
 def _invalid(path: Path, line: int, what: str) -> DataError:

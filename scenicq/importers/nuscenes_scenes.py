@@ -1,23 +1,28 @@
-"""Scenes of nuScenes, joined: what belongs to each, and the labels that it becomes."""
+"""Scenes of nuScenes, joined: what belongs to each, and the recordings that they become."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import math
-from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from scenicq.importers.base import ClassNames, Labels
+from scenicq.importers.label_rows import labels_of
+from scenicq.importers.nuscenes_boxes import Boxes
 from scenicq.importers.report import Report
-from scenicq.store.labels import Label, LabelObject, Recording
+from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
+from scenicq.store.labels import Recording
 
 __all__ = [
     "AXLE_TO_CENTRE_M",
     "EGO_SIZE_M",
     "LONGEST_STEP_US",
     "POSE_CHANNEL",
-    "Box",
     "Instant",
     "SceneContent",
     "SceneReader",
@@ -37,38 +42,33 @@ POSE_CHANNEL = "LIDAR_TOP"
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
-    """An annotation: position, heading, size; what it belongs to."""
-
-    token: str
-    track: str
-    x: float
-    y: float
-    heading: float
-    size: tuple[float, ...]
-    attributes: Mapping[str, str | float | bool]
-
-
-@dataclass(frozen=True, slots=True)
 class Instant:
-    """A sample with all that belongs to it; `pose` is that of the ego: x, y, heading."""
+    """A sample with all that belongs to it.
+
+    Attributes:
+        place: File and line, for messages.
+        pose: Of the ego: x, y, heading.
+        sensors: Channel and file, in order of the channels.
+        boxes: How many of the scene's boxes are its.
+    """
 
     token: str
     time: int
     place: str
     pose: tuple[float, float, float] | None
     sensors: tuple[tuple[str, str], ...]
-    boxes: tuple[Box, ...]
+    boxes: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SceneContent:
     """A scene with all that belongs to it.
 
     Attributes:
         ahead_s: How far the local clock is ahead of UTC, seconds; None if unknown.
         instants: In order of time.
-        classes: Class name of each track.
+        boxes: Of one instant after the other; the numbers of tracks are those of `tracks`.
+        tracks: Token and class name of each track.
     """
 
     name: str
@@ -76,16 +76,24 @@ class SceneContent:
     ahead_s: int | None
     params: tuple[tuple[str, str | float | bool], ...]
     instants: tuple[Instant, ...]
-    classes: tuple[tuple[str, str], ...]
+    boxes: Boxes
+    tracks: tuple[tuple[str, str], ...]
 
     @property
     def weight(self) -> int:
         """How many label objects there are."""
-        return sum(len(instant.boxes) for instant in self.instants)
+        return len(self.boxes.tokens)
 
     def digest(self) -> str:
         """Changes with anything of the scene."""
-        return hashlib.blake2b(repr(self).encode(errors="backslashreplace"), digest_size=16).hexdigest()
+        instants = [(i.token, i.time, i.place, i.pose, i.sensors, i.boxes) for i in self.instants]
+        texts = [self.name, self.location, self.ahead_s, self.params, instants, self.tracks]
+        digest = hashlib.blake2b(
+            json.dumps([*texts, self.boxes.tokens, self.boxes.attributes]).encode(), digest_size=16
+        )
+        digest.update(self.boxes.tracks.tobytes())
+        digest.update(self.boxes.values.tobytes())
+        return digest.hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +108,7 @@ class SceneReader:
     scenes: tuple[SceneContent, ...] = field(repr=False)
     classes: Mapping[str, str]
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording]:
+    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording | RecordingColumns]:
         """The recordings in order of their names."""
         classes = ClassNames(self.classes, report)
         for scene in self.scenes:
@@ -108,60 +116,90 @@ class SceneReader:
                 if instant.pose is None:
                     message = f"{instant.place}: sample `{instant.token}` has no sound {POSE_CHANNEL} pose"
                     report.left_out("label", "record-invalid", message)
-            found = labels.recording(scene.name, list(_labels(scene, classes)))
+            columns = _columns(scene, classes)
+            ids = set(columns.objects.id)
+            sound = len(ids) == len(columns.objects.id) and "ego" not in ids
+            sound = sound and 0 < len(columns.frames) == len(set(columns.times_us))
+            if sound and labels.accept(scene.name, scene.location, columns.frames):
+                yield columns
+                continue
+            places = [instant.place for instant in scene.instants if instant.pose is not None]
+            found = labels.recording(scene.name, list(zip(labels_of(columns), places, strict=True)))
             if found is not None:
                 yield found
 
 
-def _labels(scene: SceneContent, classes: ClassNames) -> Iterator[tuple[Label, str]]:
+def _columns(scene: SceneContent, classes: ClassNames) -> RecordingColumns:
+    """The columns of the instants that have a pose."""
     posed = [(instant, instant.pose) for instant in scene.instants if instant.pose is not None]
-    centres = [
-        (instant.time, x - AXLE_TO_CENTRE_M * math.sin(heading), y + AXLE_TO_CENTRE_M * math.cos(heading))
-        for instant, (x, y, heading) in posed
-    ]
-    tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
-    step: dict[str, int] = {}
-    for instant, _ in posed:
-        for box in instant.boxes:
-            step[box.token] = len(tracks[box.track])
-            tracks[box.track].append((instant.time, box.x, box.y))
+    boxes = scene.boxes
+    if len(posed) < len(scene.instants):
+        has_pose = np.repeat([i.pose is not None for i in scene.instants], [i.boxes for i in scene.instants])
+        boxes = boxes.take(np.flatnonzero(has_pose))
+    counts = np.array([instant.boxes for instant, _ in posed], dtype=np.int64)
+    # whole numbers of any size where 64 bits might not hold a difference
+    times = [instant.time for instant, _ in posed]
+    moments = np.array(times, dtype=np.int64 if max(map(abs, times), default=0) < 1 << 62 else object)
+    params = dict(scene.params)
+    clocks = [{} if scene.ahead_s is None else {"time": _minutes(time, scene.ahead_s)} for time in times]
+    return RecordingColumns(
+        name=scene.name,
+        map=scene.location,
+        frames=[instant.token for instant, _ in posed],
+        times_us=times,
+        params=[to_json(params | clock) for clock in clocks],
+        egos=_egos(moments, [pose for _, pose in posed]),
+        objects=_objects(scene, classes, boxes, np.repeat(moments, counts)),
+        object_counts=counts,
+        sensor_counts=np.array([len(instant.sensors) for instant, _ in posed], dtype=np.int64),
+        channels=[channel for instant, _ in posed for channel, _ in instant.sensors],
+        paths=[path for instant, _ in posed for _, path in instant.sensors],
+    )
+
+
+def _egos(times: NDArray[np.int64], poses: Sequence[tuple[float, float, float]]) -> MemberColumns:
+    n = len(poses)
+    centres = [(x - AXLE_TO_CENTRE_M * math.sin(h), y + AXLE_TO_CENTRE_M * math.cos(h)) for x, y, h in poses]
+    xy = np.array(centres, dtype=np.float64).reshape(-1, 2)
+    velocity = _velocities(np.zeros(n, dtype=np.int64), times, xy)
     width, length, height = EGO_SIZE_M
-    names, params = dict(scene.classes), dict(scene.params)
-    for number, (instant, pose) in enumerate(posed):
-        _, x, y = centres[number]
-        ego = LabelObject(
-            id="ego",
-            category="Car",
-            source_class="vehicle.ego",
-            x=x,
-            y=y,
-            heading=pose[2],
-            width=width,
-            length=length,
-            height=height,
-            velocity=_velocity(centres, number),
-        )
-        objects = tuple(
-            LabelObject(
-                id=box.token,
-                category=classes.category(names[box.track]),
-                source_class=names[box.track],
-                x=box.x,
-                y=box.y,
-                heading=box.heading,
-                width=box.size[0],
-                length=box.size[1],
-                height=box.size[2],
-                velocity=_velocity(tracks[box.track], step[box.token]),
-                track=box.track,
-                attributes=box.attributes,
-            )
-            for box in instant.boxes
-        )
-        sensors = dict(instant.sensors)
-        told = params if scene.ahead_s is None else params | {"time": _minutes(instant.time, scene.ahead_s)}
-        label = Label(instant.token, scene.name, instant.time, scene.location, ego, objects, told, sensors)
-        yield label, instant.place
+    return MemberColumns(
+        id=["ego"] * n,
+        category=["Car"] * n,
+        source_class=["vehicle.ego"] * n,
+        x=xy[:, 0],
+        y=xy[:, 1],
+        heading=np.array([heading for _, _, heading in poses], dtype=np.float64),
+        width=np.full(n, width),
+        length=np.full(n, length),
+        height=np.full(n, height),
+        vx=velocity[:, 0],
+        vy=velocity[:, 1],
+        track=[None] * n,
+        attributes=[None] * n,
+    )
+
+
+def _objects(scene: SceneContent, classes: ClassNames, boxes: Boxes, times: NDArray[np.int64]) -> MemberColumns:
+    tracks: list[int] = boxes.tracks.tolist()
+    names = [scene.tracks[track][1] for track in tracks]
+    velocity = _velocities(boxes.tracks, times, boxes.values[:, :2])
+    x, y, heading, width, length, height = boxes.values.T
+    return MemberColumns(
+        id=boxes.tokens,
+        category=[classes.known.get(name) or classes.category(name) for name in names],
+        source_class=names,
+        x=x,
+        y=y,
+        heading=heading,
+        width=width,
+        length=length,
+        height=height,
+        vx=velocity[:, 0],
+        vy=velocity[:, 1],
+        track=[scene.tracks[track][0] for track in tracks],
+        attributes=boxes.attributes,
+    )
 
 
 def _minutes(time_us: int, ahead_s: int) -> float:
@@ -169,10 +207,21 @@ def _minutes(time_us: int, ahead_s: int) -> float:
     return (time_us + ahead_s * 1_000_000) % 86_400_000_000 / 60e6
 
 
-def _velocity(track: list[tuple[int, float, float]], step: int) -> tuple[float, float] | None:
-    """Central difference, at the ends of a track one-sided; None where there is no neighbour close enough in time."""
-    here = track[step]
-    before = track[step - 1] if step > 0 and here[0] - track[step - 1][0] <= LONGEST_STEP_US else here
-    after = track[step + 1] if step + 1 < len(track) and track[step + 1][0] - here[0] <= LONGEST_STEP_US else here
-    seconds = (after[0] - before[0]) / 1e6
-    return None if seconds <= 0 else ((after[1] - before[1]) / seconds, (after[2] - before[2]) / seconds)
+def _velocities(tracks: NDArray[np.int64], times: NDArray[np.int64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Central differences, at the ends of a track one-sided; nan where there is no neighbour close enough in time.
+
+    Args:
+        tracks: Number of the track of each position, shape (n,).
+        times: Of each position, microseconds, in order.
+        xy: Positions, shape (n, 2).
+    """
+    order = np.argsort(tracks, kind="stable")
+    tracks, times, xy = tracks[order], times[order], xy[order]
+    joins = (np.diff(tracks) == 0) & (np.diff(times) <= LONGEST_STEP_US).astype(bool)
+    here = np.arange(len(tracks))
+    before, after = here - np.append(False, joins)[: len(here)], here + np.append(joins, False)[: len(here)]
+    seconds = ((times[after] - times[before]) / 1e6).astype(np.float64)
+    found = np.full(xy.shape, math.nan)
+    moves = seconds > 0
+    found[order[moves]] = (xy[after[moves]] - xy[before[moves]]) / seconds[moves, None]
+    return found

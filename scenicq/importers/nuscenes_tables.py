@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from scenicq.geometry.angles import normalize
+import numpy as np
+
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.json_tables import read_list
-from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Box, Instant, SceneContent
+from scenicq.importers.json_tables import Block, read_list
+from scenicq.importers.nuscenes_boxes import Box, Boxes, BoxReader, found, joined, of_rows, pose
+from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
 from scenicq.importers.report import Report
 
 __all__ = ["Tables"]
 
-_CHUNK = 1 << 20
 _ZONE = re.compile(r"([+-])(\d\d)(\d\d)$")
 """At the end of a log's name, as in `n015-2018-07-24-11-22-45+0800`: hours and minutes ahead of UTC."""
 
@@ -41,7 +41,6 @@ class _Scene:
     name: str
     log: _Log
     params: Mapping[str, str | float | bool]
-    place: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +48,20 @@ class _Sample:
     token: str
     time: int
     place: str
+
+
+class _Place:
+    """File and line of a row, found out only for messages."""
+
+    __slots__ = ("_block", "_file", "_number")
+
+    def __init__(self, file: str, block: Block, number: int) -> None:
+        self._file = file
+        self._block = block
+        self._number = number
+
+    def __str__(self) -> str:
+        return f"{self._file}:{self._block.line(self._number)}"
 
 
 class Tables:
@@ -60,7 +73,7 @@ class Tables:
         logs = self._keyed("log", _log)
         self.scenes: dict[str, _Scene] = {}
         for token, row, place in self._rows("scene", "recording"):
-            self._try("recording", place, lambda: self._add_scene(token, row, place, logs))  # noqa: B023
+            self._try("recording", place, lambda: self._add_scene(token, row, logs))  # noqa: B023
         self.locations = sorted({scene.log.location for scene in self.scenes.values()})
         self.samples: dict[str, tuple[str, _Sample]] = {}
         self.samples_of: defaultdict[str, list[_Sample]] = defaultdict(list)
@@ -68,14 +81,12 @@ class Tables:
             self._try("label", place, lambda: self._add_sample(token, row, place))  # noqa: B023
         self.sensors: defaultdict[str, dict[str, str]] = defaultdict(dict)
         self.poses = self._read_sensor_files()
-        self.classes = self._read_classes()
-        self.boxes: defaultdict[str, list[Box]] = defaultdict(list)
+        self._classes = self._read_classes()
         self._read_boxes()
 
     def scene(self, token: str) -> SceneContent:
         """All that belongs to a scene."""
         scene = self.scenes[token]
-        samples = sorted(self.samples_of[token], key=lambda sample: (sample.time, sample.token))
         instants = tuple(
             Instant(
                 sample.token,
@@ -83,27 +94,30 @@ class Tables:
                 sample.place,
                 self.poses.get(sample.token),
                 tuple(sorted(self.sensors[sample.token].items())),
-                tuple(self.boxes.pop(sample.token, ())),
+                self._boxes_of[sample.token],
             )
-            for sample in samples
+            for sample in self.samples_of[token]
         )
-        tracks = sorted({box.track for instant in instants for box in instant.boxes})
-        classes = tuple((track, self.classes[track]) for track in tracks)
+        start = self._first_box[token]
+        boxes = self._boxes.take(self._order[start : start + sum(instant.boxes for instant in instants)])
+        used, numbers = np.unique(boxes.tracks, return_inverse=True)
+        tracks = tuple(self._tracks[number] for number in used.tolist())
+        params = tuple(scene.params.items())
         return SceneContent(
-            scene.name, scene.log.location, scene.log.ahead_s, tuple(scene.params.items()), instants, classes
+            scene.name, scene.log.location, scene.log.ahead_s, params, instants, replace(boxes, tracks=numbers), tracks
         )
 
-    def _add_scene(self, token: str, row: Record, place: str, logs: Mapping[str, _Log]) -> None:
+    def _add_scene(self, token: str, row: Record, logs: Mapping[str, _Log]) -> None:
         name = fields.text(row, "name")
-        log: _Log = _found(logs, fields.text(row, "log_token"), "log")
+        log: _Log = found(logs, fields.text(row, "log_token"), "log")
         if any(scene.name == name for scene in self.scenes.values()):
             raise InvalidError(f"scene name `{name}` is used twice")
-        self.scenes[token] = _Scene(name, log, _params(row.get("description"), log), place)
+        self.scenes[token] = _Scene(name, log, _params(row.get("description"), log))
 
-    def _add_sample(self, token: str, row: Record, place: str) -> None:
+    def _add_sample(self, token: str, row: Record, place: _Place) -> None:
         scene = fields.text(row, "scene_token")
-        sample = _Sample(token, fields.integer(row, "timestamp"), place)
-        _found(self.scenes, scene, "scene")
+        sample = _Sample(token, fields.integer(row, "timestamp"), str(place))
+        found(self.scenes, scene, "scene")
         if token in self.samples:
             raise InvalidError(f"sample `{token}` is there twice")
         self.samples[token] = (scene, sample)
@@ -113,7 +127,7 @@ class Tables:
         """Fill in the files of each sample; the result is position and heading of its ego."""
         channels = self._keyed("sensor", lambda row: fields.text(row, "channel"))
         mounted = self._keyed(
-            "calibrated_sensor", lambda row: _found(channels, fields.text(row, "sensor_token"), "sensor")
+            "calibrated_sensor", lambda row: found(channels, fields.text(row, "sensor_token"), "sensor")
         )
         pose_of: dict[str, str] = {}
         for token, row, place in self._rows("sample_data", "sensor file"):
@@ -121,62 +135,83 @@ class Tables:
                 continue
 
             def add(row: Record = row) -> None:
-                channel = _found(mounted, fields.text(row, "calibrated_sensor_token"), "calibrated_sensor")
+                channel = found(mounted, fields.text(row, "calibrated_sensor_token"), "calibrated_sensor")
                 sample = fields.text(row, "sample_token")
                 self.sensors[sample][channel] = fields.text(row, "filename")
                 if channel == POSE_CHANNEL:
                     pose_of[sample] = fields.text(row, "ego_pose_token")
 
-            self._try("sensor file", f"{place}: sample_data `{token}`", add)
+            self._try("sensor file", place, add, f"sample_data `{token}`")
         wanted = set(pose_of.values())
         poses = {
-            token: pose
+            token: made
             for token, row, place in self._rows("ego_pose", "ego pose")
             if token in wanted
-            and (pose := self._try("ego pose", f"{place}: ego_pose `{token}`", lambda row=row: _pose(row)))
+            and (made := self._try("ego pose", place, lambda row=row: pose(row), f"ego_pose `{token}`"))
         }
-        return {sample: poses[pose] for sample, pose in pose_of.items() if pose in poses}
+        return {sample: poses[token] for sample, token in pose_of.items() if token in poses}
 
     def _read_classes(self) -> dict[str, str]:
         """Class name of each instance."""
         names = self._keyed("category", lambda row: fields.text(row, "name"))
-        return self._keyed("instance", lambda row: _found(names, fields.text(row, "category_token"), "category"))
+        return self._keyed("instance", lambda row: found(names, fields.text(row, "category_token"), "category"))
 
     def _read_boxes(self) -> None:
         attributes = self._keyed("attribute", lambda row: fields.text(row, "name"))
         visible: dict[str, str] = {}
         if (self._folder / "visibility.json").is_file():
             visible = self._keyed("visibility", lambda row: fields.text(row, "level"))
-        for token, row, place in self._rows("sample_annotation", "object"):
+        sample_numbers = {token: number for number, token in enumerate(self.samples)}
+        track_numbers = {token: number for number, token in enumerate(sorted(self._classes))}
+        reader = BoxReader(sample_numbers, track_numbers, attributes, visible)
+        path = self._folder / "sample_annotation.json"
+        self._boxes = joined([self._boxes_in(reader, path.name, block) for block in read_list(path)])
+        self._tracks = [(token, self._classes[token]) for token in track_numbers]
+        # Boxes by scene, then by sample; those of one sample as they come.
+        counts: list[int] = np.bincount(self._boxes.samples, minlength=len(self.samples)).tolist()
+        self._boxes_of = dict(zip(self.samples, counts, strict=True))
+        rank = np.empty(len(self.samples), dtype=np.int64)
+        self._first_box: dict[str, int] = {}
+        ranked = first = 0
+        for scene in self.scenes:
+            self.samples_of[scene].sort(key=lambda sample: (sample.time, sample.token))
+            self._first_box[scene] = first
+            for sample in self.samples_of[scene]:
+                rank[sample_numbers[sample.token]] = ranked
+                ranked += 1
+                first += self._boxes_of[sample.token]
+        self._order = np.argsort(rank[self._boxes.samples], kind="stable")
 
-            def add(token: str = token, row: Record = row) -> None:
-                sample = fields.text(row, "sample_token")
-                _found(self.samples, sample, "sample")
-                track = fields.text(row, "instance_token")
-                _found(self.classes, track, "instance")
-                x, y, heading = _pose(row)
-                size = fields.vector(row, "size", 3)
-                if min(size) <= 0:
-                    raise InvalidError("`size` is not positive")
-                told = _attributes(row, attributes, visible)
-                self.boxes[sample].append(Box(token, track, x, y, heading, size, told))
-
-            self._try("object", f"{place}: annotation `{token}`", add)
+    def _boxes_in(self, reader: BoxReader, file: str, block: Block) -> Boxes:
+        boxes = None if "\\u" in block.text else reader.columns(block.elements)
+        if boxes is not None:
+            return boxes
+        rows: list[Box] = []
+        for token, row, place in self._rows_in(block, file, "object"):
+            box = self._try("object", place, lambda: reader.row(token, row), f"annotation `{token}`")  # noqa: B023
+            if box is not None:
+                rows.append(box)
+        return of_rows(rows)
 
     def _keyed(self, table: str, value: Callable[[Record], Any]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for token, row, place in self._rows(table, "record"):
-            made = self._try("record", f"{place}: {table} `{token}`", lambda row=row: value(row))
+            made = self._try("record", place, lambda row=row: value(row), f"{table} `{token}`")
             if made is not None:
-                found[token] = made
-        return found
+                values[token] = made
+        return values
 
-    def _rows(self, table: str, what: str) -> Iterator[tuple[str, Record, str]]:
+    def _rows(self, table: str, what: str) -> Iterator[tuple[str, Record, _Place]]:
         """Token, fields and place of each row."""
         path = self._folder / f"{table}.json"
-        escapes = _has_escapes(path)
-        for element, line in read_list(path):
-            place = f"{path.name}:{line}"
+        for block in read_list(path):
+            yield from self._rows_in(block, path.name, what)
+
+    def _rows_in(self, block: Block, file: str, what: str) -> Iterator[tuple[str, Record, _Place]]:
+        # only where a character is named by its number can there be half of one
+        escapes = "\\u" in block.text
+        for number, element in enumerate(block.elements):
+            place = _Place(file, block, number)
             try:
                 row = fields.record(element, "it")
                 if escapes:
@@ -187,26 +222,13 @@ class Tables:
             else:
                 yield token, row, place
 
-    def _try(self, what: str, place: str, make: Callable[[], Any]) -> Any:
+    def _try(self, what: str, place: _Place, make: Callable[[], Any], name: str = "") -> Any:
         try:
             return make()
         except InvalidError as error:
-            self._report.left_out(what, "record-invalid", f"{place}: {error}")
+            of = f"{name}: " if name else ""
+            self._report.left_out(what, "record-invalid", f"{place}: {of}{error}")
             return None
-
-
-def _has_escapes(path: Path) -> bool:
-    """Whether a file may name a character by its number; only so can it have half of one."""
-    try:
-        with path.open("rb") as file:
-            before = b""
-            while chunk := file.read(_CHUNK):
-                if b"\\u" in before + chunk:
-                    return True
-                before = chunk[-1:]
-            return False
-    except OSError:
-        return True  # whoever reads it says so
 
 
 def _log(row: Record) -> _Log:
@@ -216,32 +238,6 @@ def _log(row: Record) -> _Log:
     if zone is not None:
         ahead = int(f"{zone[1]}1") * (int(zone[2]) * 3600 + int(zone[3]) * 60)
     return _Log(fields.text(row, "location"), fields.optional_text(row, "date_captured"), ahead)
-
-
-def _pose(row: Record) -> tuple[float, float, float]:
-    """Position and heading of `translation` and `rotation`."""
-    x, y, _ = fields.vector(row, "translation", 3)
-    a, b, c, d = fields.vector(row, "rotation", 4)
-    norm = math.hypot(a, b, c, d)
-    if not 0.5 < norm < 2:
-        raise InvalidError("`rotation` is not a unit quaternion")
-    a, b, c, d = a / norm, b / norm, c / norm, d / norm
-    yaw = math.atan2(2 * (a * d + b * c), 1 - 2 * (c * c + d * d))
-    return x, y, normalize(yaw - math.pi / 2)
-
-
-def _attributes(row: Record, names: Mapping[str, str], visible: Mapping[str, str]) -> dict[str, str | float | bool]:
-    """What else an annotation says: `vehicle.parked` becomes `vehicle: parked`; tokens may be empty."""
-    told: dict[str, str | float | bool] = {}
-    for token in fields.optional_items(row, "attribute_tokens"):
-        group, _, value = _found(names, token, "attribute").rpartition(".")
-        told[group or "attribute"] = value
-    if (level := fields.optional_text(row, "visibility_token")) is not None:
-        told["visibility"] = visible.get(level, level)
-    for key in ("num_lidar_pts", "num_radar_pts"):
-        if row.get(key) is not None:
-            told[key] = fields.integer(row, key)
-    return told
 
 
 def _params(description: object, log: _Log) -> dict[str, str | float | bool]:
@@ -254,9 +250,3 @@ def _params(description: object, log: _Log) -> dict[str, str | float | bool]:
     if words:
         params |= {"description": words, "rain": _RAIN.search(lower) is not None, "night": "night" in lower}
     return params
-
-
-def _found(table: Mapping[str, Any], token: object, name: str) -> Any:
-    if not isinstance(token, str) or token not in table:
-        raise InvalidError(f"{name} `{token}` is not there")
-    return table[token]

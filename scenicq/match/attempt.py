@@ -16,6 +16,7 @@ from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Constraint, Group
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
+from scenicq.match.apart import decide_apart
 from scenicq.match.casting import Cast
 from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes, condition_group, decide
 from scenicq.match.options import MatchOptions
@@ -153,7 +154,7 @@ class Attempt:
             items = self.items(group, assignment)
             if self.options.method == "smt":
                 return self.ask([items])
-            outcome = decide(items, self.options.tolerance)
+            outcome = decide_apart(items, self.options.tolerance)
             return self.ask([items]) if isinstance(outcome, Maybe) else outcome
         except CannotEvaluate as error:
             return Maybe(group.constraints[0], f"unsupported: {error}")

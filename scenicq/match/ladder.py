@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
-
-import numpy as np
 
 from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.condition import condition
@@ -29,7 +27,7 @@ from scenicq.match.linear import NotLinear, inside, position_boxes, solve_affine
 from scenicq.match.options import Tolerance
 from scenicq.match.program import Row
 
-__all__ = ["Item", "Maybe", "No", "Outcome", "Yes", "condition_group", "decide", "ground_cause"]
+__all__ = ["LINEAR_SLACK", "Item", "Maybe", "No", "Outcome", "Yes", "condition_group", "decide", "ground_cause"]
 
 Item = tuple[Constraint, Node, Value]
 """A constraint, what conditioning left of its expression, and the label's value if it is a comparison."""
@@ -63,7 +61,7 @@ Outcome = Yes | No | Maybe
 _MOST_BRANCHES = 4096
 _MOST_PARTS = 200
 """Parts of one cell that are looked at."""
-_LINEAR_SLACK = 1e-6
+LINEAR_SLACK = 1e-6
 """Metres or radians that the witness of a linear program may be off."""
 
 
@@ -90,9 +88,15 @@ def ground_cause(item: Item) -> str:
     return value.reason if isinstance(value, Undefined) else "does not hold"
 
 
-def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
-    """Decide a group without a solver; `Maybe` with reason "nonlinear" where one is needed."""
-    return _Ladder(tolerance).decide(items, {}, [])
+def decide(items: list[Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> Outcome:
+    """Decide a group without a solver; `Maybe` with reason "nonlinear" where one is needed.
+
+    Args:
+        items: The group's constraints, conditioned.
+        tolerance: Per feature.
+        rows: Linear facts that hold besides.
+    """
+    return _Ladder(tolerance).decide(items, {}, [*rows])
 
 
 class _Ladder:
@@ -186,7 +190,7 @@ class _Ladder:
         place = affine_vector(field.point)
         if place is None or not isinstance(field.field, Constant):
             return Maybe(constraint, "nonlinear")
-        (x0, x1), (y0, y1) = vector_bounds(field.point, position_boxes(items, self.tolerance))
+        (x0, x1), (y0, y1) = vector_bounds(field.point, position_boxes(items, self.tolerance, rows))
         if not all(map(math.isfinite, (x0, x1, y0, y1))):
             return Maybe(constraint, "nonlinear")
         vector_field = cast(VectorField, field.field.value)
@@ -195,6 +199,8 @@ class _Ladder:
 
         def outcomes() -> Iterator[Outcome]:
             for cell in vector_field.cells((x0, y0, x1, y1)):
+                if _apart(cell, ((x0, x1), (y0, y1))):
+                    continue
                 if cell.heading not in given_heading:
                     given_heading[cell.heading] = self._with_heading(items, field, cell.heading)
                 known = given_heading[cell.heading]
@@ -202,10 +208,12 @@ class _Ladder:
                     yield known
                     continue
                 fixed, box = known
-                if _apart(cell.polygon, box):
+                if _apart(cell, box):
                     yield No(constraint)
                     continue
-                more = [*rows, *inside(place, cell.polygon)]
+                west, south, east, north = cell.bounds
+                around = (Row(place[0], west, east), Row(place[1], south, north))
+                more = [*rows, *inside(place, cell.polygon), *around]
                 outcome = self.decide(fixed, given, more)
                 if not cell.exact and not isinstance(outcome, No) and not self._confirmed(items, outcome):
                     outcome = self._refine(items, fixed, given, more, place, cell)
@@ -224,7 +232,7 @@ class _Ladder:
 
     def _confirmed(self, items: list[Item], outcome: Outcome) -> bool:
         """Whether a witness found in a cell that covers too much holds where the field is asked itself."""
-        return isinstance(outcome, Yes) and replay(items, outcome.values, self.tolerance, _LINEAR_SLACK)
+        return isinstance(outcome, Yes) and replay(items, outcome.values, self.tolerance, LINEAR_SLACK)
 
     def _refine(
         self,
@@ -264,7 +272,7 @@ class _Ladder:
         if found is None:
             return No(constraint)
         values = given | found
-        holding = replay(items, values, self.tolerance, _LINEAR_SLACK)
+        holding = replay(items, values, self.tolerance, LINEAR_SLACK)
         return Yes(values) if holding else Maybe(constraint, "nonlinear")
 
 
@@ -280,14 +288,22 @@ def _options(leaf: Leaf) -> range | None:
 
 
 def _free_direction(items: list[Item]) -> DirectionAt | None:
-    for node in postorder([node for _, node, _ in items]):
-        if isinstance(node, DirectionAt) and not isinstance(node.point, Constant):
-            return node
-    return None
+    """A field at a random point; first one that alone decides a constraint, because most of its cells are then out."""
+    found: DirectionAt | None = None
+    for _, node, _ in items:
+        free = [
+            each
+            for each in postorder((node,))
+            if isinstance(each, DirectionAt) and not isinstance(each.point, Constant)
+        ]
+        if len(free) == 1 and isinstance(condition(node, {}, None, {id(free[0]): Constant(0.0)}), Constant):
+            return free[0]
+        found = found or next(iter(free), None)
+    return found
 
 
-def _apart(polygon: np.ndarray, box: Box) -> bool:
-    """Whether a polygon lies outside of a box."""
-    low, high = polygon.min(axis=0), polygon.max(axis=0)
+def _apart(cell: FieldCell, box: Box) -> bool:
+    """Whether a cell lies outside of a box."""
+    west, south, east, north = cell.bounds
     (x0, x1), (y0, y1) = box
-    return bool(low[0] > x1 or high[0] < x0 or low[1] > y1 or high[1] < y0)
+    return west > x1 or east < x0 or south > y1 or north < y0

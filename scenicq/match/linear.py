@@ -56,15 +56,37 @@ class NotLinear(Exception):
     """The constraints are not affine, or the linear programs do not tell."""
 
 
-def position_boxes(items: Sequence[_Item], tolerance: Tolerance) -> dict[Identity, Box]:
-    """Where each random point can lie, from the positions that it leads to; a little too much, never too little."""
+def position_boxes(items: Sequence[_Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> dict[Identity, Box]:
+    """Where each random point can lie, from the positions that it leads to; a little too much, never too little.
+
+    Args:
+        items: The constraints after conditioning.
+        tolerance: Per feature.
+        rows: Linear facts that hold besides: those about one coordinate alone count.
+    """
     reach = tolerance.reach + _CULLING
     targets: list[tuple[Node, Box]] = []
     for constraint, node, observed in items:
         if isinstance(constraint, Comparison) and constraint.property == "position":
             x, y = cast("tuple[float, float]", observed)
             targets.append((node, ((x - reach, x + reach), (y - reach, y + reach))))
-    return leaf_boxes(targets)
+    boxes = leaf_boxes(targets)
+    for row in rows:
+        if len(row.form.terms) == 1:
+            _narrow(boxes, row)
+    return boxes
+
+
+def _narrow(boxes: dict[Identity, Box], row: Row) -> None:
+    """Keep a point within what a row says of one of its coordinates."""
+    (((identity, axis), factor),) = row.form.terms.items()
+    if factor == 0:
+        return
+    ends = sorted(((limit - row.form.constant) / factor) for limit in (row.low, row.high))
+    limits = list(boxes.get(identity, ((-math.inf, math.inf), (-math.inf, math.inf))))
+    low, high = limits[axis]
+    limits[axis] = (max(low, ends[0] - _CULLING), min(high, ends[1] + _CULLING))
+    boxes[identity] = (limits[0], limits[1])
 
 
 def inside(place: AffineVector, polygon: np.ndarray) -> list[Row]:
@@ -91,7 +113,7 @@ def solve_affine(items: Sequence[_Item], rows: Sequence[Row], tolerance: Toleran
     Raises:
         NotLinear: Something is not affine, or lies between the inner and the outer polygons.
     """
-    problem = _Problem(tolerance, position_boxes(items, tolerance), LinearSystem(list(rows)))
+    problem = _Problem(tolerance, position_boxes(items, tolerance, rows), LinearSystem(list(rows)))
     for item in items:
         problem.add(item)
     variables = {leaf.identity: leaf for leaf in leaves(*(node for _, node, _ in items))}

@@ -1,7 +1,6 @@
 """An interrupt that gets lost on its way ends the command all the same."""
 
 import os
-import signal
 import subprocess
 import sys
 
