@@ -1,9 +1,10 @@
-"""A solver that is opened when the first question comes: most queries never ask one."""
+"""A solver that is opened when the first question comes (most queries never ask one) and asked nothing twice."""
 
 from __future__ import annotations
 
 from scenicq.smt.answer import Answer, SolverSession
 from scenicq.smt.formula import Problem
+from scenicq.smt.remembering import RememberingSolver
 from scenicq.smt.solver import open_solver
 
 __all__ = ["LazySolver"]
@@ -22,6 +23,7 @@ class LazySolver:
         self.name = name
         self.calls = 0
         self._session: SolverSession | None = None
+        self._memory: RememberingSolver | None = None
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide one problem; see `Solver.check`.
@@ -29,10 +31,11 @@ class LazySolver:
         Raises:
             SolverError: The solver cannot be loaded or started.
         """
-        if self._session is None:
+        if self._memory is None:
             self._session = open_solver(self.name)
+            self._memory = RememberingSolver(self._session)
         self.calls += 1
-        return self._session.check(problem, precision=precision, timeout_s=timeout_s)
+        return self._memory.check(problem, precision=precision, timeout_s=timeout_s)
 
     def __enter__(self) -> LazySolver:
         """Nothing is started yet."""
@@ -42,4 +45,4 @@ class LazySolver:
         """Close the solver if it was opened."""
         if self._session is not None:
             self._session.close()
-            self._session = None
+            self._session = self._memory = None
