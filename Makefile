@@ -49,6 +49,7 @@ bench: $(READY) ## Measure queries, start-up, ingest and pictures; numbers go to
 	$(BIN)/python tests/bench/queries.py
 	$(BIN)/python tests/bench/jointly.py
 	$(BIN)/python tests/bench/scalability.py --patience 5
+	$(BIN)/python tests/bench/ingest.py
 	$(BIN)/python tests/bench/pictures.py
 
 FRAMES ?= 10000 100000

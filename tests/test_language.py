@@ -11,6 +11,7 @@ import ast
 import math
 import random
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -22,6 +23,9 @@ from scenicq.compiler.standin import street
 from scenicq.errors import CODES, ScenarioError, Source
 from scenicq.forest.improvise import draw_scene
 from scenicq.forest.scenario import Scenario
+from scenicq.syntax import ast as scenic
+from scenicq.syntax.parser import parse
+from scenicq.syntax.walk import walk
 
 PAGES = Path(__file__).parent / "language"
 NOT_ERRORS_OF_PROGRAMS = {"option-invalid", "soft-requirement"}
@@ -43,6 +47,11 @@ class Block:
     text: str
 
     @property
+    def version(self) -> int | None:
+        """The version that the block is read as, if it says so."""
+        return next((int(word.removeprefix("scenic=")) for word in self.options if word.startswith("scenic=")), None)
+
+    @property
     def marks(self) -> set[tuple[int, str]]:
         """Lines of the block with the codes of their errors."""
         lines = self.text.splitlines()
@@ -50,9 +59,8 @@ class Block:
 
     def compiled(self) -> Scenario:
         """The scenario over the made-up street."""
-        version = next((int(word.removeprefix("scenic=")) for word in self.options if word.startswith("scenic=")), None)
         source = Source(f"{self.page}:{self.line}", self.text)
-        return compile_scenario(source, street(), version=version, initial="initial" in self.options)
+        return compile_scenario(source, street(), version=self.version, initial="initial" in self.options)
 
 
 def blocks() -> list[Block]:
@@ -109,6 +117,16 @@ def test_every_code_that_a_program_can_cause_is_shown() -> None:
     """The codes of the program's part of the table, up to the first one of the data."""
     expected = set(takewhile(lambda code: code != "unknown-class", CODES)) - NOT_ERRORS_OF_PROGRAMS
     assert expected == {code for block in BLOCKS for _, code in block.marks}
+
+
+def test_every_construct_of_the_grammar_is_shown() -> None:
+    """Each kind of statement, expression and specifier occurs in some block that is read."""
+    shown: set[type[scenic.Node]] = set()
+    for block in BLOCKS:
+        with suppress(ScenarioError):
+            shown |= {type(node) for node in walk(*parse(Source(block.page, block.text), block.version).body)}
+    kinds = {kind for kind in vars(scenic).values() if isinstance(kind, type) and issubclass(kind, scenic.Node)}
+    assert kinds - {scenic.Node} == shown
 
 
 def test_the_table_lists_every_page_and_real_codes_only() -> None:

@@ -6,9 +6,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Any, cast
+
+from shapely.geometry import LineString
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_random
@@ -17,6 +20,7 @@ from scenicq.compiler.coerce import property_node, to_heading, to_scalar, to_vec
 from scenicq.compiler.elements import MISSING, names_of, of_element, of_network
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.lookups import look_up
+from scenicq.compiler.unavailable import unavailable_attribute
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
@@ -25,7 +29,9 @@ from scenicq.forest.nodes import Constant, Node, PointIn
 from scenicq.geometry.angles import heading_of
 from scenicq.geometry.elements import Maneuver, NetworkElement
 from scenicq.geometry.network import Network
-from scenicq.geometry.regions import PolylineSet, Region, orientation_of
+from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, orientation_of
+from scenicq.geometry.road_direction import along_lines
+from scenicq.geometry.shapes import simple_parts
 
 __all__ = ["attribute", "corner", "part_of"]
 
@@ -92,10 +98,20 @@ def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
     if isinstance(value, Instance) and name.lstrip("_") in _PLACES:
         return fail("unknown-attribute", f"{describe(value)} has no attribute `{name}`", span, "not found",
                     (f"`network.{_PLACES[name.lstrip('_')]}(...)` says what lies at any point",))  # fmt: skip
+    if is_node(value) or isinstance(value, Instance | NetworkElement):
+        refused = unavailable_attribute(name, span)
+        if refused is not None:
+            return refused
     close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
     hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
     shown = f"a {kind_of(cast(Node, value))}" if is_node(value) else describe(value)
-    return fail("unknown-attribute", f"{shown} has no attribute `{name}`", span, "not found", hints)
+    owner = _OWNER.search(span.source.text, 0, span.start)
+    label = f"`{owner[1]}` is {shown}" if owner else "not found"
+    return fail("unknown-attribute", f"{shown} has no attribute `{name}`", span, label, hints)
+
+
+_OWNER = re.compile(r"([A-Za-z_][\w.]{0,60})\.\Z")
+"""The dotted name before an attribute."""
 
 
 def _of_choice(run: Runner, value: Choice, name: str, span: Span) -> ModelValue:
@@ -131,7 +147,7 @@ def _lookup(run: Runner, value: ModelValue, name: str, span: Span) -> ModelValue
         case Maneuver():
             return of_element(run, value, name, span)
         case _ if is_node(value):
-            return _of_node(value, name, span)
+            return _of_field(run, value, name) if kind_of(value) == "field" else _of_node(value, name, span)
         case _ if name in _PLAIN.get(type(value), ()):
             return Builtin(name, _guarded(name, value), lifted=False, owner=value)
         case _:
@@ -204,6 +220,16 @@ def _of_instance(run: Runner, value: Instance, name: str, span: Span) -> ModelVa
     return next((cls.attributes[name] for cls in value.cls.ancestry() if name in cls.attributes), MISSING)
 
 
+def _of_field(run: Runner, value: Node, name: str) -> ModelValue:
+    if name != "followFrom":
+        return MISSING
+
+    def follow(span: Span, start: ModelValue, distance: ModelValue) -> ModelValue:
+        return operators.follow(value, start, distance, run.version, span).properties["position"]
+
+    return Builtin(name, follow)
+
+
 def _of_node(value: Node, name: str, span: Span) -> ModelValue:
     match kind_of(value), name:
         case "vector", "x" | "y":
@@ -255,10 +281,37 @@ def _of_region(value: Node, name: str, span: Span) -> ModelValue:
             return operators.oriented(build.constant(place, span), build.constant(heading_of(u - x, v - y), span))
         case "points" if (points := _line(value)) is not None:
             return tuple(build.constant(point, span) for point in points)
+        case "footprint" if isinstance(value, Constant) and isinstance(value.value, PolygonSet):
+            return value
+        case "boundary" if isinstance(value, Constant) and isinstance(value.value, PolygonSet):
+            return _boundary(value.value, span)
+        case "pointAlongBy" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
+            region = value.value
+            return Builtin(
+                name, lambda span, by, normalized=False: _point_along(region, by, span, normalized=normalized)
+            )
         case "length" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
             return float(sum(line.length for line in value.value.lines))
         case _:
             return MISSING
+
+
+def _boundary(region: PolygonSet, span: Span) -> ModelValue:
+    """The border of a single polygon, directed along itself."""
+    if len(region.polygons) != 1:
+        return MISSING
+    lines = cast("tuple[LineString, ...]", tuple(simple_parts([region.polygons[0].boundary])))
+    return build.constant(PolylineSet(lines, region.name, along_lines(lines, region.name)), span)
+
+
+def _point_along(region: PolylineSet, by: ModelValue, span: Span, *, normalized: ModelValue) -> ModelValue:
+    """The point at a distance along a single line, in metres or as a share of its length."""
+    distance = to_scalar(by, span)
+    if len(region.lines) != 1 or not isinstance(distance, Constant):
+        raise fail("unsupported-construct", "this point along a line is not supported", span,
+                   "a random distance, or several lines", ("place something `on` the line",))  # fmt: skip
+    point = region.lines[0].interpolate(float(cast(float, distance.value)), normalized=bool(normalized))
+    return build.constant((float(point.x), float(point.y)), span)
 
 
 def _line(value: ModelValue) -> list[tuple[float, float]] | None:

@@ -23,7 +23,7 @@ from scenicq.compiler.values import Builtin, Choice, Delayed, Instance, ModelVal
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant
-from scenicq.geometry.regions import Everywhere, Nowhere
+from scenicq.geometry.regions import Everywhere, Nowhere, PolylineSet
 
 __all__ = ["extreme", "language_names", "mathematics", "truth"]
 
@@ -126,9 +126,13 @@ def _has_class(value: ModelValue, wanted: ModelValue, span: Span) -> bool:
 
 
 def _plain(name: str, function: Callable[..., Any]) -> Builtin:
-    """A function of Python that only ever sees known values."""
+    """A function of Python that only ever sees known values: each outcome of a random choice by itself."""
 
     def call(span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
+        if any(map(is_choice, args)):
+            return distribute(lambda *known: call(span, *known, **named), args, span, spread=is_choice)
+        if name == "float" and len(args) == 1 and is_node(args[0]):
+            return to_scalar(args[0], span)
         for arg in args:
             if is_random(arg):
                 raise fail("random-branch", f"`{name}` cannot be applied to a random value", span, "random here",
@@ -199,6 +203,8 @@ def _sum(span: Span, values: ModelValue, start: ModelValue = 0) -> ModelValue:
 
 
 def _length(values: Any) -> int:
+    if isinstance(values, PolylineSet):
+        return sum(len(line.coords) for line in values.pieces)
     if isinstance(values, str | list | tuple | dict | set | range):
         return len(cast("list[Any]", values))
     raise TypeError(f"needs a list, not {describe(values)}")

@@ -15,7 +15,7 @@ from scenicq.syntax import ast
 
 __all__ = ["bind_arguments", "define_class", "refuse_decorators"]
 
-_IN_SPACE = frozenset({"pitch", "roll", "orientation", "shape"})
+_IN_SPACE = frozenset({"pitch", "roll", "orientation", "shape", "contactTolerance"})
 
 
 class _Definer(Runner, Protocol):

@@ -122,7 +122,10 @@ def to_scalar(value: ModelValue, span: Span | None) -> Node:
 
 def to_heading(value: ModelValue, span: Span | None) -> Node:
     """A heading in radians: a number, or the heading of an oriented point or object."""
-    if isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 3 and value[1:] == (0, 0):
+    if isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 3:
+        if value[1:] != (0, 0):
+            raise fail("unsupported-construct", "an orientation in space is not supported: labels are matched in 2D",
+                       span, "three angles", ("write one angle, or make the second and third 0",))  # fmt: skip
         return to_scalar(value[0], span)
     if isinstance(value, Instance) and value.oriented:
         return to_scalar(property_node(value, "heading", span), span)

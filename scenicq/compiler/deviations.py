@@ -1,4 +1,4 @@
-"""How much noise `mutate` adds: the deviations of position and heading, also as Scenic 3 spells them."""
+"""Properties that Scenic 3 spells with one number an axis: the noise that `mutate` adds, and angles of view."""
 
 # Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -14,18 +14,22 @@ from scenicq.forest.nodes import Constant
 
 __all__ = ["DEVIATIONS", "deviation", "is_zero"]
 
-DEVIATIONS = {"positionStdDev": "positionStdDev", "orientationStdDev": "headingStdDev"}
-"""Properties of Scenic 3 that hold one deviation an axis, and the name of the one that counts in the plane."""
+DEVIATIONS = {"positionStdDev": "positionStdDev", "orientationStdDev": "headingStdDev", "viewAngles": "viewAngle"}
+"""Properties of Scenic 3 that hold one number an axis, and the name of the one that counts in the plane."""
 
 
 def deviation(name: str, value: ModelValue, span: Span | None) -> ModelValue:
-    """The one deviation in the plane that `(1, 1, 0)` of a position, or `(5 deg, 0, 0)` of an orientation, stands for.
+    """The one number in the plane that `(1, 1, 0)` of a position, or `(5 deg, 0, 0)` of an orientation, stands for.
+
+    Of `viewAngles` it is the first: the second one is the height of what is seen.
 
     Raises:
         ScenarioError: unsupported-construct, for different deviations along the axes, or out of the plane.
     """
     if is_node(value) and isinstance(value, Constant) and isinstance(value.value, tuple):
         value = value.value
+    if name in ("viewAngles", "viewAngle") and isinstance(value, tuple | list) and len(value) == 2:
+        return cast(Sequence[ModelValue], value)[0]
     if name not in DEVIATIONS or not isinstance(value, tuple | list):
         return value
     parts = list(cast(Sequence[ModelValue], value))

@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import Protocol
 
 from scenicq.compiler.places import Lookups
+from scenicq.compiler.unavailable import unavailable_name
 from scenicq.compiler.values import Function, Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Node
@@ -88,6 +89,12 @@ class Environment:
         self.shared: dict[str, Environment] = {}
         self.library = not user and (library or (parent is not None and parent.library))
 
+    @property
+    def is_module(self) -> bool:
+        """Whether it holds the names of a file: only a model's names or those of the language are around it."""
+        around = self.parent
+        return around is None or around.parent is None or (around.library and not self.library)
+
     def find(self, name: str) -> Environment | None:
         """The innermost environment that has a name."""
         current: Environment | None = self
@@ -99,11 +106,14 @@ class Environment:
         """The value of a name.
 
         Raises:
-            ScenarioError: unknown-name, with the nearest name as a hint.
+            ScenarioError: unknown-name, with the nearest name as a hint; unsupported-construct, for what Scenic has.
         """
         found = self.find(name)
         if found is not None:
             return found.names[name]
+        refused = unavailable_name(name, span)
+        if refused is not None:
+            raise refused
         known: set[str] = set()
         current: Environment | None = self
         while current is not None:

@@ -40,6 +40,7 @@ from scenicq.compiler.values import (
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Constant
+from scenicq.geometry.elements import NetworkElement
 from scenicq.syntax import ast
 
 __all__ = ["assign", "call", "evaluate"]
@@ -135,7 +136,7 @@ def _length(value: ModelValue) -> int:
 
 
 def _subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
-    value = regions_apart(value)
+    value = value.names if isinstance(value, Module) and value.name == "globalParameters" else regions_apart(value)
     if isinstance(value, Choice):
         return each_existing(run, value, lambda option: _subscript(run, option, index, span), span)
     if is_random(index) and isinstance(value, list | tuple):
@@ -145,13 +146,19 @@ def _subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) ->
         return build.coordinate(to_vector(value, span), int(index), span)
     if kind_of_model(value) == "region":
         return corner(value, index, span)
+    if kind_of_model(value) == "field":
+        return operators.direction_at(value, index, span)
     if isinstance(value, list | tuple | dict | str | range):
         if isinstance(value, dict):
             hashed(index, span)
         try:
             return cast(Any, value)[index]
         except (IndexError, KeyError, TypeError, ValueError):
-            raise fail("runtime-error", "there is no item with this index", span, "not found") from None
+            shown = f"`{index}`" if isinstance(index, int) or (isinstance(index, str) and len(index) <= 40) else "that"
+            ids = isinstance(value, dict) and any(isinstance(item, NetworkElement) for item in value.values())
+            hints = ("the identifiers are those of the dataset's map: choose an element by what it is like",)
+            raise fail("map-lacks" if ids else "runtime-error", f"the map has no element {shown}" if ids else
+                       f"there is no item {shown}", span, "not found", hints if ids else ()) from None  # fmt: skip
     raise fail("wrong-type", f"{describe(value)} has no items", span, "indexed here")
 
 

@@ -346,9 +346,7 @@ class Interpreter:
     def _share(self, node: ast.Global | ast.Nonlocal, scope: Environment) -> None:
         for name in node.names:
             outer = scope.parent
-            while (
-                isinstance(node, ast.Global) and outer is not None and outer.parent is not None and outer.parent.parent
-            ):
+            while isinstance(node, ast.Global) and outer is not None and not outer.is_module:
                 outer = outer.parent
             found = outer.find(name.id) if outer is not None else None
             if found is None:
@@ -364,7 +362,7 @@ class Interpreter:
             probability = 1.0
         wanted = node.condition
         if isinstance(wanted, ast.Temporal | ast.Until):
-            self.dynamic(f"require {wanted.span.text.split()[0]}", wanted.span)
+            self.dynamic(f"require {wanted.operator if isinstance(wanted, ast.Temporal) else 'until'}", wanted.span)
             if not (isinstance(wanted, ast.Temporal) and wanted.operator == "always"):
                 return
             wanted = wanted.operand

@@ -7,6 +7,7 @@ over time has no meaning at one instant. The driving domain itself has CARLA's c
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from importlib import resources
 
@@ -44,12 +45,15 @@ _LIBRARIES: dict[str, tuple[str, ...]] = {
     "scenic.simulators.gta.model": ("colors", "gta"),
     "scenic.simulators.webots.road.model": ("colors", "webots_road"),
     "scenic.simulators.webots.mars.model": ("mars",),
+    "scenic.simulators.webots.model": ("webots",),
     "carla": ("colors", "driving", "traffic", "carla"),
     "gta": ("colors", "gta"),
     "gtaLib": ("colors", "gta"),
     "mars": ("mars",),
 }
-_NO_MAP = frozenset({"mars"})
+_NO_MAP = frozenset({"mars", "webots"})
+_IN_SPACE = frozenset({"trimesh", "scenic.core.shapes"})
+"""Modules that are about shapes in space."""
 _DYNAMIC = frozenset({"actions", "behaviors", "monitors", "simulator", "simulators", "controllers", "sensors"})
 _MAP_FILES = {"setLocalMap", "setMapPath", "mapPath", "setLocalWorld", "worldPath"}
 _ELEMENTS = (
@@ -120,7 +124,7 @@ def plain_module(name: str, span: Span) -> Module:
     """A module that does not depend on the map.
 
     Raises:
-        ScenarioError: unknown-model.
+        ScenarioError: unknown-model; unsupported-construct, for modules of Python and of shapes in space.
     """
     match name:
         case "math":
@@ -132,6 +136,12 @@ def plain_module(name: str, span: Span) -> Module:
             return Module(name, {each: Builtin(each, _ignored) for each in _MAP_FILES})
         case "scenic":
             return Module(name, {})
+        case _ if name in _IN_SPACE:
+            raise fail("unsupported-construct", f"`{name}` is not supported: labels are matched in 2D", span,
+                       "shapes in space", ("give objects a `width` and a `length` instead of a shape",))  # fmt: skip
+        case _ if name.partition(".")[0] in sys.stdlib_module_names:
+            raise fail("unsupported-construct", f"Python's module `{name}` is not supported", span, "not imported",
+                       ("of Python's modules only `math` is known: write what the scene needs in Scenic",))  # fmt: skip
         case _:
             raise fail("unknown-model", f"`{name}` is not a model or module known here", span, "not found",
                        ("known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "

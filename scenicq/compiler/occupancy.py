@@ -34,6 +34,7 @@ TOLERANCE = 0.05
 _OVERLAP = 1e-6
 """Square metres that two elements may share without counting as overlapping."""
 _KEPT = 4096
+_KEPT_CELLS = 16
 
 Place: TypeAlias = tuple[Shape, int, int]
 """An area, the number of the option that is found in it, and whose area it is: an owner is found once at a point."""
@@ -125,7 +126,7 @@ class Occupancy:
     def outside(self, bounds: Bounds) -> list[Corners]:
         """Convex pieces of what lies in no area within a box."""
         if bounds not in self._outside:
-            if len(self._outside) >= _KEPT:
+            if len(self._outside) >= _KEPT_CELLS:
                 self._outside.clear()
             box = _box(bounds)
             near = [
@@ -204,6 +205,13 @@ class Ranked:
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every point with its option within the bounds."""
+        if bounds not in self._cells:
+            if len(self._cells) >= _KEPT_CELLS:
+                self._cells.clear()
+            self._cells[bounds] = self._make_cells(bounds)
+        return self._cells[bounds]
+
+    def _make_cells(self, bounds: Bounds) -> list[FieldCell]:
         options, scale = self.options, self.options.scale
         cells = [
             FieldCell(piece.corners, piece.number / scale, exact=True)
@@ -212,6 +220,10 @@ class Ranked:
         ]
         beside = options.outside(bounds)
         return cells + [FieldCell(corners, options.nothing / scale, exact=True) for corners in beside]
+
+    @cached_property
+    def _cells(self) -> dict[Bounds, list[FieldCell]]:
+        return {}
 
 
 def _box(bounds: Bounds) -> Shape:

@@ -307,14 +307,21 @@ def _bind_each(node: ast.Specifier, values: dict[int, ModelValue], around: Surro
     return BoundSpecifier(options[0].gives, optional, needs, chosen, node.span)
 
 
-_IN_SPACE = frozenset({"pitch", "roll", "orientation", "shape"})
+_IN_SPACE = frozenset({"pitch", "roll", "orientation", "shape", "contactTolerance"})
+
+
+def _leaves_the_plane(name: str, value: ModelValue) -> bool:
+    """Whether a property says what a box in the plane does not have: a tilt, a shape, a base beside its centre."""
+    if name == "baseOffset" and isinstance(value, tuple | list):
+        return any(part != 0 for part in cast("tuple[ModelValue, ...]", tuple(value))[:2])
+    return name in _IN_SPACE and value != 0
 
 
 def _with(node: ast.WithSpecifier, value: ModelValue, around: Surroundings) -> BoundSpecifier:
     name = FIRST_NAMES.get(node.property, node.property) if around.version == 1 else node.property
-    if name in _IN_SPACE and value != 0:
+    if _leaves_the_plane(name, value):
         raise fail("unsupported-construct", f"`with {name}` is not supported", node.span, "labels are matched in 2D",
-                   ("state the heading with `facing`",))  # fmt: skip
+                   ("state the heading with `facing`, the size with `width` and `length`",))  # fmt: skip
     own = DEVIATIONS.get(name, name)
     return _specifier(
         node.span, own, lambda instance: {own: deviation(name, _known(value, instance), node.span)}, value

@@ -148,7 +148,7 @@ class RoadDirection:
         group[crossing[point]] = own[crossing[point]]
         off = np.setdiff1d(np.arange(len(xy)), point)
         if len(off):
-            off_point, off_lane = self._nearest_lanes(points[off])
+            off_point, off_lane = self._nearest_lanes(xy[off])
             point = np.concatenate([point, off[off_point]])
             lane = np.concatenate([lane, off_lane])
             group = np.concatenate([group, np.arange(len(off_point)) + len(xy) + len(own)])
@@ -164,12 +164,15 @@ class RoadDirection:
             found[index][heading] = None
         return [tuple(sorted(values)) for values in found]
 
-    def _nearest_lanes(self, points: NDArray[np.object_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _nearest_lanes(self, xy: Coordinates) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Pairs (point, lane) of the lanes within reach that are nearest, ties included."""
-        index, _, away = shapes.tree_nearest(self._tree, points, max_distance=REACH)
-        index, first = np.unique(index, return_index=True)
-        point, lane = shapes.tree_pairs_within(self._tree, points[index], away[first] + _TIE)
-        return index[point], lane
+        # all distances at once take a third of the time of a search for the nearest, point by point
+        point, lane = shapes.tree_pairs_around(self._tree, xy, REACH)
+        away = shapes.distances(shapes.points(xy)[point], self._areas[lane])
+        least = np.full(len(xy), np.inf)
+        np.minimum.at(least, point, away)
+        nearest = (least[point] <= REACH) & (away <= least[point] + _TIE)
+        return point[nearest], lane[nearest]
 
     def _lane_cells(self, lane: int) -> list[FieldCell]:
         found = self._cells_of.get(lane)

@@ -98,11 +98,18 @@ def tree_pairs_within(
     return cast("NDArray[np.intp]", found[0]), cast("NDArray[np.intp]", found[1])
 
 
+def tree_pairs_around(tree: STRtree, xy: Coordinates, reach: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All pairs (index of a point, index in the tree) where the box of the geometry meets a square about the point."""
+    squares = cast("NDArray[Any]", shapely.box(*(xy - reach).T, *(xy + reach).T))
+    found = tree.query(squares)
+    return cast("NDArray[np.intp]", found[0]), cast("NDArray[np.intp]", found[1])
+
+
 def tree_nearest(
-    tree: STRtree, geometries: NDArray[Any], max_distance: float | None = None
+    tree: STRtree, geometries: NDArray[Any]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
     """For each geometry its nearest ones in the tree, ties included: (index, index in the tree, distance)."""
-    pairs, distances = tree.query_nearest(geometries, max_distance=max_distance, return_distance=True)
+    pairs, distances = tree.query_nearest(geometries, return_distance=True)
     return cast("NDArray[np.intp]", pairs[0]), cast("NDArray[np.intp]", pairs[1]), distances
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.collector import without_collector
 
 __all__ = ["Block", "read_list"]
 
@@ -114,7 +115,8 @@ def _at_once(buffer: str, position: int, line: int) -> Block | None:
         return None
     text = buffer[position : ends[-1]]
     try:
-        return Block(json.loads(f"[{text}]"), text, line)
+        with without_collector():
+            return Block(json.loads(f"[{text}]"), text, line)
     except (RecursionError, ValueError):
         return None
 

@@ -40,7 +40,7 @@ class NuScenes:
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open a dataroot or one of its `v1.0-*` folders.
 
-        All tables but the annotations are read here; memory grows with the source, about 1 kB an annotation.
+        All tables are read here; memory grows with the source, about 200 bytes an annotation.
 
         Raises:
             DataError: `file-missing` or `file-invalid`; with a strict report whatever is unsound.

@@ -81,7 +81,7 @@ class Tables:
             self._try("label", place, lambda: self._add_sample(token, row, place))  # noqa: B023
         self.sensors: defaultdict[str, dict[str, str]] = defaultdict(dict)
         self.poses = self._read_sensor_files()
-        self._classes = self._read_classes()
+        self._classes: dict[str, str] = self._read_classes()
         self._read_boxes()
 
     def scene(self, token: str) -> SceneContent:
@@ -101,7 +101,8 @@ class Tables:
         start = self._first_box[token]
         boxes = self._boxes.take(self._order[start : start + sum(instant.boxes for instant in instants)])
         used, numbers = np.unique(boxes.tracks, return_inverse=True)
-        tracks = tuple(self._tracks[number] for number in used.tolist())
+        of_used: list[int] = used.tolist()
+        tracks = tuple([self._tracks[number] for number in of_used])
         params = tuple(scene.params.items())
         return SceneContent(
             scene.name, scene.log.location, scene.log.ahead_s, params, instants, replace(boxes, tracks=numbers), tracks
@@ -166,10 +167,10 @@ class Tables:
         reader = BoxReader(sample_numbers, track_numbers, attributes, visible)
         path = self._folder / "sample_annotation.json"
         self._boxes = joined([self._boxes_in(reader, path.name, block) for block in read_list(path)])
-        self._tracks = [(token, self._classes[token]) for token in track_numbers]
+        self._tracks: list[tuple[str, str]] = [(token, self._classes[token]) for token in track_numbers]
         # Boxes by scene, then by sample; those of one sample as they come.
         counts: list[int] = np.bincount(self._boxes.samples, minlength=len(self.samples)).tolist()
-        self._boxes_of = dict(zip(self.samples, counts, strict=True))
+        self._boxes_of: dict[str, int] = dict(zip(self.samples, counts, strict=True))
         rank = np.empty(len(self.samples), dtype=np.int64)
         self._first_box: dict[str, int] = {}
         ranked = first = 0

@@ -5,7 +5,6 @@ What a segment holds depends on its job alone, so segments can be written here o
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,6 +16,7 @@ import shapely
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature
 from scenicq.importers.base import Entry, Labels, Reader
+from scenicq.importers.collector import without_collector
 from scenicq.importers.report import Report
 from scenicq.processes import Lost, Workers
 from scenicq.store.columns import columns_of
@@ -133,21 +133,17 @@ def write_segments(world: World, jobs: Sequence[Job], processes: int, on_recordi
 def _write(world: World, job: Job, indexes: dict[str, MapIndex], on_recording: OnRecording) -> Segment:
     report = Report(strict=world.strict)
     writer = SegmentWriter(world.folder, job.number)
-    # Records hold no cycles, and the collector would walk through all of them again and again.
-    collects = gc.isenabled()
-    gc.disable()
     try:
-        writer.open()
-        for found in job.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
-            columns = columns_of(found) if isinstance(found, Recording) else found
-            if columns.map not in indexes:
-                indexes[columns.map] = MapIndex(columns.map, world.maps.get(columns.map, ()))
-            writer.add(columns, indexes[columns.map])
-            on_recording(columns.name, len(columns.frames))
-        return writer.finish(job.fingerprint, report.tally, report.told)
+        with without_collector():
+            writer.open()
+            for found in job.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
+                columns = columns_of(found) if isinstance(found, Recording) else found
+                if columns.map not in indexes:
+                    indexes[columns.map] = MapIndex(columns.map, world.maps.get(columns.map, ()))
+                writer.add(columns, indexes[columns.map])
+                on_recording(columns.name, len(columns.frames))
+            return writer.finish(job.fingerprint, report.tally, report.told)
     finally:
-        if collects:
-            gc.enable()
         writer.abandon()
 
 

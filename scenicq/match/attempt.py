@@ -173,6 +173,13 @@ class Attempt:
         if self.failure is None or failure.depth > self.failure.depth:
             self.failure = failure
 
+    def _blamed(self, plan: GroupPlan, assignment: Mapping[int, int]) -> frozenset[int]:
+        """The roles that keep a group from being satisfied: one or two of them, if a part of it says so."""
+        for part in plan.parts:
+            if isinstance(self.decide(part, assignment), No):
+                return frozenset(part.roles)
+        return frozenset(plan.roles)
+
     # --- the query paper's algorithm 1
 
     def _modular(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
@@ -276,16 +283,31 @@ class Attempt:
         budget: int | None = None,
     ) -> Iterator[dict[int, int]]:
         due: dict[int, list[tuple[GroupPlan, frozenset[int]]]] = {}
+        parts: dict[int, list[tuple[int, GroupPlan, frozenset[int]]]] = {}
+        wary: set[int] = set()
+        if self.options.method == "auto":
+            for group in plan.joint:
+                for part in group.parts:
+                    for index in part.roles:
+                        parts.setdefault(index, []).append((group.kind, part, frozenset(part.roles)))
         for group in plan.joint:
             for index in group.roles:
                 due.setdefault(index, []).append((group, frozenset(group.roles)))
         options = {slot.name: slot.candidates for slot in slots}
 
         def check(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+            for whole, part, roles in parts.get(slot, ()):
+                ready = whole in wary and roles <= assignment.keys()
+                if ready and self._judge(part, assignment, 10 + len(assignment)) is Answer.NO:
+                    return Answer.NO, roles
             for group, roles in due.get(slot, ()):
                 if roles <= assignment.keys():
                     answer = self._judge(group, assignment, 10 + len(assignment))
-                    if answer is Answer.NO or (answer is Answer.UNKNOWN and not accept_unknown):
+                    if answer is Answer.NO:
+                        # from now on its parts are looked at first
+                        wary.add(group.kind)
+                        return answer, self._blamed(group, assignment) if parts else roles
+                    if answer is Answer.UNKNOWN and not accept_unknown:
                         return Answer.NO, roles
             return Answer.YES, frozenset()
 

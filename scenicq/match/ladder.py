@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import cast
 
@@ -88,15 +88,9 @@ def ground_cause(item: Item) -> str:
     return value.reason if isinstance(value, Undefined) else "does not hold"
 
 
-def decide(items: list[Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> Outcome:
-    """Decide a group without a solver; `Maybe` with reason "nonlinear" where one is needed.
-
-    Args:
-        items: The group's constraints, conditioned.
-        tolerance: Per feature.
-        rows: Linear facts that hold besides.
-    """
-    return _Ladder(tolerance).decide(items, {}, [*rows])
+def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
+    """Decide a group without a solver; `Maybe` with reason "nonlinear" where one is needed."""
+    return _Ladder(tolerance).decide(items, {}, [])
 
 
 class _Ladder:
@@ -105,6 +99,8 @@ class _Ladder:
     def __init__(self, tolerance: Tolerance) -> None:
         self.tolerance = tolerance
         self.branches = 0
+        self.places: list[Node] = []
+        """The points for which a cell is chosen: they may occur nowhere else, and still need a value."""
 
     def decide(self, items: list[Item], given: dict[Identity, Value], rows: list[Row]) -> Outcome:
         """Decide constraints, given values of discrete variables and linear facts about the rest.
@@ -121,7 +117,7 @@ class _Ladder:
             elif not holds(item[0], item[1].value, item[2], self.tolerance):
                 return No(item[0], ground_cause(item))
         if not open_items:
-            return Yes(given)
+            return self._linear(items, given, rows) if self.places else Yes(given)
         for leaf in leaves(*(node for _, node, _ in open_items)):
             options = _options(leaf)
             if options is not None:
@@ -198,36 +194,46 @@ class _Ladder:
         given_heading: dict[float, tuple[list[Item], Box] | No] = {}
 
         def outcomes() -> Iterator[Outcome]:
-            for cell in vector_field.cells((x0, y0, x1, y1)):
-                if _apart(cell, ((x0, x1), (y0, y1))):
+            for whole in vector_field.cells((x0, y0, x1, y1)):
+                cell = None if _apart(whole, ((x0, x1), (y0, y1))) else whole.part((x0, y0, x1, y1))
+                if cell is None:
                     continue
-                if cell.heading not in given_heading:
-                    given_heading[cell.heading] = self._with_heading(items, field, cell.heading)
-                known = given_heading[cell.heading]
-                if isinstance(known, No):
-                    yield known
+                known = given_heading.get(cell.heading)
+                if known is None:
+                    known = given_heading[cell.heading] = self._with_heading(items, field, cell.heading, rows)
+                    if isinstance(known, No):
+                        yield known
+                if isinstance(known, No) or _apart(cell, known[1]):
                     continue
-                fixed, box = known
-                if _apart(cell, box):
-                    yield No(constraint)
-                    continue
+                fixed, _ = known
                 west, south, east, north = cell.bounds
-                around = (Row(place[0], west, east), Row(place[1], south, north))
+                box = (max(west, x0), min(east, x1)), (max(south, y0), min(north, y1))
+                around = (Row(place[0], *box[0]), Row(place[1], *box[1]))
                 more = [*rows, *inside(place, cell.polygon), *around]
+                self.places.append(field.point)
                 outcome = self.decide(fixed, given, more)
                 if not cell.exact and not isinstance(outcome, No) and not self._confirmed(items, outcome):
-                    outcome = self._refine(items, fixed, given, more, place, cell)
+                    outcome = self._refine(items, fixed, given, more, place, cell, box)
+                self.places.pop()
                 yield outcome
 
         return self._branch(constraint, outcomes())
 
-    def _with_heading(self, items: list[Item], field: DirectionAt, heading: float) -> tuple[list[Item], Box] | No:
+    def _with_heading(
+        self, items: list[Item], field: DirectionAt, heading: float, rows: list[Row]
+    ) -> tuple[list[Item], Box] | No:
         """The constraints where the field has a heading, and where its point can then be."""
         memo: dict[int, Node] = {id(field): Constant(heading, span=field.span)}
         fixed = [(c, condition(node, {}, None, memo), value) for c, node, value in items]
         for item in fixed:
             if isinstance(item[1], Constant) and not holds(item[0], item[1].value, item[2], self.tolerance):
                 return No(item[0], ground_cause(item))
+        free = {leaf.identity for leaf in leaves(field.point)}
+        if not rows and free.isdisjoint(leaf.identity for leaf in leaves(*(node for _, node, _ in fixed))):
+            # the rest does not ask where the point is: what excludes it does so in every cell
+            outcome = _Ladder(self.tolerance).decide(fixed, {}, [])
+            if isinstance(outcome, No):
+                return outcome
         return fixed, vector_bounds(field.point, position_boxes(fixed, self.tolerance))
 
     def _confirmed(self, items: list[Item], outcome: Outcome) -> bool:
@@ -242,10 +248,10 @@ class _Ladder:
         rows: list[Row],
         place: AffineVector,
         cell: FieldCell,
+        box: Box,
     ) -> Outcome:
         """A cell that covers too much, halved again and again: until a witness holds, or no part is left."""
-        (x0, y0), (x1, y1) = cell.polygon.min(axis=0).tolist(), cell.polygon.max(axis=0).tolist()
-        todo: deque[Box] = deque([((x0, x1), (y0, y1))])
+        todo: deque[Box] = deque([box])
         for _ in range(_MOST_PARTS):
             if not todo:
                 return No(items[0][0])
@@ -266,7 +272,7 @@ class _Ladder:
     def _linear(self, items: list[Item], given: dict[Identity, Value], rows: list[Row]) -> Outcome:
         constraint = items[0][0]
         try:
-            found = solve_affine(items, rows, self.tolerance)
+            found = solve_affine(items, rows, self.tolerance, self.places)
         except NotLinear:
             return Maybe(constraint, "nonlinear")
         if found is None:

@@ -102,13 +102,16 @@ def inside(place: AffineVector, polygon: np.ndarray) -> list[Row]:
     return rows
 
 
-def solve_affine(items: Sequence[_Item], rows: Sequence[Row], tolerance: Tolerance) -> dict[Identity, Value] | None:
+def solve_affine(
+    items: Sequence[_Item], rows: Sequence[Row], tolerance: Tolerance, places: Sequence[Node] = ()
+) -> dict[Identity, Value] | None:
     """Values of the random variables that satisfy affine constraints, or None if there are none.
 
     Args:
         items: The constraints after conditioning.
         rows: Linear facts that hold besides.
         tolerance: Per feature.
+        places: Points that need values, too.
 
     Raises:
         NotLinear: Something is not affine, or lies between the inner and the outer polygons.
@@ -116,7 +119,7 @@ def solve_affine(items: Sequence[_Item], rows: Sequence[Row], tolerance: Toleran
     problem = _Problem(tolerance, position_boxes(items, tolerance, rows), LinearSystem(list(rows)))
     for item in items:
         problem.add(item)
-    variables = {leaf.identity: leaf for leaf in leaves(*(node for _, node, _ in items))}
+    variables = {leaf.identity: leaf for leaf in leaves(*(node for _, node, _ in items), *places)}
     for leaf in variables.values():
         problem.add_leaf(leaf)
     found = problem.solve()

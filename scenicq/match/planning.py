@@ -10,6 +10,7 @@ from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.forest.walk import features
 from scenicq.match.constraints import Signature, build_groups
 from scenicq.match.options import MatchOptions
+from scenicq.match.parts import parts_of
 from scenicq.match.quick import Quick, quick_of
 from scenicq.match.shape import Shape, interchangeable, shape_of
 
@@ -25,12 +26,14 @@ class GroupPlan:
         kind: Number of its shape: equal for groups that ask the same question of their roles.
         roles: The objects that it is about, the ego left out, in the order in which the question speaks of them.
         quick: Its closed form, if it has one.
+        parts: What a group about many objects demands of one or two of them.
     """
 
     group: Group
     kind: int
     roles: tuple[int, ...]
     quick: Quick | None = None
+    parts: tuple[GroupPlan, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,9 +89,19 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
     for group in build_groups(scenario, signature, options):
         shape = shape_of(group, scenario.ego)
         shapes.append(shape)
-        groups.append(GroupPlan(group, kinds.setdefault(shape.key, len(kinds)), shape.roles, quick_of(group)))
-        for index in shape.roles:
-            links.setdefault(index, set()).update(shape.roles)
+        parts: list[GroupPlan] = []
+        for part in parts_of(group, scenario.ego):
+            small = shape_of(part, scenario.ego)
+            number = kinds.setdefault(small.key, len(kinds))
+            parts.append(GroupPlan(part, number, small.roles, quick_of(part)))
+        number = kinds.setdefault(shape.key, len(kinds))
+        groups.append(GroupPlan(group, number, shape.roles, quick_of(group), tuple(parts)))
+        paired = [part.roles for part in parts if len(part.roles) > 1]
+        # of a chain, the next one is what can be checked next
+        chained = set(shape.roles) == {index for roles in paired for index in roles}
+        for roles in paired if chained else [shape.roles]:
+            for index in roles:
+                links.setdefault(index, set()).update(roles)
     unary: dict[int, list[GroupPlan]] = {}
     for each in groups:
         if len(each.roles) == 1:

@@ -105,6 +105,8 @@ _SCALAR: dict[ArithmeticOp, Operator] = {
 }
 
 
+_MOST_WHOLE = 1000
+"""Cases of a number that is rounded down."""
 EVERYWHERE: Box = ((-math.inf, math.inf), (-math.inf, math.inf))
 
 
@@ -286,7 +288,38 @@ class Expressions:
                 return apply(Operator.POW, args[0], exponent)
         if op is ArithmeticOp.WRAP:
             return self._wrapped(args[0], scalar_bounds(node.args[0], self._boxes))
+        whole = self._floored(node, args)
+        if whole is not None:
+            return whole
         raise UnsupportedError(f"`{op.value}` of random values")
+
+    def _floored(self, node: Arithmetic, args: list[Term]) -> Term | None:
+        """Rounding down, division and remainder by it: one case for each whole number within the bounds."""
+        limits = [scalar_bounds(arg, self._boxes) for arg in node.args]
+        match node.op:
+            case ArithmeticOp.FLOOR:
+                value, (low, high) = args[0], limits[0]
+            case ArithmeticOp.FLOORDIV | ArithmeticOp.MOD if limits[1][0] > 0 or limits[1][1] < 0:
+                value = apply(Operator.DIV, args[0], args[1])
+                ends = [a / b for a in limits[0] for b in limits[1]]
+                low, high = min(ends), max(ends)
+            case _:
+                return None
+        if not high - low <= _MOST_WHOLE:
+            return None
+        numbers = range(math.floor(low), math.floor(high) + 1)
+        whole = self.unknowns.fresh("whole", float(numbers[0]), float(numbers[-1]))
+        self.unknowns.side.append(
+            disjunction(
+                conjunction(
+                    [compare("==", whole, float(n)), compare("<=", float(n), value), compare("<", value, n + 1.0)]
+                )
+                for n in numbers
+            )
+        )
+        if node.op is not ArithmeticOp.MOD:
+            return whole
+        return apply(Operator.SUB, args[0], apply(Operator.MUL, args[1], whole))
 
     def _wrapped(self, angle: Term, limits: tuple[float, float]) -> Term:
         low, high = limits

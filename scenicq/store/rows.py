@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
 from scenicq.store.columns import MemberColumns, RecordingColumns
-from scenicq.store.placement import MapIndex
-from scenicq.store.schema import SCHEMAS, ArrowTable
+from scenicq.store.placement import MapIndex, Memberships
+from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
 
 __all__ = ["recording_rows"]
 
@@ -42,8 +42,7 @@ def recording_rows(
     xy = np.empty((len(ego_at) + len(object_at), 2))
     xy[ego_at] = np.column_stack((egos.x, egos.y))
     xy[object_at] = np.column_stack((objects.x, objects.y))
-    near = index.memberships(xy)
-    lanes, directions = index.lanes(xy, near), index.road_directions(xy)
+    near, lanes, directions = _placed(index, xy)
     frames, labels = pa.array(columns.frames, pa.string()), pa.array(label_of)
     everyone = np.repeat(np.arange(len(counts)), counts + 1)
     ids = np.empty(len(xy), dtype=object)
@@ -101,6 +100,19 @@ def recording_rows(
             },
         ),
     }
+
+
+def _placed(index: MapIndex, xy: NDArray[np.float64]) -> tuple[Memberships, ArrowArray, ArrowArray]:
+    """Regions near positions (n, 2), lanes and directions of the road: once for all who stand at the same place."""
+    _, first, at = np.unique(xy.view(np.complex128)[:, 0], return_index=True, return_inverse=True)
+    places = xy[first]
+    near, take = index.memberships(places), pa.array(at)
+    lanes, directions = index.lanes(places, near).take(take), index.road_directions(places).take(take)
+    counts = np.bincount(near.point, minlength=len(places))
+    many = counts[at]
+    point = np.repeat(np.arange(len(xy)), many)
+    pair = np.arange(len(point)) + np.repeat((np.cumsum(counts) - counts)[at] - (np.cumsum(many) - many), many)
+    return Memberships(point, near.feature[pair], near.distance[pair]), lanes, directions
 
 
 def _table(name: str, columns: Mapping[str, Any]) -> ArrowTable:

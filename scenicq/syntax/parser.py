@@ -6,6 +6,7 @@ from itertools import pairwise
 
 from scenicq.errors import Diagnostic, ScenarioError, Source
 from scenicq.syntax import ast
+from scenicq.syntax.jumps import check_jumps
 from scenicq.syntax.lexer import tokenize
 from scenicq.syntax.scenic_statements import ProgramParser
 from scenicq.syntax.tokens import INFIX_WORDS, Token
@@ -47,6 +48,7 @@ def parse(source: Source, version: int | None = None) -> ast.Module:
         error = parser.fail("the program is nested too deeply", code="budget-exceeded")
         raise error from None
     check_height(body)
+    check_jumps(body)
     evidence = find_evidence(source, body, parser.classes | parser.variables)
     versions, chosen = choose_version(evidence, version)
     return ast.Module(source, body, versions, chosen, evidence)

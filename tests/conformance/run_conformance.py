@@ -4,6 +4,7 @@ Run by `make conformance`: `python tests/conformance/run_conformance.py --map To
 stays in an environment of its own (`draw_scenes.py` runs there). Every drawn scene becomes a label. It must match with
 the default tolerance, and again with every built-in requirement in force. A program with a line `# sharp: position
 heading` also says that its last object has no such freedom: moved by 3 m or turned by 1 rad, it must not match.
+A program with a line `# tolerance: position=0.05 why` is matched with that tolerance.
 A program with a line `# scenic refuses` is one that both sides refuse. A program with a line `# differs: why` holds a
 deviation of Scenic 3.1.1 from its own manual and from the language paper: some of its scenes must not match.
 """
@@ -19,7 +20,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ from scenicq.forest.scenario import BuiltIn
 from scenicq.geometry.features import read_geojson
 from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions
+from scenicq.match.options import MatchOptions, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.smt.solver import open_solver
 from scenicq.store.classes import is_class
@@ -39,6 +40,7 @@ from scenicq.store.labels import Label, LabelObject
 HERE = Path(__file__).resolve().parent
 SCENIC = "scenic==3.1.1"
 OPTIONS = {"default": MatchOptions(), "enforced": MatchOptions(enforce=frozenset(BuiltIn))}
+_TOLERANCE = re.compile(r"^# tolerance: position=([0-9.]+)", re.MULTILINE)
 _SHARP = re.compile(r"^# sharp:(.*)$", re.MULTILINE)
 _DIFFERS = re.compile(r"^# differs:(.*)$", re.MULTILINE)
 _REFUSED = re.compile(r"^# scenic refuses", re.MULTILINE)
@@ -129,7 +131,11 @@ def compare(path: Path, answer: dict[str, Any], network: Network, solver: Any) -
     if "error" in answer or refused:
         outcome.faults.append(f"Scenic says: {answer.get('error', 'nothing, where it should refuse')}")
         return outcome
-    matchers = {name: Matcher(scenario, options, solver) for name, options in OPTIONS.items()}
+    given = _TOLERANCE.search(text)
+    tolerance = Tolerance(position=float(given[1])) if given else Tolerance()
+    matchers = {
+        name: Matcher(scenario, replace(options, tolerance=tolerance), solver) for name, options in OPTIONS.items()
+    }
     sharp, differs = _SHARP.search(text), _DIFFERS.search(text)
     for number, scene in enumerate(answer["scenes"]):
         label = label_of(scene, number)

@@ -21,6 +21,7 @@ from scenicq.importers.ingest import ingest
 from scenicq.importers.interaction import Interaction
 from scenicq.importers.interchange import Interchange
 from scenicq.importers.kitti import Kitti
+from scenicq.importers.label_rows import labels_of
 from scenicq.importers.nuscenes import NuScenes
 from scenicq.importers.openlabel import OpenLabel
 from scenicq.importers.registry import importers
@@ -55,16 +56,9 @@ class Case:
     margin_m: float = 60.0
 
 
-def by_label() -> Interchange:
-    """The reader of columns is compared with this one in `test_interchange_columns`."""
-    importer = Interchange()
-    importer.columnar = False
-    return importer
-
-
 CASES = {
     "crossroads": Case(
-        by_label(),
+        Interchange(),
         SAMPLES / "crossroads",
         156,
         676,
@@ -184,7 +178,7 @@ CASES = {
     ),
     # --- end of them
     "boston": Case(
-        by_label(),
+        Interchange(),
         REAL / "boston",
         707,
         725,
@@ -219,7 +213,12 @@ def case(request: pytest.FixtureRequest) -> Case:
 def read(case: Case) -> list[Recording]:
     report = Report()
     found = list(case.importer.read(case.path, Options(case.maps), report).recordings(report))
-    return [recording for recording in found if isinstance(recording, Recording)]
+    return [
+        recording
+        if isinstance(recording, Recording)
+        else Recording(recording.name, recording.map, tuple(labels_of(recording)))
+        for recording in found
+    ]
 
 
 def read_labels(case: Case) -> list[Label]:

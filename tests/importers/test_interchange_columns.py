@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from scenicq.importers.base import ClassNames, Labels
 from scenicq.importers.interchange import _LabelReader
 from scenicq.importers.interchange_columns import read_columns
+from scenicq.importers.label_rows import labels_of
 from scenicq.importers.report import Report
 from scenicq.store.columns import MemberColumns, RecordingColumns, columns_of
+from scenicq.store.labels import Recording
 
 CLASSES = {"car": "Car", "adult": "Adult"}
 JUNK = [None, True, False, 0, -1, 2.5, float("nan"), 10**400, "", "x", "ego", [], [1, None], [1, True], {}, {"a": [1]}]
@@ -83,6 +85,7 @@ def test_sound_recordings_are_read_alike(labels: list[dict[str, Any]], yaw: bool
     assert not wrong
     assert columns is not None
     assert same(columns, expected)
+    assert same(columns_of(Recording("r", columns.map, tuple(labels_of(columns)))), columns)
 
 
 def places(value: Any) -> list[tuple[Any, Any]]:

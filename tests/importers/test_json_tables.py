@@ -27,10 +27,6 @@ def elements(file: Path) -> list[tuple[object, int]]:
     return [(value, block.line(number)) for block in read_list(file) for number, value in enumerate(block.elements)]
 
 
-def one_by_one(buffer: str, position: int, line: int) -> None:
-    """Instead of reading many elements at once."""
-
-
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=objects, indent=st.none() | st.integers(0, 2), chunk=st.integers(1, 40) | st.just(1 << 20))
 def test_same_as_reading_at_once(tmp_path: Path, content: list[object], indent: int | None, chunk: int) -> None:
@@ -69,3 +65,42 @@ def test_no_text_and_no_file(tmp_path: Path) -> None:
     with pytest.raises(DataError) as error:
         list(read_list(tmp_path / "nowhere.json"))
     assert error.value.diagnostics[0].code == "file-missing"
+
+
+def read_or_told(file: Path) -> tuple[list[tuple[object, int]], str]:
+    """All elements before the first that is unsound, and what is said of that."""
+    found: list[tuple[object, int]] = []
+    try:
+        for block in read_list(file):
+            found += [(value, block.line(number)) for number, value in enumerate(block.elements)]
+    except DataError as error:
+        return found, error.diagnostics[0].message
+    return found, ""
+
+
+JUNK = ["", "[", "]", "{", "}", '"', ",", "},\n{", "\n", "\\", " ", "1", "NaN", "\x00"]
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    content=objects, indent=st.none() | st.integers(0, 2), chunk=st.integers(1, 60) | st.just(1 << 20), data=st.data()
+)
+def test_at_once_is_as_one_by_one(
+    tmp_path: Path, content: list[object], indent: int | None, chunk: int, data: st.DataObject
+) -> None:
+    file = tmp_path / "list.json"
+    text = json.dumps(content, indent=indent)
+    at = data.draw(st.integers(0, len(text)))
+    text = text[:at] + data.draw(st.sampled_from(JUNK)) + text[at + data.draw(st.integers(0, 2)) :]
+    file.write_text(text, encoding="utf-8")
+    with patch.object(json_tables, "_CHUNK", chunk):
+        found = read_or_told(file)
+        with patch.object(json_tables, "_TAIL", 0):
+            expected = read_or_told(file)
+    assert repr(found) == repr(expected)
+
+
+def test_many_elements_are_read_at_once(tmp_path: Path) -> None:
+    file = tmp_path / "list.json"
+    file.write_text(json.dumps([{"a": n} for n in range(1000)], indent=0))
+    assert [len(block.elements) for block in read_list(file)] == [999, 1]

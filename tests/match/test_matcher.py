@@ -220,10 +220,10 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
     def decide(items, tolerance):
         return Maybe(items[0][0], "nonlinear") if (2.0, 57.0) in [item[2] for item in items] else real(items, tolerance)
 
-    real = attempt.decide
+    real = attempt.decide_apart
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(attempt.Attempt, "_quick", lambda *_: None)
-        patch.setattr(attempt, "decide", decide)
+        patch.setattr(attempt, "decide_apart", decide)
         assert (
             Matcher(scenario, MatchOptions(), Fixed(Undecided("timeout"))).match(label).correspondence["other"] == "b"
         )

@@ -1,0 +1,48 @@
+"""What a group about many objects demands of one or two of them alone.
+
+Such a part is a necessary condition of the whole: where it cannot be satisfied, no correspondence with these label
+objects in these roles matches, whoever plays the others. The search then takes back the two that are to blame.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+from scenicq.forest.groups import PARAMS, Comparison, Constraint, Group, group_constraints
+from scenicq.forest.walk import features
+
+__all__ = ["parts_of"]
+
+_MOST_ROLES = 2
+_MOST_PARTS = 300
+
+
+def parts_of(group: Group, ego: int) -> tuple[Group, ...]:
+    """The parts of a group, those about fewer objects first; none of a group about two objects or fewer.
+
+    Args:
+        group: A group of jointly dependent constraints.
+        ego: Index of the ego, which plays no role of its own.
+    """
+    if len(set(group.objects) - {ego}) <= _MOST_ROLES:
+        return ()
+    about = [(item, _roles(item, ego)) for item in group.constraints]
+    single = dict.fromkeys(roles for _, roles in about if 0 < len(roles) <= _MOST_ROLES)
+    joined = dict.fromkeys(one | other for one, other in itertools.combinations(single, 2))
+    wanted = {roles: None for roles in (*single, *joined) if len(roles) <= _MOST_ROLES}
+    if len(wanted) > _MOST_PARTS:
+        wanted = single
+    found = [
+        part
+        for roles in wanted
+        for part in group_constraints(item for item, own in about if own <= roles)
+        if frozenset(part.objects) - {ego} == roles
+    ]
+    return tuple(sorted(found, key=lambda part: len(part.objects)))
+
+
+def _roles(item: Constraint, ego: int) -> frozenset[int]:
+    used = {index for index, _ in features(item.expression)}
+    if isinstance(item, Comparison):
+        used.add(item.object)
+    return frozenset(used - {ego, PARAMS})

@@ -1,0 +1,141 @@
+"""Speed and memory of `scenicq ingest`: generated interchange recordings of growing number, and nuScenes.
+
+`python tests/bench/ingest.py [--frames 2000 20000] [--jobs 1 2] [--nuscenes DIR] [--sources DIR]`. Sources are made by
+`fleet.py` and kept in DIR if that is given. Prints, for each source and number of processes, label objects, CPU seconds
+of the importing alone and of the whole command, objects a CPU second of both, and the peak memory of its largest
+process; then each bar with pass or fail. The numbers go to bench-results/. A CPU second is one of one core, however
+many work and whoever else uses the machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from clock import cpu_s
+from fleet import Fleet, write_interchange
+
+from scenicq.importers.ingest import ingest
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "bench-results"
+COMMAND = str(Path(sys.executable).with_name("scenicq"))
+NUSCENES = ROOT.parent / "shared" / "data" / "nuscenes-mini"
+LEAST_RATE, MOST_GROWTH = 50_000, 1.25
+BARS_FROM = 10_000
+"""Objects from which a rate says something, and frames from which memory may no longer grow."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One source, ingested by so many processes.
+
+    Attributes:
+        source, frames, objects, jobs: What.
+        import_s, command_s: CPU seconds of the importing alone and of the whole command.
+        wall_s: Of the whole command.
+        peak_mib: Of the command's largest process.
+    """
+
+    source: str
+    frames: int
+    objects: int
+    jobs: int
+    import_s: float
+    command_s: float
+    wall_s: float
+    peak_mib: float
+
+    @property
+    def rate(self) -> float:
+        """Objects a CPU second of the importing."""
+        return self.objects / self.import_s
+
+
+def command(source: Path, target: Path, jobs: int) -> tuple[float, float, float]:
+    """CPU and wall seconds and peak memory of `scenicq ingest`, with all its processes."""
+    given = [COMMAND, "ingest", str(source), str(target), "--force", "--jobs", str(jobs)]
+    started = datetime.now(UTC)
+    process = subprocess.Popen(given, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"{' '.join(given)} failed")
+    wall = (datetime.now(UTC) - started).total_seconds()
+    return used.ru_utime + used.ru_stime, wall, used.ru_maxrss / 1024
+
+
+def measure(source: Path, jobs: int, folder: Path) -> Measured:
+    """Ingest a source as a command, then in this process, where start-up is not counted."""
+    command_s, wall, peak = command(source, folder / "command", jobs)
+    before = cpu_s()
+    summary = ingest(source, folder / "here", jobs=jobs, force=True)
+    import_s = cpu_s() - before
+    one = Measured(source.name, summary.frames, summary.objects, jobs, import_s, command_s, wall, peak)
+    print(
+        f"  {one.source:14}  {one.frames:>9,} {one.objects:>11,} {jobs:>5} {import_s:>9.2f} {command_s:>9.2f}"
+        f" {one.rate:>9,.0f} {one.objects / command_s:>9,.0f} {peak:>7.0f}",
+        flush=True,
+    )
+    return one
+
+
+def bars(found: list[Measured]) -> Iterator[tuple[str, bool]]:
+    """What is asked, and whether it is met."""
+    for one in found:
+        if one.objects >= BARS_FROM:
+            what = f"{one.source}, --jobs {one.jobs}: {one.rate:,.0f} objects a CPU second, at least {LEAST_RATE:,}"
+            yield what, one.rate >= LEAST_RATE
+    generated = [one for one in found if one.source.startswith("fleet-") and one.frames >= BARS_FROM]
+    for jobs in dict.fromkeys(one.jobs for one in generated):
+        by_size = sorted((one for one in generated if one.jobs == jobs), key=lambda one: one.frames)
+        growth = by_size[-1].peak_mib / by_size[0].peak_mib
+        size = by_size[-1].frames / by_size[0].frames
+        if size > 1:
+            yield f"--jobs {jobs}: {size:.0f} times the frames take {growth:.2f} times the memory", growth < MOST_GROWTH
+
+
+def main() -> None:
+    """Make the sources, measure, print and keep."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, nargs="*", default=[2_000, 20_000])
+    parser.add_argument("--jobs", type=int, nargs="+", default=[1])
+    parser.add_argument("--nuscenes", type=Path, default=NUSCENES)
+    parser.add_argument("--sources", type=Path)
+    given = parser.parse_args()
+    found: list[Measured] = []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        sources = [given.nuscenes] if given.nuscenes.is_dir() else []
+        for frames in sorted(given.frames):
+            source = (given.sources or folder) / f"fleet-{frames}"
+            if not source.exists():
+                write_interchange(Fleet(frames, 0, needle=False), source)
+            sources.append(source)
+        print("  source             frames     objects  jobs  import s command s  objects/s of both      MiB")
+        found += [measure(source, jobs, folder) for source in sources for jobs in given.jobs]
+    judged = list(bars(found))
+    for what, met in judged:
+        print(f"  {'pass' if met else 'FAIL'}  {what}")
+    now = datetime.now(UTC)
+    RESULTS.mkdir(exist_ok=True)
+    content = {
+        "time": now.isoformat(),
+        "python": platform.python_version(),
+        "results": [asdict(one) for one in found],
+        "bars": [{"bar": what, "met": met} for what, met in judged],
+    }
+    (RESULTS / f"ingest-{now:%Y%m%dT%H%M%S}.json").write_text(json.dumps(content, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+"""Annotations read by column are what they are row by row, or are not read by column."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenicq.importers.base import Options
+from scenicq.importers.fields import InvalidError
+from scenicq.importers.label_rows import labels_of
+from scenicq.importers.nuscenes import NuScenes
+from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, of_rows
+from scenicq.importers.report import Report
+from scenicq.store.columns import RecordingColumns, columns_of
+from scenicq.store.labels import Recording
+
+TINY = Path(__file__).parents[2] / "sample_data" / "nuscenes_tiny"
+ATTRIBUTES = {
+    "a": "vehicle.parked",
+    "b": "pedestrian.moving",
+    "c": "plain",
+    "d": "num_lidar_pts.x",
+    "e": "visibility.y",
+}
+READER = ({"s0": 0, "s1": 1}, {"t0": 0, "t1": 1}, ATTRIBUTES, {"1": "v0-40", "2": "v80-100"})
+JUNK = [None, True, 0, -1, 2.5, float("nan"), 10**400, 2**63, "", "x", "ab", [], [1, None], [True, 1, 1], {}, ["a", 1]]
+
+reals = st.floats(-1e6, 1e6) | st.integers(-1000, 1000)
+parts = st.floats(-0.9, 0.9)
+annotations = st.fixed_dictionaries(
+    {
+        "token": st.sampled_from("pqr"),
+        "sample_token": st.sampled_from(["s0", "s1"]),
+        "instance_token": st.sampled_from(["t0", "t1"]),
+        "translation": st.lists(reals, min_size=3, max_size=3),
+        "rotation": st.tuples(st.floats(0.6, 0.9), parts, parts, parts).map(list),
+        "size": st.lists(st.floats(0.1, 20) | st.integers(1, 9), min_size=3, max_size=3),
+    },
+    optional={
+        "attribute_tokens": st.none() | st.lists(st.sampled_from("abcde"), max_size=3),
+        "visibility_token": st.sampled_from([None, "", "1", "2", "ü"]),
+        "num_lidar_pts": st.none() | st.integers(0, 2**63 - 1),
+        "num_radar_pts": st.none() | st.integers(-1, 99),
+    },
+)
+
+
+def by_row(rows: list[dict[str, Any]]) -> Boxes | None:
+    """The reference; None where a row is unsound."""
+    reader = BoxReader(*READER)
+    try:
+        return of_rows([reader.row(row["token"], row) for row in rows])
+    except InvalidError:
+        return None
+
+
+def same(one: Boxes, two: Boxes) -> bool:
+    return (one.tokens, one.attributes, one.samples.tolist(), one.tracks.tolist(), one.values.tobytes()) == (
+        *(two.tokens, two.attributes, two.samples.tolist(), two.tracks.tolist()),
+        np.ascontiguousarray(two.values).tobytes(),
+    )
+
+
+@settings(deadline=None)
+@given(rows=st.lists(annotations, min_size=1, max_size=5))
+def test_sound_rows_are_read_alike(rows: list[dict[str, Any]]) -> None:
+    columns, expected = BoxReader(*READER).columns(rows), by_row(rows)
+    assert expected is not None
+    unusual = any("d" in (row.get("attribute_tokens") or ()) for row in rows)
+    assert unusual or columns is not None
+    if columns is not None:
+        assert same(columns, expected)
+
+
+@settings(deadline=None, max_examples=300)
+@given(rows=st.lists(annotations, min_size=1, max_size=3), data=st.data())
+def test_unsound_rows_are_left_to_the_other(rows: list[dict[str, Any]], data: st.DataObject) -> None:
+    row = data.draw(st.sampled_from(rows))
+    row[data.draw(st.sampled_from(sorted(row)))] = data.draw(st.sampled_from(JUNK))
+    columns = BoxReader(*READER).columns(rows)
+    if columns is not None:
+        expected = by_row(rows)
+        assert expected is not None
+        assert same(columns, expected)
+
+
+def tiny(folder: Path, table: str, change: Any) -> tuple[list[RecordingColumns | Recording], Report]:
+    """The recordings of the sample data after a change of a table."""
+    for file in (TINY / "v1.0-tiny").iterdir():
+        rows = json.loads(file.read_bytes())
+        if file.stem == table:
+            change(rows)
+        (folder / file.name).write_text(json.dumps(rows, indent=0))
+    report = Report()
+    return list(NuScenes().read(folder, Options(), report).recordings(report)), report
+
+
+def test_a_bad_row_among_good_ones_is_named(tmp_path: Path) -> None:
+    folder = tmp_path / "v1.0-tiny"
+    folder.mkdir()
+
+    def change(rows: list[dict[str, Any]]) -> None:
+        rows[3]["rotation"] = [9, 9, 9, 9]
+
+    (before, _), (after, report) = tiny(folder, "", change), tiny(folder, "sample_annotation", change)
+    table = (folder / "sample_annotation.json").read_text().splitlines()
+    row = json.loads((TINY / "v1.0-tiny" / "sample_annotation.json").read_bytes())[3]["token"]
+    line = table.index(f'"token": "{row}",')
+    expected = f"sample_annotation.json:{line}: annotation `{row}`: `rotation` is not a unit quaternion"
+    assert [problem.message for problem in report.told if problem.what == "object"] == [expected]
+    counts = [
+        sum(len(one.objects.id) for one in found if isinstance(one, RecordingColumns)) for found in (before, after)
+    ]
+    assert counts[1] == counts[0] - 1
+
+
+def test_labels_and_columns_agree(tmp_path: Path) -> None:
+    folder = tmp_path / "v1.0-tiny"
+    folder.mkdir()
+    for found in tiny(folder, "", None)[0]:
+        assert isinstance(found, RecordingColumns)
+        again = columns_of(Recording(found.name, found.map, tuple(labels_of(found))))
+        assert (again.frames, again.params, again.objects.attributes) == (
+            found.frames,
+            found.params,
+            found.objects.attributes,
+        )
+        assert again.objects.vx.tobytes() == np.ascontiguousarray(found.objects.vx).tobytes()
+
+
+def test_an_annotation_that_is_there_twice_counts_once(tmp_path: Path) -> None:
+    folder = tmp_path / "v1.0-tiny"
+    folder.mkdir()
+    found, report = tiny(folder, "sample_annotation", lambda rows: rows.append(rows[0]))
+    assert all(isinstance(one, Recording | RecordingColumns) for one in found)
+    assert [
+        (problem.what, "is used twice" in problem.message) for problem in report.told if problem.what == "object"
+    ] == [("object", True)]
+
+
+def test_times_near_the_largest_number_have_no_wrong_velocity(tmp_path: Path) -> None:
+    folder = tmp_path / "v1.0-tiny"
+    folder.mkdir()
+
+    def change(rows: list[dict[str, Any]]) -> None:
+        for number, row in enumerate(sorted(rows, key=lambda row: row["timestamp"])):
+            row["timestamp"] = 2**63 - 1 - number * 10_000_000 if number else 1 - 2**63
+
+    found, _ = tiny(folder, "sample", change)
+    assert all(isinstance(one, RecordingColumns) and np.isnan(one.objects.vx).all() for one in found)
+    assert all(isinstance(one, RecordingColumns) and np.isnan(one.egos.vx).all() for one in found)
+
+
+@pytest.mark.parametrize("field", ["token", "sample_token"])
+def test_half_a_character_is_left_out(tmp_path: Path, field: str) -> None:
+    folder = tmp_path / "v1.0-tiny"
+    folder.mkdir()
+    _, report = tiny(folder, "sample_annotation", lambda rows: rows[0].update({field: "\ud800"}))
+    assert any("half of a character" in problem.message for problem in report.told)
