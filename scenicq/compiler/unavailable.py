@@ -54,7 +54,7 @@ _ATTRIBUTES: dict[str, tuple[str, str]] = {
         "labels are matched in 2D",
         "use regions in the plane",
     ),
-    "signedDistanceTo pointAlongBy signedDistanceTo segmentAt buffer boundary": (
+    "signedDistanceTo pointAlongBy buffer boundary": (
         "not a part of regions that can be matched",
         "`distance to` a region, `on` it, and `follow` along a field can",
     ),

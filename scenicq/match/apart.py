@@ -8,7 +8,7 @@ where single parts want it, or else is narrowed down by halving.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from scenicq.forest.bounds import Interval
 from scenicq.forest.condition import condition
@@ -26,6 +26,15 @@ __all__ = ["decide_apart"]
 _TIGHT = 0.05
 """Share of the tolerance with which a part is asked first, so that its witness suits the others, too."""
 _MOST_HALVES = 60
+_PATIENCE = 8
+"""Parts of a group along a field that are put to the ladder at most; what is open then is for a solver."""
+
+
+@dataclass(slots=True)
+class _Patience:
+    """How many parts may still be put to the ladder."""
+
+    left: int = _PATIENCE
 
 
 def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
@@ -35,6 +44,10 @@ def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
         items: The group's constraints, conditioned.
         tolerance: Per feature.
     """
+    return _apart(items, tolerance, _Patience())
+
+
+def _apart(items: list[Item], tolerance: Tolerance, patience: _Patience) -> Outcome:
     left: list[Item] = []
     for item in items:
         if not isinstance(item[1], Constant):
@@ -51,10 +64,10 @@ def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
     used = {id(item): {leaf.identity: leaf for leaf in leaves(item[1])} for item in left}
     alone = _components(left, used, None)
     if len(alone) > 1:
-        return _all(alone, items, tolerance)
+        return _all(alone, items, tolerance, patience)
     shared = _shared(left, used)
     if shared is not None:
-        return _Sharing(items, left, *shared, tolerance).decide()
+        return _Sharing(items, left, *shared, tolerance, patience).decide()
     choice = next((leaf for item in left for leaf in used[id(item)].values() if isinstance(leaf, Index)), None)
     if choice is not None and turning:
         return _either(
@@ -64,6 +77,7 @@ def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
                 for n in range(len(choice.weights))
             ),
             tolerance,
+            patience,
         )
     guessed = shoot(left, tolerance) if turning else None
     if guessed is not None:
@@ -72,15 +86,24 @@ def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
         identity, (low, high) = wide
         middle = (low + high) / 2
         halves = ((low, middle), (middle, high))
-        return _either(left[0], ((within(left, {identity: half}), {}) for half in halves), tolerance)
+        return _either(left[0], ((within(left, {identity: half}), {}) for half in halves), tolerance, patience)
+    if turning:
+        if patience.left <= 0:
+            return Maybe(items[0][0], "nonlinear")
+        patience.left -= 1
     return decide(left, tolerance)
 
 
-def _either(first: Item, cases: Iterator[tuple[list[Item], Mapping[Identity, Value]]], tolerance: Tolerance) -> Outcome:
+def _either(
+    first: Item,
+    cases: Iterator[tuple[list[Item], Mapping[Identity, Value]]],
+    tolerance: Tolerance,
+    patience: _Patience,
+) -> Outcome:
     """Cases of a group, one of which must be satisfied; with each the values that it chooses."""
     found: Outcome | None = None
     for items, given in cases:
-        outcome = decide_apart(items, tolerance)
+        outcome = _apart(items, tolerance, patience)
         if isinstance(outcome, Yes):
             return Yes({**given, **outcome.values})
         found = outcome if found is None or isinstance(outcome, Maybe) else found
@@ -92,12 +115,12 @@ def _given(items: Sequence[Item], given: Mapping[Identity, Value]) -> list[Item]
     return [(c, condition(node, {}, given, memo), seen) for c, node, seen in items]
 
 
-def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance) -> Outcome:
+def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, patience: _Patience) -> Outcome:
     """Parts that have no random variable in common."""
     values: dict[Identity, Value] = {}
     doubt: Maybe | None = None
     for part in parts:
-        outcome = decide_apart(part, tolerance)
+        outcome = _apart(part, tolerance, patience)
         if isinstance(outcome, No):
             return outcome
         if isinstance(outcome, Maybe):
@@ -160,7 +183,9 @@ class _Sharing:
         limits: tuple[float, float],
         parts: list[list[Item]],
         tolerance: Tolerance,
+        patience: _Patience,
     ) -> None:
+        self.patience = patience
         self.items = items
         self.left = left
         self.identity = leaf.identity
@@ -172,10 +197,10 @@ class _Sharing:
     def decide(self) -> Outcome:
         wanted: list[float] = []
         for part in self.parts:
-            outcome = decide_apart(part, self.tolerance)
+            outcome = _apart(part, self.tolerance, self.patience)
             if isinstance(outcome, No):
                 return outcome
-            tight = decide_apart(part, _scaled(self.tolerance, _TIGHT))
+            tight = _apart(part, _scaled(self.tolerance, _TIGHT), self.patience)
             witness = tight if isinstance(tight, Yes) else outcome
             value = witness.values.get(self.identity) if isinstance(witness, Yes) else None
             if isinstance(value, float):
@@ -192,7 +217,7 @@ class _Sharing:
             return None
         self.tried.add(value)
         given: dict[Identity, Value] = {self.identity: value}
-        outcome = decide_apart(_given(self.left, given), self.tolerance)
+        outcome = _apart(_given(self.left, given), self.tolerance, self.patience)
         if not isinstance(outcome, Yes):
             return None
         values = given | dict(outcome.values)
@@ -207,7 +232,7 @@ class _Sharing:
                 return blamed
             low, high = todo.pop()
             here = {self.identity: (low, high)}
-            outcomes = (decide_apart(within(part, here), self.tolerance) for part in self.parts)
+            outcomes = (_apart(within(part, here), self.tolerance, self.patience) for part in self.parts)
             excluded = next((outcome for outcome in outcomes if isinstance(outcome, No)), None)
             if excluded is not None:
                 blamed = excluded

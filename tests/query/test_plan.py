@@ -190,7 +190,7 @@ def cases():
     """Every program under every option; those that keep a solver busy only by request."""
     for options in OPTIONS:
         for name in PROGRAMS:
-            busy = name == "badly parked" or (name in ("nonlinear", "follow", "figure 6") and options != "default")
+            busy = name in ("badly parked", "follow") or (name in ("nonlinear", "figure 6") and options != "default")
             yield pytest.param(name, options, marks=[pytest.mark.slow] * busy)
 
 
