@@ -43,7 +43,7 @@ def spans_of(scenario: Scenario) -> dict[str, Span]:
             found[f"param {name}"] = given.span
     for thing in scenario.objects:
         if thing.span is not None:
-            found[f"{thing.name}.class"] = found[f"{thing.name} within radius"] = thing.span
+            found[f"{thing.name}.class"] = thing.span
         for name, given in thing.properties.items():
             span = given.span or thing.span
             if span is not None and span.source is scenario.source:
