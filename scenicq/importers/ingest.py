@@ -242,8 +242,11 @@ def _summary(target: Path, importer: Importer, manifest: Manifest, report: Repor
 
 @contextmanager
 def _terminable() -> Generator[None]:
-    """Let SIGTERM end the block like Ctrl-C, so that what is half written goes away."""
-    if threading.current_thread() is not threading.main_thread():
+    """Let SIGTERM end the block like Ctrl-C, so that what is half written goes away, unless the caller handles it."""
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
+    ):
         yield
         return
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
