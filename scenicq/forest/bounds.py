@@ -38,7 +38,17 @@ from scenicq.forest.walk import children, postorder
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
 
-__all__ = ["EVERYTHING", "Box", "Interval", "leaf_boxes", "point_boxes", "scalar_bounds", "vector_bounds"]
+__all__ = [
+    "EVERYTHING",
+    "Box",
+    "Interval",
+    "add",
+    "leaf_boxes",
+    "multiply",
+    "point_boxes",
+    "scalar_bounds",
+    "vector_bounds",
+]
 
 Interval: TypeAlias = tuple[float, float]
 Box: TypeAlias = tuple[Interval, Interval]
@@ -48,7 +58,8 @@ _PLANE: Box = (EVERYTHING, EVERYTHING)
 _Bounds: TypeAlias = Interval | Box | None
 
 
-def _add(a: Interval, b: Interval) -> Interval:
+def add(a: Interval, b: Interval) -> Interval:
+    """The sum."""
     return (a[0] + b[0], a[1] + b[1])
 
 
@@ -56,7 +67,8 @@ def _product(a: float, b: float) -> float:
     return 0.0 if a == 0 or b == 0 else a * b
 
 
-def _multiply(a: Interval, b: Interval) -> Interval:
+def multiply(a: Interval, b: Interval) -> Interval:
+    """The product; nothing times an infinite end is nothing."""
     ends = [_product(x, y) for x in a for y in b]
     return (min(ends), max(ends))
 
@@ -81,15 +93,15 @@ def _arithmetic(op: ArithmeticOp, args: list[Interval]) -> Interval:
         case ArithmeticOp.ADD:
             total = first
             for other in args[1:]:
-                total = _add(total, other)
+                total = add(total, other)
             return total
         case ArithmeticOp.SUB:
             return (first[0] - args[1][1], first[1] - args[1][0])
         case ArithmeticOp.MUL:
-            return _multiply(first, args[1])
+            return multiply(first, args[1])
         case ArithmeticOp.DIV if args[1][0] > 0 or args[1][1] < 0:
             inverse = (1 / args[1][1], 1 / args[1][0])
-            return _multiply(first, inverse)
+            return multiply(first, inverse)
         case ArithmeticOp.NEG:
             return (-first[1], -first[0])
         case ArithmeticOp.ABS:
@@ -119,8 +131,8 @@ def _rotated(box: Box, angle: Interval) -> Box:
     (x0, x1), (y0, y1) = box
     if angle[0] == angle[1]:
         c, s = math.cos(angle[0]), math.sin(angle[0])
-        x = _add(_multiply((x0, x1), (c, c)), _multiply((y0, y1), (-s, -s)))
-        y = _add(_multiply((x0, x1), (s, s)), _multiply((y0, y1), (c, c)))
+        x = add(multiply((x0, x1), (c, c)), multiply((y0, y1), (-s, -s)))
+        y = add(multiply((x0, x1), (s, s)), multiply((y0, y1), (c, c)))
         return (x, y)
     reach = math.hypot(_largest((x0, x1)), _largest((y0, y1)))
     return ((-reach, reach), (-reach, reach))
@@ -181,10 +193,10 @@ def _bounds(root: Node, leaves: Mapping[Identity, _Bounds]) -> dict[int, _Bounds
                 value = (given[0], given[1])
             case VectorSum():
                 left, right = cast("list[Box]", args)
-                value = (_add(left[0], right[0]), _add(left[1], right[1]))
+                value = (add(left[0], right[0]), add(left[1], right[1]))
             case Scale():
                 x, y = cast(Box, args[0])
-                value = (_multiply(x, given[1]), _multiply(y, given[1]))
+                value = (multiply(x, given[1]), multiply(y, given[1]))
             case Rotate():
                 value = _rotated(cast(Box, args[0]), given[1])
             case Select():
@@ -247,7 +259,7 @@ def point_boxes(root: Node, target: Box) -> dict[Identity, Box]:
             case Scale() if isinstance(node.factor, Constant) and node.factor.value:
                 inverse = 1 / cast(float, node.factor.value)
                 stack.append(
-                    (node.vector, (_multiply(box[0], (inverse, inverse)), _multiply(box[1], (inverse, inverse))))
+                    (node.vector, (multiply(box[0], (inverse, inverse)), multiply(box[1], (inverse, inverse))))
                 )
             case _:
                 pass

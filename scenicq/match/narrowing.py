@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from scenicq.forest.bounds import EVERYTHING, Box, Interval, scalar_bounds, vector_bounds
+from scenicq.forest.bounds import EVERYTHING, Box, Interval, add, multiply, scalar_bounds, vector_bounds
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -40,13 +40,11 @@ from scenicq.geometry.fields import VectorField
 from scenicq.match.ladder import Item
 from scenicq.match.options import Tolerance
 from scenicq.match.spans import (
-    add,
     angle_of,
     common,
     divide,
     empty,
     grown,
-    multiply,
     near_turn,
     negative,
     rotate,

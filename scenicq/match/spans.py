@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from typing import TypeVar, cast
 
-from scenicq.forest.bounds import EVERYTHING, Box, Interval
+from scenicq.forest.bounds import EVERYTHING, Box, Interval, add, multiply
 
 __all__ = [
-    "add",
     "angle_of",
     "common",
     "divide",
     "empty",
     "grown",
-    "multiply",
     "near_turn",
     "negative",
     "rotate",
@@ -27,11 +25,6 @@ _ROUNDING = 1e-9
 """By how much two intervals may miss each other and still meet."""
 
 
-def add(a: Interval, b: Interval) -> Interval:
-    """The sum."""
-    return (a[0] + b[0], a[1] + b[1])
-
-
 def subtract(a: Interval, b: Interval) -> Interval:
     """The difference."""
     return (a[0] - b[1], a[1] - b[0])
@@ -40,16 +33,6 @@ def subtract(a: Interval, b: Interval) -> Interval:
 def negative(a: Interval) -> Interval:
     """The same below zero."""
     return (-a[1], -a[0])
-
-
-def _product(a: float, b: float) -> float:
-    return 0.0 if a == 0 or b == 0 else a * b
-
-
-def multiply(a: Interval, b: Interval) -> Interval:
-    """The product."""
-    ends = (_product(a[0], b[0]), _product(a[0], b[1]), _product(a[1], b[0]), _product(a[1], b[1]))
-    return (min(ends), max(ends))
 
 
 def divide(a: Interval, b: Interval) -> Interval:

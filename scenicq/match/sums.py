@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeAlias, cast
 
-from scenicq.forest.bounds import EVERYTHING, Box, Interval
+from scenicq.forest.bounds import EVERYTHING, Box, Interval, add, multiply
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
@@ -18,7 +18,7 @@ from scenicq.forest.nodes import (
     VectorOf,
     VectorSum,
 )
-from scenicq.match.spans import add, divide, multiply, rotate
+from scenicq.match.spans import divide, rotate
 
 __all__ = ["Form", "form_of"]
 
