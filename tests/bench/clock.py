@@ -1,14 +1,53 @@
-"""Processor time of this process and all that it starts: what a measurement costs, however busy the machine is."""
+"""Processor time of this process or of a command, and all that it starts: what a measurement costs, however busy the
+machine is."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import resource
+import subprocess
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
-__all__ = ["cpu_s"]
+__all__ = ["Used", "cpu_s", "run"]
+
+
+@dataclass(frozen=True, slots=True)
+class Used:
+    """What a command took.
+
+    Attributes:
+        wall_s, cpu_s: Seconds, the latter of all its processes.
+        peak_mib: Memory of its largest process.
+    """
+
+    wall_s: float
+    cpu_s: float
+    peak_mib: float
+
+
+def run(words: Sequence[str], output: int | IO[bytes] = subprocess.DEVNULL) -> Used:
+    """Run a command to its end.
+
+    Args:
+        words: The command.
+        output: Where its standard output goes.
+
+    Raises:
+        SystemExit: It failed.
+    """
+    started = time.perf_counter()
+    process = subprocess.Popen(words, stdout=output)
+    _, status, used = os.wait4(process.pid, 0)
+    wall_s = time.perf_counter() - started
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"{' '.join(words)}: exit code {process.returncode}")
+    return Used(wall_s, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
 
 
 def cpu_s() -> float:

@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import platform
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -21,7 +19,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from clock import cpu_s
+from clock import Used, cpu_s, run
 from fleet import Fleet, write_interchange
 
 from scenicq.importers.ingest import ingest
@@ -61,29 +59,21 @@ class Measured:
         return self.objects / self.import_s
 
 
-def command(source: Path, target: Path, jobs: int) -> tuple[float, float, float]:
-    """CPU and wall seconds and peak memory of `scenicq ingest`, with all its processes."""
-    given = [COMMAND, "ingest", str(source), str(target), "--force", "--jobs", str(jobs)]
-    started = datetime.now(UTC)
-    process = subprocess.Popen(given, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise SystemExit(f"{' '.join(given)} failed")
-    wall = (datetime.now(UTC) - started).total_seconds()
-    return used.ru_utime + used.ru_stime, wall, used.ru_maxrss / 1024
+def command(source: Path, target: Path, jobs: int) -> Used:
+    """What `scenicq ingest` takes, with all its processes."""
+    return run([COMMAND, "ingest", str(source), str(target), "--force", "--quiet", "--jobs", str(jobs)])
 
 
 def measure(source: Path, jobs: int, folder: Path) -> Measured:
     """Ingest a source as a command, then in this process, where start-up is not counted."""
-    command_s, wall, peak = command(source, folder / "command", jobs)
+    used = command(source, folder / "command", jobs)
     before = cpu_s()
     summary = ingest(source, folder / "here", jobs=jobs, force=True)
     import_s = cpu_s() - before
-    one = Measured(source.name, summary.frames, summary.objects, jobs, import_s, command_s, wall, peak)
+    one = Measured(source.name, summary.frames, summary.objects, jobs, import_s, used.cpu_s, used.wall_s, used.peak_mib)
     print(
-        f"  {one.source:14}  {one.frames:>9,} {one.objects:>11,} {jobs:>5} {import_s:>9.2f} {command_s:>9.2f}"
-        f" {one.rate:>9,.0f} {one.objects / command_s:>9,.0f} {peak:>7.0f}",
+        f"  {one.source:14}  {one.frames:>9,} {one.objects:>11,} {jobs:>5} {import_s:>9.2f} {one.command_s:>9.2f}"
+        f" {one.rate:>9,.0f} {one.objects / one.command_s:>9,.0f} {one.peak_mib:>7.0f}",
         flush=True,
     )
     return one

@@ -11,10 +11,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import platform
 import re
-import subprocess
 import sys
 import tempfile
 import time
@@ -25,6 +23,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import duckdb
+from clock import Used, run
 from fleet import NEEDLE, Fleet, write_store
 
 from scenicq.match.options import MatchOptions, parse_tolerance
@@ -71,21 +70,14 @@ class Measured:
         return self.prefilter_s / self.scan_s
 
 
-def command(dataset: Path, scenario: Path, *options: str) -> tuple[float, float, float, int]:
-    """Wall and CPU seconds, peak memory and matches of `scenicq match`."""
-    started = time.perf_counter()
+def command(dataset: Path, scenario: Path, *options: str) -> tuple[Used, int]:
+    """What `scenicq match` takes, and its matches."""
     with tempfile.TemporaryFile() as output:
-        process = subprocess.Popen(
-            [COMMAND, "match", str(scenario), str(dataset), "--exit-zero", "--format", "jsonl", *options], stdout=output
+        used = run(
+            [COMMAND, "match", str(scenario), str(dataset), "--exit-zero", "--format", "jsonl", *options], output
         )
-        _, status, used = os.wait4(process.pid, 0)
-        wall_s = time.perf_counter() - started
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            sys.exit(f"{scenario.name}: exit code {process.returncode}")
         output.seek(0)
-        matches = sum(1 for _ in output)
-    return wall_s, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, matches
+        return used, sum(1 for _ in output)
 
 
 def prefilter(dataset: Dataset, scenario: Path, options: MatchOptions) -> tuple[float, float]:
@@ -140,9 +132,10 @@ def measure(store: Path, jobs: int, only: set[str]) -> list[Measured]:
                 continue
             plain = scenario == needle
             setting = () if plain else SETTING
-            ran = command(store, scenario, "--tolerance", TOLERANCE, "--jobs", str(jobs), *setting)
+            used, matches = command(store, scenario, "--tolerance", TOLERANCE, "--jobs", str(jobs), *setting)
             tolerance = parse_tolerance(TOLERANCE)
             options = MatchOptions(tolerance) if plain else MatchOptions(tolerance, classes="coarse", radius=50.0)
+            ran = (used.wall_s, used.cpu_s, used.peak_mib, matches)
             found.append(Measured(scenario.stem, frames, *ran, *prefilter(dataset, scenario, options)))
             show(found[-1])
     return found

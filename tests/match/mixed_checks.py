@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 import zlib
 
+import bad_checks
+
 from scenicq.smt import portable
-from scenicq.smt.answer import Unknown, Unsat
 from scenicq.smt.formula import flatten
 
 
@@ -23,15 +23,10 @@ def check(problem, *, precision, timeout_s):
         case 0:
             os.kill(os.getpid(), signal.SIGKILL)
         case 1:
-            time.sleep(3600)
+            return bad_checks.hang(problem, precision=precision, timeout_s=timeout_s)
         case 2:
-            for descriptor in range(3, 20):
-                try:
-                    os.write(descriptor, b"\x00\xff not json\n")
-                except OSError:
-                    continue
-            return Unsat()
+            return bad_checks.garble(problem, precision=precision, timeout_s=timeout_s)
         case 3:
-            return Unknown(str(len(bytearray(2**45))))
+            return bad_checks.eat(problem, precision=precision, timeout_s=timeout_s)
         case _:
             return portable.check(problem, precision=precision, timeout_s=timeout_s)
