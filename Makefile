@@ -57,8 +57,10 @@ bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=100
 	$(BIN)/python tests/bench/scale.py --frames $(FRAMES)
 
 MAP ?= Town01.xodr
-conformance: $(READY) ## Compare with Scenic 3.1.1: scenes that it draws must match (MAP=an OpenDRIVE file)
-	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP)
+RANDOM ?= 200
+SEED ?= 1
+conformance: $(READY) ## Compare with Scenic 3.1.1 and 2.1.0 (MAP=an OpenDRIVE file, RANDOM=programs, SEED=)
+	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(SEED)
 
 browser: ## Install the Chromium that the tests of reports are driven in, where the system has it
 	@$(call install_browser)

@@ -19,6 +19,7 @@ from scenicq.report.write import check_target, write_report
 from .formats import make_writer
 from .output import ProgressBar, destination, writing
 from .report import show_few
+from .sources import sensor_root
 
 __all__ = ["Wanted", "deliver"]
 
@@ -33,6 +34,7 @@ class Wanted:
         export: Form and folder of an export.
         report: Folder of a report.
         work: Folder for what is not complete yet; beside the file by default.
+        sensors: Folder that the paths of sensor files start from, for the report.
     """
 
     file: Path | None
@@ -40,6 +42,7 @@ class Wanted:
     export: tuple[str, Path] | None = None
     report: Path | None = None
     work: Path | None = None
+    sensors: Path | None = None
 
 
 def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar) -> None:
@@ -73,7 +76,15 @@ def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wa
     if report is not None:
         command = shlex.join(["scenicq", *sys.argv[1:]])
         elapsed_s = time.perf_counter() - started
-        write_report(query, shown or (), report, near=close or (), command=command, elapsed_s=elapsed_s)
+        write_report(
+            query,
+            shown or (),
+            report,
+            near=close or (),
+            command=command,
+            elapsed_s=elapsed_s,
+            sensors=sensor_root(query.dataset, wanted.sensors),
+        )
 
 
 def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Result]:

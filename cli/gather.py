@@ -16,6 +16,7 @@ from .formats import FORMATS, make_writer
 from .main import NOTHING
 from .manual import Manual
 from .output import ProgressBar, choose_format, destination, writing
+from .sources import SENSORS
 
 __all__ = ["gather"]
 
@@ -34,10 +35,12 @@ __all__ = ["gather"]
               help="Hand the matching frames on, too, in a new folder DIR; as for `match`.")  # fmt: skip
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures of the matches, too: DIR/index.html.")  # fmt: skip
+@SENSORS
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches.")
 @click.pass_context
 def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Path | None,
-           export: tuple[str, Path] | None, report: Path | None, exit_zero: bool) -> None:  # fmt: skip
+           export: tuple[str, Path] | None, report: Path | None, sensors: Path | None,
+           exit_zero: bool) -> None:  # fmt: skip
     """Put the shards of a query together, in the order of the dataset.
 
     A shard that is missing or damaged is named. For an export or a report, dataset and scenario are read where they
@@ -52,7 +55,7 @@ def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Pat
         query = noted_question(folder, gathered.question)
         query.funnel = gathered.funnel
         results = (restore(each, query.source) for each in gathered.records())
-        deliver(query, results, (), Wanted(file, form, export, report), ProgressBar(quiet=True))
+        deliver(query, results, (), Wanted(file, form, export, report, sensors=sensors), ProgressBar(quiet=True))
     if gathered.funnel.matches == 0 and not exit_zero:
         ctx.exit(NOTHING)
 

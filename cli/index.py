@@ -10,6 +10,7 @@ from scenicq.store.rebuild import rebuild
 from .manual import Manual
 from .output import ProgressBar
 from .report import count
+from .sources import recorded, remember
 
 __all__ = ["index"]
 
@@ -28,7 +29,10 @@ def index(dataset: str, *, quiet: bool) -> None:
     objects, sensor paths and maps stay as they are.
     """
     opened = open_dataset(dataset)
+    source = recorded(opened)
     with ProgressBar(opened.manifest.total.frames, quiet=quiet) as bar:
         manifest = rebuild(opened, bar.advance)
+    if source is not None:
+        remember(opened.path, source)
     if not quiet:
         click.echo(f"{dataset}: {count(manifest.total.frames, 'frame')} indexed", err=True)

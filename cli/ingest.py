@@ -15,6 +15,7 @@ from .cache import user_cache
 from .manual import Manual
 from .output import ProgressBar
 from .report import columns, count, show_few
+from .sources import remember
 
 __all__ = ["defects", "ingest"]
 
@@ -78,14 +79,14 @@ def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
     "--jobs",
     metavar="N",
     type=click.IntRange(1),
-    default=1,
-    help="Processes that read and compute.",
+    help="Processes that read and compute.  [default: one a processor, at most 8]",
 )
 @click.option("--force", is_flag=True, help="Replace a dataset that is there already.")
 @click.option("--update", is_flag=True, help="Add what is new in the source to the dataset that is there already.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary, no warnings.")
 def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str, ...], class_map: Path | None,
-           ego: str | None, strict: bool, jobs: int, force: bool, update: bool, quiet: bool) -> None:  # fmt: skip
+           ego: str | None, strict: bool, jobs: int | None, force: bool, update: bool,
+           quiet: bool) -> None:  # fmt: skip
     """Make a dataset from a source, such as a nuScenes folder.
 
     The dataset appears when it is complete: an error or an interrupt leaves what was there before.
@@ -106,6 +107,7 @@ def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str,
             jobs=jobs,
             progress=lambda progress: bar.reach(progress.frames, progress.total),
         )
+    remember(dataset, source)
     if not quiet:
         show_few(summary.diagnostics)
         click.echo("\n".join(_lines(summary, time.perf_counter() - started)), err=True)

@@ -1,18 +1,30 @@
 """Ctrl-C and SIGTERM: a command that is asked to stop stops.
 
-A `KeyboardInterrupt` can get lost on its way: DuckDB turns it into an error of its own, and what a callback or
-`__del__` raises is dropped. So it is remembered, and raised again while the command goes on.
+A `KeyboardInterrupt` can get lost on its way. What `__del__` or a callback of a weak reference raises is dropped: this
+happens to one interrupt in a hundred that come at random, as the locks of imports have such callbacks. Python tells of
+what it drops, and the interrupt is raised again at once. DuckDB turns an interrupt into an error of its own, and what
+other libraries do is theirs; so it is also remembered, and raised again while the command goes on as if nothing were.
 """
 
 from __future__ import annotations
 
 import signal
+import sys
+import time
 from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
 
 __all__ = ["Interrupts"]
 
 INSIST_S = 10.0
-"""Seconds for cleaning up, after which the interrupt is taken for lost and raised again."""
+"""Seconds for cleaning up, after which the interrupt is raised again."""
+_LOOK_S = 0.5
+"""Seconds between looks at whether anything is being cleaned up; else the interrupt is lost, and raised again."""
+_AT_ONCE_S = 0.001
+"""Seconds until one that is known to be lost is raised again, outside of what lost it."""
 
 
 class Interrupts:
@@ -21,6 +33,7 @@ class Interrupts:
     def __init__(self) -> None:
         """Nothing is heeded yet."""
         self.noticed = False
+        self._until = 0.0
 
     def heed(self) -> None:
         """Treat SIGTERM like Ctrl-C from now on; a shell that had SIGINT ignored keeps its will."""
@@ -29,14 +42,29 @@ class Interrupts:
         signal.signal(signal.SIGTERM, self._notice)
         if hasattr(signal, "SIGALRM"):
             signal.signal(signal.SIGALRM, self._notice)
+            sys.unraisablehook = self._dropped
 
     def done(self) -> None:
-        """The interrupt has arrived."""
+        """The interrupt has arrived; what comes while the process ends is not raised again."""
         if hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, signal.SIG_IGN)
+
+    def _dropped(self, told: UnraisableHookArgs) -> None:
+        """Python drops an exception, as nobody is there to take it."""
+        if told.exc_type is KeyboardInterrupt:
+            signal.setitimer(signal.ITIMER_REAL, _AT_ONCE_S)
+        else:
+            sys.__unraisablehook__(told)
 
     def _notice(self, number: int, frame: FrameType | None) -> None:
-        self.noticed = True
+        now = time.monotonic()
+        again = self.noticed and hasattr(signal, "SIGALRM") and number == signal.SIGALRM
+        # while anything is cleaned up, the interrupt or what has become of it is being handled
+        wait = again and sys.exc_info()[0] is not None and now < self._until
+        if not wait:
+            self.noticed, self._until = True, now + INSIST_S
         if hasattr(signal, "setitimer"):
-            signal.setitimer(signal.ITIMER_REAL, INSIST_S)
-        raise KeyboardInterrupt
+            signal.setitimer(signal.ITIMER_REAL, min(_LOOK_S, max(_AT_ONCE_S, self._until - now)))
+        if not wait:
+            raise KeyboardInterrupt

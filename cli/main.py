@@ -154,4 +154,6 @@ def main() -> None:
     """Run the command line of this process."""
     # so that a terminated run leaves nothing half-written, like an interrupted one
     INTERRUPTS.heed()
+    # work is shared out among processes: threads for linear algebra would only take their time to start
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     cli(prog_name="scenicq")

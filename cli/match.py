@@ -31,6 +31,7 @@ from .options import DEFAULTS, TOPICS, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
+from .sources import SENSORS
 
 __all__ = ["match"]
 
@@ -76,7 +77,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               help="smt sends everything to the solver; monolithic as one formula. The verdicts are the same.")
 @click.option("--prefilter/--no-prefilter", default=True,
               help="Whether SQL narrows the frames first. The matches are the same.")
-@click.option("--jobs", metavar="N", type=click.IntRange(1), default=1, help="Processes that match.")
+@click.option("--jobs", metavar="N", type=click.IntRange(1), help="Processes that match.  [default: one a processor, "
+              "at most 8, once it is clear that it takes long; with --shard 1]")
 @click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULTS.timeout_s,
               help="Seconds for one question to the solver; then the frame is unknown.")
 @click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
@@ -104,6 +106,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               help="Print what SQL decides and what stays for the matcher, and match nothing.")
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures of the matches, too: DIR/index.html.")
+@SENSORS
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
 @click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")
@@ -113,7 +116,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.pass_context
 def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | None, output: Path | None,
           export: tuple[str, Path] | None, near: int | None, report: Path | None, shard: Shard | None, resume: bool,
-          engine: Engine | None, explain: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
+          sensors: Path | None, engine: Engine | None, explain: bool, exit_zero: bool, summary: bool, quiet: bool,
+          **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
 
@@ -123,6 +127,8 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     started = time.perf_counter()
     file = None if output is None or str(output) == "-" else output
     chosen = choose_format(format_, None if shard else file)
+    if shard is not None:
+        given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
     query = Query(open_dataset(dataset), read_program(scenario), query_options(given))
     if explain:
         show_plan(query)
@@ -141,7 +147,7 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
     results = in_order(query, engine, pieces_of(query, 16), bar.advance) if engine else query.results(bar.advance)
     try:
-        deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces), bar)
+        deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
     except BaseException:
         if pieces is not None:
             with contextlib.suppress(OSError):

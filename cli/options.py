@@ -27,7 +27,7 @@ TOPICS = {
     "What counts as a match": SHARED - {"solver", "method", "timeout", "budget"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
-        "limit", "every", "all_matches", "near", "format_", "output", "report", "export", "explain",
+        "limit", "every", "all_matches", "near", "format_", "output", "report", "sensors", "export", "explain",
     },
     "Long runs": {"shard", "resume"},
     "Messages and exit code": {"exit_zero", "summary", "quiet", "help"},

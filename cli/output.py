@@ -8,11 +8,13 @@ import os
 import sys
 from collections.abc import Generator
 from pathlib import Path
-from typing import BinaryIO, NoReturn, Self
-
-from tqdm import tqdm
+from typing import TYPE_CHECKING, BinaryIO, NoReturn, Self
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.store.whole_files import WholeFile
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 __all__ = ["ProgressBar", "choose_format", "destination", "writing"]
 
@@ -78,27 +80,19 @@ def destination(file: Path | None, folder: Path | None = None) -> Generator[Bina
 
 
 def _complete(name: Path, file: Path, folder: Path | None) -> Generator[BinaryIO]:
-    beside = (folder or file.parent) / f".{file.name}.{os.getpid()}.tmp"
+    whole = WholeFile(file, folder)
     try:
         with writing(name):
             if file.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             if folder is not None:
                 folder.mkdir(exist_ok=True)
-            sink = beside.open("wb")
-        try:
-            yield sink
-            with writing(name):
-                sink.flush()
-                os.fsync(sink.fileno())
-        finally:
-            with writing(name):
-                sink.close()
+            sink = whole.open()
+        yield sink
         with writing(name):
-            beside.replace(file)
+            whole.finish()
     finally:
-        with contextlib.suppress(OSError):
-            beside.unlink()
+        whole.abandon()
 
 
 class ProgressBar:
@@ -111,24 +105,26 @@ class ProgressBar:
             total: Frames in all, if known.
             quiet: Whether to be silent anyway.
         """
-        # tqdm takes None for: only on a terminal
-        disable = True if quiet else None
-        self._bar: tqdm[NoReturn] = tqdm(
-            total=total, unit=" frames", unit_scale=True, leave=False, file=sys.stderr, disable=disable
-        )
+        self._bar: tqdm[NoReturn] | None = None
+        if not quiet and sys.stderr.isatty():
+            from tqdm import tqdm  # noqa: PLC0415 - slow to load, and most runs have no terminal
+
+            self._bar = tqdm(total=total, unit=" frames", unit_scale=True, leave=False, file=sys.stderr)
 
     def advance(self, frames: int) -> None:
         """So many frames more are done."""
-        self._bar.update(frames)
+        if self._bar is not None:
+            self._bar.update(frames)
 
     def reach(self, frames: int, total: int) -> None:
         """So many frames are done of a total."""
-        self._bar.total = total
-        self._bar.update(frames - self._bar.n)
+        if self._bar is not None:
+            self._bar.total = total
+            self._bar.update(frames - self._bar.n)
 
     def aside(self) -> contextlib.AbstractContextManager[None]:
         """Takes the bar away while results are written to the same terminal."""
-        return tqdm.external_write_mode(file=sys.stdout)
+        return contextlib.nullcontext() if self._bar is None else self._bar.external_write_mode(file=sys.stdout)
 
     def __enter__(self) -> Self:
         """Return the bar itself."""
@@ -136,4 +132,5 @@ class ProgressBar:
 
     def __exit__(self, *_: object) -> None:
         """Take the bar away."""
-        self._bar.close()
+        if self._bar is not None:
+            self._bar.close()

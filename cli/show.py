@@ -27,6 +27,7 @@ from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
+from .sources import SENSORS, sensor_root
 
 __all__ = ["show"]
 
@@ -92,8 +93,9 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     help="Metres from the ego to the edges of the picture.  [default: so that every role is seen]",
 )
 @click.option("--width", metavar="PX", type=click.IntRange(50, 10_000), default=900, help="Width in pixels.")
+@SENSORS
 def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None, half: float | None,
-         width: int, **given: Any) -> None:  # fmt: skip
+         width: int, sensors: Path | None, **given: Any) -> None:  # fmt: skip
     """Draw one frame from above: map, boxes, and what a scenario says of it.
 
     The picture is drawn to scale with north up; the ego is in its middle.
@@ -108,7 +110,8 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
             data = png(picture)
         case ".html":
             beside = Path() if file is None else file.absolute().parent
-            files = SensorFiles(roots_of(opened), beside, beside, can_make_thumbnails(), inside=True)
+            roots = roots_of(opened, sensor_root(opened, sensors))
+            files = SensorFiles(roots, beside, beside, can_make_thumbnails(), inside=True)
             data = frame_page(shot, picture, files.find(shot.label.sensors)).encode()
         case _:
             data = picture.encode()

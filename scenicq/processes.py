@@ -16,6 +16,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, field
 from itertools import islice
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from types import TracebackType
@@ -23,7 +24,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from scenicq.errors import DataError, Diagnostic
 
-__all__ = ["Lost", "Work", "Workers"]
+__all__ = ["Lost", "Work", "Workers", "as_many_as_pay", "processors"]
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -33,6 +34,8 @@ Work = Callable[[Task, Callable[[Any], None]], Answer]
 
 _STARTS = 3
 """Processes in a row that may end before they have started."""
+_AT_MOST = 8
+"""Processes where nobody says how many: each may take some 300 MB."""
 _END_S = 2.0
 """Seconds that a worker has to end by itself."""
 
@@ -102,17 +105,21 @@ class Workers(Generic[Task, Answer]):
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """End all processes; at once where the block failed."""
-        workers, self._workers = self._workers, []
-        for worker in workers:
-            if kind is None and worker.piece is None:
-                with contextlib.suppress(OSError):
-                    worker.connection.send(None)
-            else:
-                worker.process.kill()
-        for worker in workers:
-            worker.process.join(_END_S)
-            _end(worker)
+        """End all processes; at once where the block failed, or where an interrupt comes while they end."""
+        try:
+            for worker in self._workers:
+                if kind is None and worker.piece is None:
+                    with contextlib.suppress(OSError):
+                        worker.connection.send(None)
+                else:
+                    worker.process.kill()
+            for worker in self._workers:
+                worker.process.join(_END_S)
+        finally:
+            # one that were left would be waited for, for ever, when this process ends
+            with _uninterrupted() if self._workers else contextlib.nullcontext():
+                while self._workers:
+                    _end(self._workers.pop())
 
     def run(
         self, tasks: Iterable[Task], told: Callable[[Any], None] | None = None, *, tries: int = 3
@@ -172,9 +179,10 @@ class Workers(Generic[Task, Answer]):
         context = multiprocessing.get_context("spawn")
         mine, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs, *self._call), daemon=False)
-        process.start()
-        theirs.close()  # so that the end of the process is the end of the pipe
-        self._workers.append(_Worker(process, mine))
+        with _uninterrupted():
+            process.start()
+            theirs.close()  # so that the end of the process is the end of the pipe
+            self._workers.append(_Worker(process, mine))
         return self._workers[-1]
 
     def _listen(self) -> None:
@@ -216,6 +224,28 @@ class Workers(Generic[Task, Answer]):
             self._waiting.appendleft(piece)
 
 
+@contextlib.contextmanager
+def _uninterrupted() -> Generator[None]:
+    """Hold interrupts back: in this process until the block ends, in one that is started there until it is ready.
+
+    Else one that comes while a worker is still importing modules would make it tell of that.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # whose start would let interrupts through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _interrupts())
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _interrupts() -> set[signal.Signals]:
+    """What a caller may take for an interrupt."""
+    return {signal.SIGINT, signal.SIGTERM, signal.SIGALRM}
+
+
 def _end(worker: _Worker) -> None:
     worker.process.kill()
     worker.process.join()
@@ -226,6 +256,8 @@ def _end(worker: _Worker) -> None:
 def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]], setup: tuple[Any, ...]) -> None:
     """The life of a worker."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _interrupts())
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
@@ -246,6 +278,16 @@ def _end_with(sentinel: int) -> None:
     """A parent that is killed says nothing."""
     wait([sentinel])
     os._exit(1)
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def as_many_as_pay() -> int:
+    """How many processes to use where nobody says how many."""
+    return min(processors(), _AT_MOST)
 
 
 def _portable(error: Exception) -> Exception:

@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -10,6 +10,7 @@ from click.testing import CliRunner, Result
 
 from scenicq.importers.ingest import ingest
 from scenicq_cli.main import cli
+from scenicq_cli.sources import remember
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "sample_data"
@@ -17,6 +18,14 @@ SAMPLES = ROOT / "sample_data"
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write golden files instead of comparing with them")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def home_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What the command line remembers between runs is not the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield
 
 
 @pytest.fixture
@@ -42,10 +51,11 @@ def scenarios() -> Path:
 
 
 @pytest.fixture(scope="session")
-def crossroads(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The dataset made from the sample recordings; only to be read."""
+def crossroads(tmp_path_factory: pytest.TempPathFactory, home_of_its_own: None) -> Path:
+    """The dataset that the command line makes from the sample recordings; only to be read."""
     target = tmp_path_factory.mktemp("datasets") / "crossroads"
     ingest(SAMPLES / "crossroads", target)
+    remember(target, SAMPLES / "crossroads")
     return target
 
 

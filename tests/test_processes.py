@@ -71,6 +71,24 @@ def test_answers_come_in_order(count):
     assert multiprocessing.active_children() == []
 
 
+@pytest.mark.parametrize("where", ["send", "join"])
+def test_an_interrupt_while_processes_end_leaves_none(monkeypatch, where):
+    def interrupted(*_):
+        monkeypatch.undo()
+        raise KeyboardInterrupt
+
+    owner = "connection.Connection" if where == "send" else "context.SpawnProcess"
+
+    def work():
+        with Workers(2, squares, (0,)) as workers:
+            assert len(list(workers.run(range(8)))) == 8
+            monkeypatch.setattr(f"multiprocessing.{owner}.{where}", interrupted)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert multiprocessing.active_children() == []
+
+
 def test_tasks_are_taken_when_there_is_room():
     taken = []
     with Workers(2, squares, (0,)) as workers:

@@ -14,7 +14,7 @@ from typing import Any, cast
 from shapely.geometry import LineString
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_random
+from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_flat, is_random
 from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import property_node, to_heading, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING, names_of, of_element, of_network
@@ -25,7 +25,8 @@ from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Modul
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Constant, Node, PointIn
+from scenicq.forest.nodes import ArithmeticOp, Constant, Node, PointIn
+from scenicq.forest.turns import one_turn
 from scenicq.geometry.angles import heading_of
 from scenicq.geometry.elements import Maneuver, NetworkElement
 from scenicq.geometry.network import Network
@@ -36,8 +37,8 @@ from scenicq.geometry.shapes import simple_parts
 __all__ = ["attribute", "corner", "part_of"]
 
 _PLAIN: dict[type, frozenset[str]] = {
-    str: frozenset("lower upper strip lstrip rstrip split startswith endswith replace title isdigit".split()),
-    list: frozenset("append extend insert pop remove index count reverse copy clear".split()),
+    str: frozenset("lower upper strip lstrip rstrip split startswith endswith replace title isdigit join".split()),
+    list: frozenset("append extend insert pop remove index count reverse copy clear sort".split()),
     dict: frozenset("get keys values items update pop setdefault copy".split()),
     set: frozenset("add discard remove union intersection difference update copy".split()),
     tuple: frozenset("index count".split()),
@@ -167,6 +168,12 @@ def _guarded(name: str, owner: ModelValue) -> Callable[..., ModelValue]:
             if any(map(is_random, [*args, *cast("list[ModelValue]", owner)])):
                 raise fail("random-branch", f"`{name}` cannot look for a random value", span, "random here")
             check_weight(span, owner, *args, compared=True)
+        if name == "sort" and ("key" in named or not is_flat(owner)):
+            raise fail("unsupported-construct", "`sort` of these values is not supported", span, "not plain values",
+                       ("write `items = sorted(items, key=...)`",))  # fmt: skip
+        if name == "join" and args and isinstance(args[0], list | tuple):
+            held = cast("list[ModelValue]", args[0])
+            _check_length(sum(len(owner) + len(each) for each in held if isinstance(each, str)), span)
         if isinstance(owner, dict | set) and name in _KEYED:
             args = (hashed(args[0], span), *args[1:]) if args else args
         if isinstance(owner, str) and name == "replace" and all(isinstance(arg, str) for arg in args[:2]):
@@ -203,7 +210,9 @@ _PLACES = {
 
 def _of_instance(run: Runner, value: Instance, name: str, span: Span) -> ModelValue:
     if name in value.properties:
-        return property_node(value, name, span)
+        found = property_node(value, name, span)
+        turned = name == "heading" and run.version == 3 and is_node(found)
+        return one_turn(cast(Node, found)) if turned else found
     if name in _PART_NAMES and value.index is not None:
         return part_of(_PART_NAMES[name], value, span)
     if value.cls.derives_from("DrivingObject"):
@@ -236,6 +245,9 @@ def _of_node(value: Node, name: str, span: Span) -> ModelValue:
             return build.coordinate(value, "xy".index(name), span)
         case "vector", "z":
             return 0.0
+        case "vector", "normalized":
+            one = build.arithmetic(ArithmeticOp.DIV, build.constant(1.0), build.norm(value, span), span=span)
+            return Builtin(name, lambda span: build.scale(value, one, span))
         case "vector", "norm":
             return Builtin(name, lambda span: build.norm(value, span))
         case "vector", "distanceTo":

@@ -19,6 +19,7 @@ from scenicq.compiler.choices import distribute, is_choice
 from scenicq.compiler.coerce import to_scalar, to_vector
 from scenicq.compiler.distributions import DISTRIBUTIONS
 from scenicq.compiler.region_functions import REGION_FUNCTIONS
+from scenicq.compiler.rounding import rounded, truncated
 from scenicq.compiler.values import Builtin, Choice, Delayed, Instance, ModelValue, ScenicClass, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -89,11 +90,27 @@ _OPS: dict[str, tuple[ArithmeticOp, Callable[..., float]]] = {
 }
 
 
+_KNOWN_MATH: dict[str, Callable[..., Any]] = {
+    "trunc": math.trunc, "copysign": math.copysign, "fmod": math.fmod, "log10": math.log10, "log2": math.log2,
+    "log1p": math.log1p, "gcd": math.gcd, "isclose": math.isclose, "isfinite": math.isfinite, "isinf": math.isinf,
+    "isnan": math.isnan, "sinh": math.sinh, "cosh": math.cosh, "tanh": math.tanh, "dist": math.dist,
+}  # fmt: skip
+"""Functions of known numbers only."""
+
+
+def _power(span: Span, base: ModelValue, exponent: ModelValue) -> ModelValue:
+    if is_random(base) or is_random(exponent):
+        return build.arithmetic(ArithmeticOp.POW, to_scalar(base, span), to_scalar(exponent, span), span=span)
+    return plain_binary("**", base, exponent, span)
+
+
 def mathematics() -> Mapping[str, ModelValue]:
     """The names of the module `math`, over known and random numbers alike."""
     names: dict[str, Any] = {name: Builtin(name, _scalar_function(*pair)) for name, pair in _OPS.items()}
     names["fabs"] = Builtin("fabs", _scalar_function(ArithmeticOp.ABS, cast("Callable[..., float]", abs)))
     names["hypot"] = Builtin("hypot", _hypot)
+    names["pow"] = Builtin("pow", lambda span, x, y: _power(span, float(x) if isinstance(x, int) else x, y))
+    names |= {name: _plain(name, function) for name, function in _KNOWN_MATH.items()}
     names["radians"] = Builtin("radians", lambda span, x: operators.degrees(x, span))
     names["degrees"] = Builtin(
         "degrees", lambda span, x: operators.binary("*", to_scalar(x, span), 180 / math.pi, span)
@@ -125,18 +142,34 @@ def _has_class(value: ModelValue, wanted: ModelValue, span: Span) -> bool:
     raise fail("wrong-type", "`isinstance` needs a class", span, f"this is {describe(wanted)}")
 
 
+_OF_NUMBERS = frozenset({"int", "float", "round"})
+_SHOWN = "choose between known strings with `Uniform(...)`"
+
+
+def _of_random(name: str, span: Span, value: ModelValue, digits: ModelValue = None, **named: ModelValue) -> ModelValue:
+    """`int`, `float` or `round` of a random number."""
+    digits = named.pop("ndigits", digits)
+    if named or (digits is not None and (name != "round" or not isinstance(digits, int) or abs(digits) > 15)):
+        raise fail("wrong-value", f"`{name}` of a random number cannot take this", span, "not a small known number")
+    number = to_scalar(value, span)
+    if name == "float":
+        return number
+    return truncated(number, span) if name == "int" else rounded(number, digits or 0, span)
+
+
 def _plain(name: str, function: Callable[..., Any]) -> Builtin:
     """A function of Python that only ever sees known values: each outcome of a random choice by itself."""
 
     def call(span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
         if any(map(is_choice, args)):
             return distribute(lambda *known: call(span, *known, **named), args, span, spread=is_choice)
-        if name == "float" and len(args) == 1 and is_node(args[0]):
-            return to_scalar(args[0], span)
+        if name in _OF_NUMBERS and args and is_node(args[0]) and is_random(args[0]):
+            return _of_random(name, span, *args, **named)
         for arg in args:
             if is_random(arg):
+                hint = _SHOWN if name == "str" else "use arithmetic, which works on random values too"
                 raise fail("random-branch", f"`{name}` cannot be applied to a random value", span, "random here",
-                           ("use arithmetic, which works on random values too",))  # fmt: skip
+                           (hint,))  # fmt: skip
         known = [arg.value if isinstance(arg, Constant) else arg for arg in args]
         try:
             return function(*known, **named)
@@ -250,6 +283,7 @@ def language_names() -> dict[str, ModelValue]:
         "sin": _scalar_function(*_OPS["sin"]),
         "cos": _scalar_function(*_OPS["cos"]),
         "hypot": _hypot,
+        "pow": _power,
     }
     names: dict[str, ModelValue] = {name: Builtin(name, call, known=name in _KNOWN) for name, call in own.items()}
     python: dict[str, Callable[..., Any]] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol, cast
 
-from scenicq.compiler.deviations import DEVIATIONS
+from scenicq.compiler.deviations import DEVIATIONS, IN_SPACE
 from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.values import Function, ModelValue, PropertyDefinition, ScenicClass, describe, fail
@@ -14,8 +14,6 @@ from scenicq.store.classes import is_class, is_subclass
 from scenicq.syntax import ast
 
 __all__ = ["bind_arguments", "define_class", "refuse_decorators"]
-
-_IN_SPACE = frozenset({"pitch", "roll", "orientation", "shape", "contactTolerance"})
 
 
 class _Definer(Runner, Protocol):
@@ -59,6 +57,7 @@ def define_class(run: _Definer, node: ast.ClassDef, scope: Environment) -> Sceni
         match line:
             case ast.PropertyDefault():
                 name = _property_name(run.version, line, scope)
+                _check_final(base, name, line.name_span)
                 needs = frozenset(_first_names(run.version, needed) for needed in _needs(line.value))
                 definitions[name] = PropertyDefinition(
                     name, line.value, lambda _: None, needs, line.modifiers, scope, scope.library, line.span
@@ -68,7 +67,11 @@ def define_class(run: _Definer, node: ast.ClassDef, scope: Environment) -> Sceni
             case ast.FunctionDef(name="__init__"):
                 raise fail("unsupported-construct", "a constructor is not supported", line.name_span, "runs Python",
                            ("give properties their defaults, as in `width: 2`",))  # fmt: skip
-            case ast.FunctionDef() | ast.Assign():
+            case ast.FunctionDef():
+                # a method does not see the names of its class
+                refuse_decorators(line.decorators)
+                inner.set(line.name, run.make_function(line.name, line.parameters, line.body, scope, line.span))
+            case ast.Assign():
                 run.run((line,), inner)
             case _:
                 raise fail("unsupported-construct", "this cannot stand in a class", line.span, "not a property line",
@@ -78,12 +81,20 @@ def define_class(run: _Definer, node: ast.ClassDef, scope: Environment) -> Sceni
     return ScenicClass(node.name, base, definitions, inner.names, node.name if own else base.category, node.span)
 
 
+def _check_final(base: ScenicClass, name: str, span: Span) -> None:
+    for ancestor in base.ancestry():
+        definition = ancestor.definitions.get(name)
+        if definition is not None and "final" in definition.modifiers:
+            raise fail("specifier-conflict", f"`{name}` is final in `{ancestor.name}`", span, "cannot be overridden",
+                       ("remove this line",))  # fmt: skip
+
+
 def _first_names(version: int, name: str) -> str:
     return FIRST_NAMES.get(name, name) if version == 1 else name
 
 
 def _property_name(version: int, line: ast.PropertyDefault, scope: Environment) -> str:
-    if line.name in _IN_SPACE:
+    if line.name in IN_SPACE:
         raise fail("unsupported-construct", f"`{line.name}` is not supported", line.name_span,
                    "labels are matched in 2D", ("state the heading",))  # fmt: skip
     if line.name == "heading" and version == 3:

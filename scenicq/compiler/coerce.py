@@ -14,6 +14,7 @@ from scenicq.errors import Span
 from scenicq.forest.build import constant, vector
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Constant, Feature, Kind, Node, Select, Undefined
+from scenicq.forest.turns import any_turn
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
 
@@ -133,7 +134,7 @@ def to_heading(value: ModelValue, span: Span | None) -> Node:
         return Select(value.index, tuple(to_heading(option, span) for option in value.options), span=span)
     if isinstance(value, Instance) or (is_node(value) and kind_of(cast(Node, value)) not in ("scalar", "boolean")):
         raise _need(value, "a heading", span)
-    return to_scalar(value, span)
+    return any_turn(to_scalar(value, span))
 
 
 def to_vector(value: ModelValue, span: Span | None) -> Node:

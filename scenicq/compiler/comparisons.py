@@ -15,7 +15,7 @@ from scenicq.compiler.coerce import kind_of_model
 from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import CompareOp, Index, Node, Select
+from scenicq.forest.nodes import CompareOp, Constant, Index, Node, Select
 from scenicq.geometry.elements import Maneuver, NetworkElement
 
 __all__ = ["binary", "compare", "iterate", "symbolic"]
@@ -120,11 +120,24 @@ def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> Mod
         return (left in right) == (op == "in")
     if isinstance(right, list | tuple | dict | set | range):
         items = list(cast("list[ModelValue]", right))
-        if is_random(left) or (not is_flat(items) and any(map(is_random, items))):
-            return negated(operators.combine("or", [compare("==", left, item, span) for item in items], span))
+        if _is_special(left) or (not is_flat(items) and any(map(_is_special, items))):
+            return negated(_any_equal(left, items, span))
         check_weight(span, left, right, compared=True)
         return (hashed(left, span) in right if isinstance(right, dict | set) else left in items) == (op == "in")
     raise fail("wrong-type", f"`{op}` needs a region or a list", span, f"this is {describe(right)}")
+
+
+def _is_special(value: ModelValue) -> bool:
+    """Whether Python's own `==` says nothing about a value."""
+    return is_random(value) or is_node(value)
+
+
+def _any_equal(left: ModelValue, items: list[ModelValue], span: Span) -> ModelValue:
+    compared = [compare("==", left, item, span) for item in items]
+    known = [each.value if isinstance(each, Constant) else each for each in compared]
+    if True in known or not any(map(is_random, known)):
+        return True in known
+    return operators.combine("or", known, span)
 
 
 def iterate(value: ModelValue, span: Span) -> list[ModelValue]:

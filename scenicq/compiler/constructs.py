@@ -115,7 +115,11 @@ def _measure(
         case ast.Implies():
             return lift(lambda a, b: operators.combine("or", [operators.combine("not", [a], span), b], span),
                         value(node.left), value(node.right))  # fmt: skip
-        case ast.Temporal() | ast.Until() | ast.InitialScenario():
+        case ast.InitialScenario():
+            # the scene that is matched is the initial one
+            run.dynamic("initial scenario", span)
+            return True
+        case ast.Temporal() | ast.Until():
             raise fail("unsupported-construct", f"`{span.text}` is not supported", span,
                        "does not describe one instant",
                        ("a scene is matched at one instant: state what holds then",))  # fmt: skip

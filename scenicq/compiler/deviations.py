@@ -12,10 +12,20 @@ from scenicq.compiler.values import ModelValue, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
 
-__all__ = ["DEVIATIONS", "deviation", "is_zero"]
+__all__ = ["DEVIATIONS", "IN_SPACE", "deviation", "is_zero", "leaves_the_plane"]
+
+IN_SPACE = frozenset({"pitch", "roll", "orientation", "shape", "contactTolerance"})
+"""Properties that a box in the plane does not have."""
 
 DEVIATIONS = {"positionStdDev": "positionStdDev", "orientationStdDev": "headingStdDev", "viewAngles": "viewAngle"}
 """Properties of Scenic 3 that hold one number an axis, and the name of the one that counts in the plane."""
+
+
+def leaves_the_plane(name: str, value: ModelValue) -> bool:
+    """Whether a property says what a box in the plane does not have: a tilt, a shape, a base beside its centre."""
+    if name == "baseOffset" and isinstance(value, tuple | list):
+        return not all(map(is_zero, cast(Sequence[ModelValue], value)[:2]))
+    return name in IN_SPACE and value != 0
 
 
 def deviation(name: str, value: ModelValue, span: Span | None) -> ModelValue:
@@ -24,8 +34,11 @@ def deviation(name: str, value: ModelValue, span: Span | None) -> ModelValue:
     Of `viewAngles` it is the first: the second one is the height of what is seen.
 
     Raises:
-        ScenarioError: unsupported-construct, for different deviations along the axes, or out of the plane.
+        ScenarioError: unsupported-construct, for different deviations along the axes, or out of the plane; wrong-type.
     """
+    if name == "viewAngles" and not isinstance(value, tuple | list):
+        raise fail("wrong-type", "`viewAngles` needs two angles", span, "one value",
+                   ("write `with viewAngle` for one angle",))  # fmt: skip
     if is_node(value) and isinstance(value, Constant) and isinstance(value.value, tuple):
         value = value.value
     if name in ("viewAngles", "viewAngle") and isinstance(value, tuple | list) and len(value) == 2:

@@ -74,19 +74,13 @@ def _weights(values: list[ModelValue], span: Span) -> list[float]:
 
 
 def _discrete(span: Span, options: ModelValue) -> ModelValue:
-    if not isinstance(options, dict):
-        raise fail("wrong-type", "`Discrete` needs a dictionary of options and weights", span,
-                   f"this is {describe(options)}", ("write `Discrete({option: weight, ...})`",))  # fmt: skip
-    table = cast("dict[ModelValue, ModelValue]", options)
-    return uniform(list(table), _weights(list(table.values()), span), span)
-
-
-def _options(span: Span, options: ModelValue) -> ModelValue:
     if isinstance(options, dict):
-        return _discrete(span, options)
-    if not isinstance(options, list | tuple):
-        raise fail("wrong-type", "`Options` needs a list or a dictionary", span, f"this is {describe(options)}")
-    return uniform(list(cast("list[ModelValue]", options)), None, span)
+        table = cast("dict[ModelValue, ModelValue]", options)
+        return uniform(list(table), _weights(list(table.values()), span), span)
+    if isinstance(options, list | tuple):
+        return uniform(list(cast("list[ModelValue]", options)), None, span)
+    raise fail("wrong-type", "a dictionary of options and weights is needed here", span,
+               f"this is {describe(options)}", ("write `Discrete({option: weight, ...})`",))  # fmt: skip
 
 
 def _range(span: Span, low: ModelValue, high: ModelValue) -> ModelValue:
@@ -168,10 +162,10 @@ DISTRIBUTIONS: dict[str, Callable[..., Any]] = {
     "DiscreteRange": _discrete_range,
     "Uniform": _uniform,
     "Discrete": _discrete,
-    "Options": _options,
+    "Options": _discrete,
     "VerifaiRange": _range,
     "VerifaiDiscreteRange": _discrete_range,
-    "VerifaiOptions": _options,
+    "VerifaiOptions": _discrete,
     "resample": _resample,
 }
 """What programs call the distributions: takes the place of the call and its arguments."""

@@ -44,7 +44,7 @@ class Budget:
         """Use up the steps of making or going through a value of so many items."""
         self.step(span, items // self.ITEMS_PER_STEP)
 
-    def step(self, span: Span, count: int = 1) -> None:
+    def step(self, span: Span | None, count: int = 1) -> None:
         """Use up steps."""
         self.steps -= count
         if self.steps < 0:
@@ -70,10 +70,12 @@ class Environment:
         names: The innermost names.
         parent: The enclosing environment.
         shared: Names that `global` or `nonlocal` takes from an enclosing environment.
+        own: Names that a function binds somewhere: unset before, whatever is around.
+        comprehension: Whether it is that of a comprehension, whose `:=` binds outside.
         library: Whether this is a library's rather than the user's text.
     """
 
-    __slots__ = ("library", "names", "parent", "shared")
+    __slots__ = ("comprehension", "library", "names", "own", "parent", "shared")
 
     def __init__(
         self,
@@ -82,11 +84,15 @@ class Environment:
         *,
         library: bool = False,
         user: bool = False,
+        own: frozenset[str] = frozenset(),
+        comprehension: bool = False,
     ) -> None:
         """Take the names and the enclosing environment; inside a library's, it is a library's unless the user's."""
         self.names = names
         self.parent = parent
         self.shared: dict[str, Environment] = {}
+        self.own = own
+        self.comprehension = comprehension
         self.library = not user and (library or (parent is not None and parent.library))
 
     @property
@@ -95,11 +101,21 @@ class Environment:
         around = self.parent
         return around is None or around.parent is None or (around.library and not self.library)
 
+    @property
+    def module(self) -> Environment:
+        """The environment of the file around."""
+        current = self
+        while not current.is_module and current.parent is not None:
+            current = current.parent
+        return current
+
     def find(self, name: str) -> Environment | None:
-        """The innermost environment that has a name."""
+        """The environment that a name's value is in, None if it has none."""
         current: Environment | None = self
         while current is not None and name not in current.names:
-            current = current.parent
+            if name in current.own:
+                return None
+            current = current.shared.get(name, current.parent)
         return current
 
     def get(self, name: str, span: Span) -> ModelValue:
@@ -117,6 +133,9 @@ class Environment:
         known: set[str] = set()
         current: Environment | None = self
         while current is not None:
+            if name in current.own:
+                raise fail("unknown-name", f"`{name}` is used before the function gives it a value", span,
+                           "has no value yet", (f"`global {name}` says that the program's own is meant",))  # fmt: skip
             known.update(current.names)
             current = current.parent
         close = get_close_matches(name, sorted(known), 1, 0.75)
@@ -157,6 +176,10 @@ class Runner(Protocol):
         """
         ...
 
+    def evaluate(self, node: ast.Expression, scope: Environment) -> ModelValue:
+        """The value of an expression."""
+        ...
+
     def call_function(
         self, function: Function, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span
     ) -> ModelValue:
@@ -180,6 +203,10 @@ class Runner(Protocol):
 
     def make_instance(self, node: ast.New, scope: Environment) -> Instance:
         """Make a point, oriented point or object."""
+        ...
+
+    def dynamic(self, kind: str, span: Span) -> None:
+        """Refuse what does not describe one instant, or note that it is ignored."""
         ...
 
     def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:

@@ -9,24 +9,25 @@ No Python is ever executed: every construct is interpreted here, and what is not
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, cast
+from collections.abc import Iterable, Mapping
+from typing import cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import LARGEST, hashed, is_random, plain_unary
-from scenicq.compiler.attributes import attribute, corner
-from scenicq.compiler.builtins import truth
-from scenicq.compiler.choices import each_existing, map_choice, regions_apart
-from scenicq.compiler.coerce import kind_of_model, to_vector
+from scenicq.compiler.arithmetic import hashed, plain_unary
+from scenicq.compiler.assignment import assign_around, go_through
+from scenicq.compiler.attributes import attribute
+from scenicq.compiler.choices import each_existing, map_choice
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
 from scenicq.compiler.constructs import construct
 from scenicq.compiler.distributions import interval
 from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
+from scenicq.compiler.items import items_of, length_of, subscript
+from scenicq.compiler.logic import condition, connected, inverted
 from scenicq.compiler.settled import decided, settled
+from scenicq.compiler.texts import formatted
 from scenicq.compiler.values import (
     Builtin,
     Choice,
-    Delayed,
     Function,
     Instance,
     ModelValue,
@@ -38,12 +39,9 @@ from scenicq.compiler.values import (
     lift,
 )
 from scenicq.errors import Span
-from scenicq.forest import build
-from scenicq.forest.nodes import Constant
-from scenicq.geometry.elements import NetworkElement
 from scenicq.syntax import ast
 
-__all__ = ["assign", "call", "evaluate"]
+__all__ = ["call", "evaluate"]
 
 
 class _Arguments:
@@ -63,7 +61,7 @@ def _arguments(run: Runner, items: tuple[ast.Argument, ...], scope: Environment)
             if isinstance(value, Choice) and len(items) == 1:
                 found.choice = value
             else:
-                found.positional += iterate(value, item.span)
+                found.positional += items_of(run, value, item.span)
         elif item.star == "**":
             if not isinstance(value, dict):
                 raise fail("wrong-type", "`**` needs a dictionary", item.span, f"this is {describe(value)}")
@@ -83,7 +81,7 @@ def call(
     if isinstance(function, Function):
         return run.call_function(function, args, named, span)
     if isinstance(function, Builtin):
-        run.budget.pay(sum(_length(value) for value in (function.owner, *args, *named.values())), span)
+        run.budget.pay(sum(length_of(value) for value in (function.owner, *args, *named.values())), span)
         run.budget.step(span, function.cost)
         if function.known:
             args = [settled(run, value) for value in args]
@@ -131,79 +129,6 @@ def _call_each(run: Runner, function: ModelValue, choice: Choice, span: Span) ->
     return each_existing(run, choice, now, span)
 
 
-def _length(value: ModelValue) -> int:
-    return len(cast("list[ModelValue]", value)) if isinstance(value, str | list | tuple | dict | set | range) else 0
-
-
-def _subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
-    value = value.names if isinstance(value, Module) and value.name == "globalParameters" else regions_apart(value)
-    if isinstance(value, Choice):
-        return each_existing(run, value, lambda option: _subscript(run, option, index, span), span)
-    if is_random(index) and isinstance(value, list | tuple):
-        raise fail("unsupported-construct", "a random index is not supported", span, "random here",
-                   ("use `Uniform(*list)` to pick one of the items",))  # fmt: skip
-    if kind_of_model(value) == "vector" and index in (0, 1):
-        return build.coordinate(to_vector(value, span), int(index), span)
-    if kind_of_model(value) == "region":
-        return corner(value, index, span)
-    if kind_of_model(value) == "field":
-        return operators.direction_at(value, index, span)
-    if isinstance(value, list | tuple | dict | str | range):
-        if isinstance(value, dict):
-            hashed(index, span)
-        try:
-            return cast(Any, value)[index]
-        except (IndexError, KeyError, TypeError, ValueError):
-            shown = f"`{index}`" if isinstance(index, int) or (isinstance(index, str) and len(index) <= 40) else "that"
-            ids = isinstance(value, dict) and any(isinstance(item, NetworkElement) for item in value.values())
-            hints = ("the identifiers are those of the dataset's map: choose an element by what it is like",)
-            raise fail("map-lacks" if ids else "runtime-error", f"the map has no element {shown}" if ids else
-                       f"there is no item {shown}", span, "not found", hints if ids else ()) from None  # fmt: skip
-    raise fail("wrong-type", f"{describe(value)} has no items", span, "indexed here")
-
-
-def _comprehension(
-    run: Runner, clauses: tuple[ast.Clause, ...], scope: Environment, visit: Callable[[Environment], None]
-) -> None:
-    if not clauses:
-        visit(scope)
-        return
-    clause = clauses[0]
-    for item in iterate(evaluate(run, clause.iterable, scope), clause.iterable.span):
-        run.budget.step(clause.span)
-        inner = Environment({}, scope)
-        assign(run, clause.target, item, inner)
-        if all(decided(run, evaluate(run, test, inner), test.span) for test in clause.conditions):
-            _comprehension(run, clauses[1:], inner, visit)
-
-
-def assign(run: Runner, target: ast.Expression, value: ModelValue, scope: Environment) -> None:
-    """Give a name, an item or several names a value."""
-    match target:
-        case ast.Name():
-            run.name_value(target.id, value, scope, target.span)
-        case ast.Tuple() | ast.List():
-            items = iterate(value, target.span)
-            if len(items) != len(target.items) or any(isinstance(item, ast.Starred) for item in target.items):
-                raise fail("wrong-value", f"{len(items)} values for {len(target.items)} names", target.span)
-            for part, item in zip(target.items, items, strict=True):
-                assign(run, part, item, scope)
-        case ast.Subscript():
-            holder = evaluate(run, target.value, scope)
-            if not isinstance(holder, list | dict):
-                raise fail("wrong-type", f"an item of {describe(holder)} cannot be set", target.span)
-            index = evaluate(run, target.index, scope)
-            try:
-                cast(Any, holder)[hashed(index, target.span) if isinstance(holder, dict) else index] = value
-            except (IndexError, TypeError):
-                raise fail("runtime-error", "there is no item with this index", target.span) from None
-        case ast.Slice() | ast.Starred():
-            raise fail("unsupported-construct", "this cannot be assigned to", target.span, "not a name")
-        case _:
-            raise fail("unsupported-construct", "this cannot be assigned to", target.span, "not a name",
-                       ("give objects their properties with `with`",))  # fmt: skip
-
-
 def _tuple(run: Runner, node: ast.Tuple, scope: Environment) -> ModelValue:
     items = _items(run, node.items, scope)
     if run.version == 1 and not scope.library and len(items) == 2 and node.span.text.startswith("("):
@@ -215,34 +140,18 @@ def _items(run: Runner, nodes: Iterable[ast.Expression], scope: Environment) -> 
     items: list[ModelValue] = []
     for node in nodes:
         value = evaluate(run, node.value if isinstance(node, ast.Starred) else node, scope)
-        items += iterate(value, node.span) if isinstance(node, ast.Starred) else [value]
+        items += items_of(run, value, node.span) if isinstance(node, ast.Starred) else [value]
     return items
-
-
-def _formatted(run: Runner, node: ast.FormattedString, scope: Environment) -> str:
-    text: list[str] = []
-    for part in node.parts:
-        if isinstance(part, ast.Constant):
-            text.append(str(part.value))
-            continue
-        value = settled(run, evaluate(run, part.value, scope))
-        value = value.value if isinstance(value, Constant) else value
-        if not isinstance(value, str | int | float | bool) or part.format is not None:
-            raise fail("unsupported-construct", "only known numbers and strings can be put in a string", part.span,
-                       f"this is {describe(value)}" if part.format is None else "a format")  # fmt: skip
-        text.append(repr(value) if part.conversion == "r" else str(value))
-        run.budget.pay(len(text[-1]), node.span)
-    if sum(map(len, text)) > LARGEST:
-        raise fail("budget-exceeded", f"a string grows beyond {LARGEST:,} characters", node.span, "grows here")
-    return "".join(text)
 
 
 def _compare_chain(run: Runner, node: ast.Compare, scope: Environment) -> ModelValue:
     left = evaluate(run, node.left, scope)
     results: list[ModelValue] = []
     for comparison in node.comparisons:
+        if results and results[-1] is False:
+            return False
         right = evaluate(run, comparison.right, scope)
-        run.budget.pay(_length(left) + _length(right), node.span)
+        run.budget.pay(length_of(left) + length_of(right), node.span)
         results.append(lift(lambda a, b, op=comparison.operator: compare(op, a, b, node.span), left, right))
         left = right
     if len(results) == 1:
@@ -254,26 +163,11 @@ def _all(values: list[ModelValue], span: Span) -> ModelValue:
     return operators.combine("and", values, span) if any(map(symbolic, values)) else all(values)
 
 
-def _boolean(run: Runner, node: ast.BoolOp, scope: Environment) -> ModelValue:
-    decisive = node.operator == "or"
-    pending: list[ModelValue] = []
-    value: ModelValue = None
-    for part in node.values:
-        value = evaluate(run, part, scope)
-        if isinstance(value, Delayed):
-            raise fail("wrong-type", "this needs the object's position, which is not known here", part.span)
-        if is_random(value):
-            pending.append(value)
-        elif bool(value.value if isinstance(value, Constant) else value) == decisive:
-            return value
-    return operators.combine(node.operator, pending, node.span) if pending else value
-
-
 def _unary(op: str, value: ModelValue, span: Span) -> ModelValue:
     if isinstance(value, Choice):
         return map_choice(value, lambda option: _unary(op, option, span), span)
     if op == "not":
-        return operators.combine("not", [value], span) if is_random(value) else not truth(value, span)
+        return inverted(value, span)
     if is_node(value):
         return operators.negate(value, span) if op == "-" else value
     return plain_unary(op, value, span)
@@ -293,7 +187,7 @@ def evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelValu
     run.budget.step(node.span)
     value = _evaluate(run, node, scope)
     if isinstance(node, _MAKERS):
-        run.budget.pay(_length(value), node.span)
+        run.budget.pay(length_of(value), node.span)
     return value
 
 
@@ -326,9 +220,9 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
         case ast.Compare():
             return _compare_chain(run, node, scope)
         case ast.BoolOp():
-            return _boolean(run, node, scope)
+            return connected(run, node, scope)
         case ast.IfElse():
-            chosen = node.then if decided(run, evaluate(run, node.test, scope), node.test.span) else node.otherwise
+            chosen = node.then if decided(run, condition(run, node.test, scope), node.test.span) else node.otherwise
             return evaluate(run, chosen, scope)
         case ast.Tuple():
             return _tuple(run, node, scope)
@@ -343,13 +237,13 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             if isinstance(node.index, ast.Slice):
                 parts = (node.index.lower, node.index.upper, node.index.step)
                 ends = [None if part is None else evaluate(run, part, scope) for part in parts]
-                return _subscript(run, value, slice(*ends), span)
-            return _subscript(run, value, evaluate(run, node.index, scope), span)
+                return subscript(run, value, slice(*ends), span)
+            return subscript(run, value, evaluate(run, node.index, scope), span)
         case ast.Lambda():
             return run.make_function("<lambda>", node.parameters, node.body, scope, span)
         case ast.Comprehension():
             items: list[ModelValue] = []
-            _comprehension(run, node.clauses, scope, lambda inner: items.append(evaluate(run, node.element, inner)))
+            go_through(run, node.clauses, scope, lambda inner: items.append(evaluate(run, node.element, inner)))
             return {hashed(item, span) for item in items} if node.kind == "set" else items
         case ast.DictComprehension():
             table: dict[ModelValue, ModelValue] = {}
@@ -357,13 +251,13 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             def put(inner: Environment) -> None:
                 table[hashed(evaluate(run, node.key, inner), span)] = evaluate(run, node.value, inner)
 
-            _comprehension(run, node.clauses, scope, put)
+            go_through(run, node.clauses, scope, put)
             return table
         case ast.FormattedString():
-            return _formatted(run, node, scope)
+            return formatted(run, node, scope)
         case ast.Walrus():
             value = evaluate(run, node.value, scope)
-            assign(run, node.target, value, scope)
+            assign_around(run, node.target, value, scope)
             return value
         case ast.Slice() | ast.Starred() | ast.UnsupportedExpression():
             raise fail("unsupported-construct", f"`{span.text.split()[0]}` is not supported here", span)
@@ -374,7 +268,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
 def _attribute(run: Runner, value: ModelValue, node: ast.Attribute) -> ModelValue:
     name = FIRST_NAMES.get(node.name, node.name) if run.version == 1 and isinstance(value, Instance) else node.name
     found = attribute(run, value, name, node.name_span)
-    if isinstance(found, Function) and isinstance(value, Instance):
+    if isinstance(found, Function) and isinstance(value, Instance) and name not in value.properties:
         method = found
 
         def call_method(span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:

@@ -13,18 +13,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, assert_never, cast
 
-from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import plain_binary
+from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
-from scenicq.compiler.coerce import to_boolean, to_region, to_scalar
-from scenicq.compiler.comparisons import iterate
-from scenicq.compiler.deviations import deviation
+from scenicq.compiler.coerce import to_region, to_scalar
+from scenicq.compiler.comparisons import binary, iterate
+from scenicq.compiler.deviations import deviation, leaves_the_plane
 from scenicq.compiler.environment import Budget, Environment
 from scenicq.compiler.exclusions import Exclusions
-from scenicq.compiler.expressions import assign, evaluate
+from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.imports import import_into
+from scenicq.compiler.items import items_of
+from scenicq.compiler.logic import condition
 from scenicq.compiler.places import Lookups
 from scenicq.compiler.placing import Surroundings, bind
+from scenicq.compiler.requirements import Requirement, requirement
+from scenicq.compiler.scoping import own_names
 from scenicq.compiler.settled import decided
 from scenicq.compiler.specifiers import construct
 from scenicq.compiler.values import (
@@ -38,7 +41,6 @@ from scenicq.compiler.values import (
     ScenicClass,
     describe,
     fail,
-    is_node,
     lift,
 )
 from scenicq.errors import Diagnostic, ScenarioError, Span
@@ -48,7 +50,7 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
 from scenicq.syntax import ast
 
-__all__ = ["Interpreter", "Requirement"]
+__all__ = ["Interpreter"]
 
 
 _OBJECT_STEPS = 300
@@ -67,15 +69,6 @@ class _Return(Exception):
     def __init__(self, value: ModelValue) -> None:
         super().__init__()
         self.value = value
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Requirement:
-    """A `require` statement: its condition, or what computes it once the ego is known."""
-
-    condition: Callable[[], Node]
-    span: Span
-    probability: float = 1.0
 
 
 @dataclass(eq=False)
@@ -102,6 +95,7 @@ class Interpreter:
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
     workspace: Node = field(default_factory=lambda: build.constant(Everywhere()))
+    _bound: dict[int, tuple[object, frozenset[str]]] = field(default_factory=dict[int, Any])
 
     # --- what expressions ask for
 
@@ -134,6 +128,10 @@ class Interpreter:
                        (f"write `ego = new {value.name}`",) if bare else ())  # fmt: skip
         self.current_ego = value
 
+    def evaluate(self, node: ast.Expression, scope: Environment) -> ModelValue:
+        """The value of an expression; see `Runner`."""
+        return evaluate(self, node, scope)
+
     def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:
         """Require that a choice does not come out as one of some options; see `Runner`."""
         self.excluded.add(index, options, count, span)
@@ -146,7 +144,8 @@ class Interpreter:
         self, function: Function, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span
     ) -> ModelValue:
         """Call a function; see `Runner`."""
-        scope = Environment(bind_arguments(function, args, named, span), cast(Environment, function.environment))
+        given = bind_arguments(function, args, named, span)
+        scope = Environment(given, cast(Environment, function.environment), own=self._own_names(function))
         self.budget.enter(span)
         try:
             if not isinstance(function.body, tuple):
@@ -157,6 +156,15 @@ class Interpreter:
         finally:
             self.budget.leave()
         return None
+
+    def _own_names(self, function: Function) -> frozenset[str]:
+        """The names that a function binds; worked out once for each text of a function."""
+        if not isinstance(function.body, tuple):
+            return frozenset()
+        body = function.body
+        if id(body) not in self._bound:
+            self._bound[id(body)] = body, own_names(body)
+        return self._bound[id(body)][1]
 
     def make_function(
         self,
@@ -211,6 +219,9 @@ class Interpreter:
         value = evaluate(self, definition.default, scope)
         while isinstance(value, Delayed):
             value = value.evaluate(instance)
+        if leaves_the_plane(definition.name, value):
+            raise fail("unsupported-construct", f"this `{definition.name}` is not supported", definition.span,
+                       "labels are matched in 2D", ("leave it out",))  # fmt: skip
         spelled = "orientationStdDev" if definition.name == "headingStdDev" else definition.name
         return deviation(spelled, value, definition.span)
 
@@ -238,10 +249,12 @@ class Interpreter:
             case ast.If():
                 self._branch(node, scope)
             case ast.For():
-                self._loop(node, ((item,) for item in iterate(evaluate(self, node.iterable, scope), node.span)), scope)
+                self._loop(
+                    node, ((item,) for item in items_of(self, evaluate(self, node.iterable, scope), node.span)), scope
+                )
             case ast.While():
                 test = node.test
-                self._loop(node, iter(lambda: decided(self, evaluate(self, test, scope), test.span), False), scope)
+                self._loop(node, iter(lambda: decided(self, condition(self, test, scope), test.span), False), scope)
             case ast.Break():
                 raise _Break
             case ast.Continue():
@@ -261,11 +274,12 @@ class Interpreter:
                 for item in node.items:
                     self.params[item.name] = (evaluate(self, item.value, scope), item.span, scope.library)
             case ast.Require():
-                self._require(node, scope)
+                made = requirement(self, node, scope)
+                self.requirements += [made] if made is not None else []
             case ast.Mutate():
                 self._mutate(node, scope)
             case ast.Assert():
-                if not decided(self, evaluate(self, node.test, scope), node.test.span):
+                if not decided(self, condition(self, node.test, scope), node.test.span):
                     raise fail("runtime-error", "the assertion does not hold", node.span)
             case ast.Global() | ast.Nonlocal():
                 self._share(node, scope)
@@ -314,18 +328,20 @@ class Interpreter:
 
     def _augment(self, node: ast.AugmentedAssign, scope: Environment) -> None:
         old, new = evaluate(self, node.target, scope), evaluate(self, node.value, scope)
-        if node.operator == "+" and isinstance(old, list):
-            cast("list[ModelValue]", old).extend(iterate(new, node.span))
+        if node.operator == "+" and isinstance(old, list) and not isinstance(new, list):
+            new = iterate(new, node.span)
+        value = lift(lambda a, b: binary(node.operator, a, b, node.span), old, new)
+        if isinstance(old, list | set) and type(value) is type(old):
+            # other names of the same list or set see the change, as in Python
+            held = list(cast("list[ModelValue]", value))
+            old.clear()
+            old.extend(held) if isinstance(old, list) else old.update(held)
             return
-        if is_node(old) or is_node(new) or isinstance(old, Instance):
-            assign(self, node.target, operators.binary(node.operator, old, new, node.span), scope)
-            return
-        value = lift(lambda a, b: plain_binary(node.operator, a, b, node.span), old, new)
         assign(self, node.target, value, scope)
 
     def _branch(self, node: ast.If, scope: Environment) -> None:
         for branch in node.branches:
-            if decided(self, evaluate(self, branch.test, scope), branch.test.span):
+            if decided(self, condition(self, branch.test, scope), branch.test.span):
                 self.run(branch.body, scope)
                 return
         self.run(node.orelse, scope)
@@ -345,46 +361,13 @@ class Interpreter:
 
     def _share(self, node: ast.Global | ast.Nonlocal, scope: Environment) -> None:
         for name in node.names:
-            outer = scope.parent
-            while isinstance(node, ast.Global) and outer is not None and not outer.is_module:
-                outer = outer.parent
-            found = outer.find(name.id) if outer is not None else None
-            if found is None:
-                raise fail("unknown-name", f"`{name.id}` is not defined outside", name.span)
+            if isinstance(node, ast.Global):
+                scope.shared[name.id] = scope.module
+                continue
+            found = scope.parent.find(name.id) if scope.parent is not None else None
+            if found is None or found.is_module:
+                raise fail("unknown-name", f"`{name.id}` is not defined in a function around this one", name.span)
             scope.shared[name.id] = found
-
-    def _require(self, node: ast.Require, scope: Environment) -> None:
-        if node.probability is not None:
-            probability = evaluate(self, node.probability, scope)
-            if isinstance(probability, bool) or not isinstance(probability, int | float) or not 0 <= probability <= 1:
-                raise fail("wrong-value", "a probability must be a known number from 0 to 1", node.probability.span)
-        else:
-            probability = 1.0
-        wanted = node.condition
-        if isinstance(wanted, ast.Temporal | ast.Until):
-            self.dynamic(f"require {wanted.operator if isinstance(wanted, ast.Temporal) else 'until'}", wanted.span)
-            if not (isinstance(wanted, ast.Temporal) and wanted.operator == "always"):
-                return
-            wanted = wanted.operand
-        names: dict[str, ModelValue] = {}
-        current = scope
-        while current.parent is not None:
-            names = current.names | names
-            current = current.parent
-        self.budget.step(node.span, 20 + len(names))
-        frozen, ego = Environment(names, current), self.current_ego
-
-        def condition() -> Node:
-            # names and the ego are those of the moment of the statement
-            before, self.current_ego = self.current_ego, ego
-            value = evaluate(self, wanted, frozen)
-            self.current_ego = before
-            if isinstance(value, Delayed):
-                raise fail("wrong-type", "this needs the position of an object", wanted.span,
-                           "no object here", ("write `F at V`",))  # fmt: skip
-            return to_boolean(value, wanted.span)
-
-        self.requirements.append(Requirement(condition, node.span, float(probability)))
 
     def _mutate(self, node: ast.Mutate, scope: Environment) -> None:
         scale = 1 if node.scale is None else evaluate(self, node.scale, scope)

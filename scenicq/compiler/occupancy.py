@@ -113,6 +113,24 @@ class Occupancy:
                     return tuple(found)
         return (self.nothing,)
 
+    def near(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Pairs (box, number) that hold every option somewhere in each box, and few more; rows of `Bounds`, (n, 4)."""
+        areas = shapes.boxes(boxes)
+        owners: list[NDArray[np.intp]] = [np.arange(len(boxes), dtype=np.intp)]
+        numbers: list[NDArray[np.float64]] = [np.full(len(boxes), float(self.nothing))]
+        covered = np.zeros(len(boxes), dtype=bool)
+        for layer, tree in zip(self.layers, self._trees, strict=True):
+            owner, hit = shapes.tree_pairs_within(tree, areas, TOLERANCE)
+            owners.append(owner)
+            numbers.append(np.array([number for _, number, _ in layer], dtype=float)[hit])
+            covered[owner[shapes.covers_many(shapes.array([area for area, _, _ in layer])[hit], areas[owner])]] = True
+        owners[0], numbers[0] = owners[0][~covered], numbers[0][~covered]
+        both: NDArray[np.float64] = np.column_stack(
+            [np.concatenate(owners).astype(np.float64), np.concatenate(numbers)]
+        )
+        pairs = np.unique(both, axis=0)
+        return pairs[:, 0].astype(np.intp), pairs[:, 1]
+
     def pieces_near(self, bounds: Bounds) -> list[Piece]:
         """Convex pieces of all areas and their borders within a box, each once for each area that it belongs to."""
         box = _box(bounds)
@@ -135,6 +153,53 @@ class Occupancy:
             left = shapes.difference(box, shapes.union_all(near))
             self._outside[bounds] = [cell for part in shapes.polygonal_part(left) for cell in convex_parts(part)]
         return self._outside[bounds]
+
+    def found_in(self, parts: Sequence[Shape]) -> tuple[int, ...] | None:
+        """The numbers of the options that some point of an area has.
+
+        Args:
+            parts: The polygons of the area.
+
+        Returns:
+            The numbers in order, None where it cannot be told.
+        """
+        tree, found = STRtree(parts), set[int]()
+        for level, layer in enumerate(self.layers):
+            for area, number, _ in layer:
+                hits: list[int] = shapes.tree_within(tree, area, TOLERANCE).tolist()
+                near = [parts[hit] for hit in hits]
+                if near and number not in found:
+                    known = self._is_found(level, area, number, near)
+                    if known is None:
+                        return None
+                    found |= {number} if known else set()
+        if any(self._sticks_out(part) for part in parts):
+            found.add(self.nothing)
+        return tuple(sorted(found))
+
+    def _is_found(self, level: int, area: Shape, number: int, near: Sequence[Shape]) -> bool | None:
+        """Whether an area, or its border, is what counts at some point of others."""
+        before = [shape for tree in self._trees[:level] for shape in self._meeting((tree,), area)]
+        beside = self._meeting(self._trees, area)
+        empty = True
+        for part in near:
+            inside = shapes.difference(shapes.intersection(area, part), shapes.union_all(before))
+            border = shapes.difference(
+                shapes.intersection(shapes.band(area, TOLERANCE), part), shapes.union_all(beside)
+            )
+            for shape in (inside, border):
+                if shape.is_empty:
+                    continue
+                if number in self.at(*shapes.inner_point(shape)):
+                    return True
+                empty = False
+        return False if empty else None
+
+    def _sticks_out(self, part: Shape) -> bool:
+        near = [
+            wide for tree in self._wider_trees for wide in tree.geometries.take(shapes.tree_within(tree, part, 0.0))
+        ]
+        return not shapes.difference(part, shapes.union_all(near)).is_empty
 
     def _pieces_of(self, level: int, hit: int) -> list[Piece]:
         """The pieces of one area and of its border, the first those that lie in it."""
@@ -202,6 +267,11 @@ class Ranked:
         """The angle that stands for the option at a point."""
         found = self.options.at(x, y)
         return (found[self.rank % len(found)] / self.options.scale,)
+
+    def headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Pairs (box, angle) that hold the angle of every option somewhere in each box, and few more; boxes (n, 4)."""
+        owner, number = self.options.near(boxes)
+        return owner, number / self.options.scale
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every point with its option within the bounds."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import cast
 
 from scenicq.errors import Span
@@ -10,23 +11,31 @@ from scenicq.forest.nodes import (
     Constant,
     DirectionAt,
     Node,
+    Range,
     RegionDifference,
     RegionIntersection,
     RegionUnion,
     Select,
     Undefined,
 )
-from scenicq.geometry.regions import Region, orientation_of
+from scenicq.geometry.regions import PolygonSet, Region, orientation_of
 
 __all__ = ["orientation"]
 
 
 def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
-    """The preferred heading of a region at a point; None if it has none."""
+    """The preferred heading of a region at a point; None if it has none.
+
+    What lies in the areas of a map has a direction; where the map does not say which (sidewalks and crossings), it is
+    any.
+    """
     match region:
         case Constant():
             field = orientation_of(cast(Region, region.value))
-            return None if field is None else DirectionAt(build.constant(field, span), point, span=span)
+            if field is not None:
+                return DirectionAt(build.constant(field, span), point, span=span)
+            undirected = isinstance(region.value, PolygonSet) and region.value.ids
+            return _any_heading(span) if undirected else None
         case Select():
             return _chosen_orientation(region, point, span)
         case RegionIntersection() | RegionUnion():
@@ -36,6 +45,10 @@ def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
             return orientation(region.base, point, span)
         case _:
             return None
+
+
+def _any_heading(span: Span | None) -> Node:
+    return Range(build.constant(-math.pi, span), build.constant(math.pi, span), span=span)
 
 
 def _chosen_orientation(region: Select, point: Node, span: Span | None) -> Node | None:
@@ -49,6 +62,8 @@ def _chosen_orientation(region: Select, point: Node, span: Span | None) -> Node 
         if heading is None:
             return None
         found.append(heading)
+    if any(isinstance(heading, Range) for heading in found):
+        return _any_heading(span)
     known = [cast(DirectionAt, heading) for heading in found if heading is not None]
     if not known:
         return None

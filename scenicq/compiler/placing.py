@@ -13,7 +13,7 @@ from typing import assert_never, cast
 from scenicq.compiler import operators
 from scenicq.compiler.choices import holds_instances, make_choice
 from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to_scalar, to_vector
-from scenicq.compiler.deviations import DEVIATIONS, deviation
+from scenicq.compiler.deviations import DEVIATIONS, deviation, leaves_the_plane
 from scenicq.compiler.environment import FIRST_NAMES
 from scenicq.compiler.orientations import orientation
 from scenicq.compiler.specifiers import BoundSpecifier
@@ -307,19 +307,9 @@ def _bind_each(node: ast.Specifier, values: dict[int, ModelValue], around: Surro
     return BoundSpecifier(options[0].gives, optional, needs, chosen, node.span)
 
 
-_IN_SPACE = frozenset({"pitch", "roll", "orientation", "shape", "contactTolerance"})
-
-
-def _leaves_the_plane(name: str, value: ModelValue) -> bool:
-    """Whether a property says what a box in the plane does not have: a tilt, a shape, a base beside its centre."""
-    if name == "baseOffset" and isinstance(value, tuple | list):
-        return any(part != 0 for part in cast("tuple[ModelValue, ...]", tuple(value))[:2])
-    return name in _IN_SPACE and value != 0
-
-
 def _with(node: ast.WithSpecifier, value: ModelValue, around: Surroundings) -> BoundSpecifier:
     name = FIRST_NAMES.get(node.property, node.property) if around.version == 1 else node.property
-    if _leaves_the_plane(name, value):
+    if leaves_the_plane(name, value):
         raise fail("unsupported-construct", f"`with {name}` is not supported", node.span, "labels are matched in 2D",
                    ("state the heading with `facing`, the size with `width` and `length`",))  # fmt: skip
     own = DEVIATIONS.get(name, name)

@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import PurePosixPath
+from typing import cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.deviations import is_zero
 from scenicq.compiler.environment import Environment
+from scenicq.compiler.free_places import choose_elements
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.models import (
     default_library,
@@ -52,6 +54,7 @@ def compile_scenario(
     version: int | None = None,
     initial: bool = False,
     loader: Loader | None = None,
+    drawn: bool = False,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -61,6 +64,7 @@ def compile_scenario(
         version: 1, 2 or 3; inferred from the spelling if not given.
         initial: Ignore dynamic parts instead of refusing them.
         loader: Reads files that the program imports.
+        drawn: Whether scenes are to be drawn from it: it then keeps its probabilities, which matching does not need.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -74,7 +78,8 @@ def compile_scenario(
         names = {} if library is None else dict(world.load(library, 0, _start(source)).names)
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
-        return _scenario(run, module, chosen, network, _borrowed(module, scope, names, library))
+        scenario = _scenario(run, module, chosen, network, _borrowed(module, scope, names, library))
+        return scenario if drawn else simplify(choose_elements(scenario))
     except RecursionError:
         raise fail("budget-exceeded", "the program is nested too deeply", _start(source), "",
                    ("make expressions and calls flatter",)) from None  # fmt: skip
@@ -213,13 +218,12 @@ def _scenario(
         if value is not None and _is_feature(value)
     }
     assert ego.index is not None
-    scenario = Scenario(
+    return Scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
         tuple(Requirement(each.condition(), each.span, probability=each.probability) for each in soft),
         tuple(run.ignored), warnings,
     )  # fmt: skip
-    return simplify(scenario)
 
 
 def _names(objects: list[Instance]) -> list[str]:
@@ -258,6 +262,8 @@ def _object(instance: Instance, name: str) -> ScenarioObject:
             continue
         span = instance.spans.get(key) or instance.span
         node = _property(key, value, span)
+        if key in ("width", "length") and isinstance(node, Constant) and cast(float, node.value) <= 0:
+            raise fail("wrong-value", f"the {key} of an object must be positive", span, "not positive")
         if node is not None:
             properties[key] = Property(node, key in instance.explicit, span)
     if instance.mutation is not None:

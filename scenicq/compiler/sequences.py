@@ -12,11 +12,12 @@ from typing import Any
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random, plain_binary
-from scenicq.compiler.builtins import extreme, truth
+from scenicq.compiler.builtins import extreme, language_names, truth
 from scenicq.compiler.choices import map_choice
 from scenicq.compiler.comparisons import iterate
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.expressions import call
+from scenicq.compiler.items import components, is_vector
 from scenicq.compiler.settled import decided, settled
 from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail
 from scenicq.errors import Span
@@ -64,6 +65,7 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
     def quantified(op: str) -> Callable[..., ModelValue]:
         def decide(span: Span, items: ModelValue) -> ModelValue:
             values = iterate(items, span)
+            run.budget.step(span, len(values) // 2)
             known = [truth(value, span) for value in values if not is_random(value)]
             random = [value for value in values if is_random(value)]
             if (op == "or") in known:
@@ -88,7 +90,19 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
 
         return find
 
+    def unrolled(name: str) -> Callable[..., ModelValue]:
+        """A function of lists that takes a vector for its coordinates."""
+        plain: Builtin = language_names()[name]
+
+        def apply_to(span: Span, *args: ModelValue) -> ModelValue:
+            return plain.call(span, *(components(run, each, span) if is_vector(each) else each for each in args))
+
+        return apply_to
+
     functions: dict[str, Callable[..., Any]] = {
+        "len": unrolled("len"),
+        "list": unrolled("list"),
+        "tuple": unrolled("tuple"),
         "filter": filtered,
         "map": mapped,
         "sorted": ordered,

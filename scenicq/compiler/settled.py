@@ -14,8 +14,8 @@ from scenicq.compiler.values import ModelValue, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.condition import condition
-from scenicq.forest.nodes import Constant, Node, Value
-from scenicq.forest.walk import features
+from scenicq.forest.nodes import Constant, Feature, Node, Value
+from scenicq.forest.walk import features, postorder
 
 __all__ = ["decided", "settled"]
 
@@ -24,8 +24,12 @@ def settled(run: Runner, value: ModelValue) -> ModelValue:
     """A value with known properties of objects put in, if that leaves nothing random; else the value itself."""
     if not is_node(value) or isinstance(value, Constant):
         return value
+    reached = list(postorder((value,)))
+    todo = list({(node.object, node.property): None for node in reached if isinstance(node, Feature)})
+    run.budget.step(value.span, len(reached) if todo else len(reached) // 4)
+    if not todo:
+        return value
     known = run.lookups.known
-    todo = list(features(value))
     waiting: set[tuple[int, str]] = set()
     while todo:
         key = todo[-1]

@@ -35,7 +35,7 @@ _NAMES: dict[str, tuple[str, str]] = {
         "out of a scenario's reach",
         "scenarios are data: they reach neither files nor the Python interpreter",
     ),
-    "pow divmod iter next slice ord chr bin hex oct ascii repr format bytes bytearray complex property staticmethod "
+    "divmod iter next slice ord chr bin hex oct ascii repr format bytes bytearray complex property staticmethod "
     "classmethod": (
         "not part of the Python subset",
         "write what the scene needs with arithmetic, lists and functions",

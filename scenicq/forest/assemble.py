@@ -26,6 +26,7 @@ from scenicq.forest.nodes import (
     Normal,
 )
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
+from scenicq.forest.turns import one_turn
 from scenicq.forest.walk import children, features, postorder, transform
 
 __all__ = ["Assembled", "Check", "assemble"]
@@ -174,7 +175,11 @@ def _step(node: Node, definitions: Mapping[Key, Node]) -> Node:
 
 def _plain(scenario: Scenario, definitions: _Definitions) -> dict[Key, Node]:
     """The expression of each property, without noise; those that others refer to come first."""
-    given = {(thing.index, name): each.value for thing in scenario.objects for name, each in thing.properties.items()}
+    given = {
+        (thing.index, name): one_turn(each.value) if name == "heading" and scenario.version == 3 else each.value
+        for thing in scenario.objects
+        for name, each in thing.properties.items()
+    }
     found = definitions.found
     todo = list(reversed(given))
     while todo:

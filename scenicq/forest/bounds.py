@@ -111,6 +111,9 @@ def _arithmetic(op: ArithmeticOp, args: list[Interval]) -> Interval:
             return (min(a[0] for a in args), min(a[1] for a in args))
         case ArithmeticOp.MAX:
             return (max(a[0] for a in args), max(a[1] for a in args))
+        case ArithmeticOp.FLOOR | ArithmeticOp.CEIL:
+            below, above = 1.0 * (op is ArithmeticOp.FLOOR), 1.0 * (op is ArithmeticOp.CEIL)
+            return (first[0] - below, first[1] + above)
         case ArithmeticOp.SQRT:
             return (math.sqrt(max(0.0, first[0])), math.sqrt(max(0.0, first[1])))
         case ArithmeticOp.SIN | ArithmeticOp.COS:

@@ -12,8 +12,6 @@ import operator
 from collections.abc import Callable
 from typing import cast
 
-import shapely
-
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
@@ -49,18 +47,14 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children, is_leaf
 from scenicq.geometry.angles import heading_of, normalize, rotate
 from scenicq.geometry.boxes import box_polygon
+from scenicq.geometry.covering import covers, overlaps
 from scenicq.geometry.fields import VectorField
-from scenicq.geometry.meeting import meets
 from scenicq.geometry.membership import contains, distance
 from scenicq.geometry.regions import (
     Disc,
-    Everywhere,
-    IntersectionOf,
-    PolygonSet,
     Rectangle,
     Region,
     Sector,
-    UnionOf,
     difference,
     intersection,
     union,
@@ -152,54 +146,19 @@ def _logic(op: LogicOp, args: tuple[Value, ...]) -> Value:
 
 
 def _intersects(left: Region, right: Region) -> bool:
-    for one, other in ((left, right), (right, left)):
-        match one:
-            case Rectangle():
-                shape = box_polygon(*one.center, one.heading, one.width, one.length)
-                answer = meets(other, shape)
-            case Disc():
-                answer = meets(other, shapely.Point(one.center), one.radius)
-            case PolygonSet():
-                answers = [meets(other, polygon) for polygon in one.polygons]
-                answer = True if True in answers else None if None in answers else False
-            case _:
-                continue
-        if answer is not None:
-            return answer
-    raise CannotEvaluate(f"whether a {type(left).__name__} and a {type(right).__name__} intersect")
+    answer = overlaps(left, right)
+    if answer is None:
+        raise CannotEvaluate(f"whether a {type(left).__name__} and a {type(right).__name__} intersect")
+    return answer
 
 
 def _encloses(outer: Region, inner: Region) -> bool:
     if not isinstance(inner, Rectangle):
         raise CannotEvaluate(f"whether a {type(inner).__name__} lies inside a region")
-    box = box_polygon(*inner.center, inner.heading, inner.width, inner.length)
-    return covers(outer, box)
-
-
-def covers(outer: Region, box: shapely.Polygon) -> bool:
-    """Whether a region holds all of a convex polygon (up to slivers of 1e-9 of its area).
-
-    Raises:
-        CannotEvaluate: For kinds of region where that is not decided.
-    """
-    match outer:
-        case PolygonSet():
-            near = [polygon for polygon in outer.polygons if polygon.intersects(box)]
-            return bool(box.difference(shapely.union_all(near)).area <= 1e-9 * box.area)
-        case Disc():
-            return all(math.dist(outer.center, corner) <= outer.radius for corner in box.exterior.coords)
-        case Rectangle():
-            frame = box_polygon(*outer.center, outer.heading, outer.width, outer.length)
-            return bool(box.difference(frame).area <= 1e-9 * box.area)
-        case IntersectionOf():
-            return all(covers(part, box) for part in outer.parts)
-        case UnionOf() if all(isinstance(part, PolygonSet) for part in outer.parts):
-            polygons = (polygon for part in outer.parts if isinstance(part, PolygonSet) for polygon in part.polygons)
-            return covers(PolygonSet(tuple(polygons), "union"), box)
-        case Everywhere():
-            return True
-        case _:
-            raise CannotEvaluate(f"whether a {type(outer).__name__} holds a box")
+    answer = covers(outer, box_polygon(*inner.center, inner.heading, inner.width, inner.length))
+    if answer is None:
+        raise CannotEvaluate(f"whether a {type(outer).__name__} holds a box")
+    return answer
 
 
 def directions(field: Value, point: Value) -> tuple[float, ...] | Undefined:

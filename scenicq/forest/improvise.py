@@ -69,6 +69,8 @@ class Improviser:
         parts = assemble(scenario, enforce)
         self.checks = parts.checks
         self.rejected: Counter[int] = Counter()
+        self.undecided = ""
+        """What geometry could not tell last, so that a scene was given up."""
         self._keys, self._params = tuple(parts.values), tuple(parts.params)
         conditions = (check.condition for check in parts.checks)
         self._roots = (*conditions, *parts.values.values(), *parts.params.values())
@@ -115,7 +117,8 @@ class Improviser:
     def _step(self, place: int, values: list[Value], rng: random.Random) -> bool:
         try:
             return self._plan.tape.steps[place].run(values, rng)
-        except CannotEvaluate:
+        except CannotEvaluate as error:
+            self.undecided = str(error)
             return False
 
     def _blank(self) -> list[Value]:

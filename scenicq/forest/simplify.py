@@ -1,7 +1,8 @@
 """Rewriting a scenario into an equivalent one that is cheaper to match.
 
 A point in a region picked from a list is a point in the union of the list, if nothing else depends on the pick: the
-support is the same, and the union has a spatial index.
+support is the same, and the union has a spatial index. The probabilities are not: scenes are drawn from the program as
+it is.
 """
 
 from __future__ import annotations
@@ -11,16 +12,17 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import cast
 
-from scenicq.forest.nodes import Constant, Index, Node, PointIn, RegionUnion, Select
+from scenicq.forest.nodes import Constant, Index, Node, PointIn, RegionUnion, Select, Undefined
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import children, postorder, transform
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import PolygonSet, Region, union
 
-__all__ = ["simplify"]
+__all__ = ["rebuilt", "roots_of", "simplify"]
 
 
-def _roots(scenario: Scenario) -> list[Node]:
+def roots_of(scenario: Scenario) -> list[Node]:
+    """All expressions of a scenario."""
     found = [given.value for thing in scenario.objects for given in thing.properties.values()]
     found += [each.condition for each in (*scenario.requirements, *scenario.soft)]
     return [*found, *(p.value for p in scenario.params.values())]
@@ -36,9 +38,13 @@ def _merged(regions: list[Region]) -> Region:
     return PolygonSet(polygons, f"{len(sets)} regions", fields.pop(), tuple(i for region in sets for i in region.ids))
 
 
+def _is_undefined(node: Node) -> bool:
+    return isinstance(node, Constant) and isinstance(node.value, Undefined)
+
+
 def simplify(scenario: Scenario) -> Scenario:
     """The same scenario with simpler expressions; random variables keep their identity."""
-    roots = _roots(scenario)
+    roots = roots_of(scenario)
     uses = Counter(id(child) for node in postorder(roots) for child in set(children(node)))
     uses.update(id(root) for root in roots)
 
@@ -48,16 +54,21 @@ def simplify(scenario: Scenario) -> Scenario:
         pick = node.region
         if not isinstance(pick.index, Index) or uses[id(pick.index)] > 1 or uses[id(pick)] > 1:
             return node
-        if all(isinstance(option, Constant) for option in pick.options):
-            merged = _merged([cast(Region, cast(Constant, option).value) for option in pick.options])
+        # an option without a value, such as the lane where there is none, has no points
+        options = tuple(option for option in pick.options if not _is_undefined(option))
+        if not options:
+            return node
+        if all(isinstance(option, Constant) for option in options):
+            merged = _merged([cast(Region, cast(Constant, option).value) for option in options])
             return replace(node, region=Constant(merged, span=pick.span))
-        return replace(node, region=RegionUnion(pick.options, span=pick.span))
+        return replace(node, region=RegionUnion(options, span=pick.span))
 
     memo: dict[int, Node] = {}
-    return _rebuilt(scenario, lambda node: transform(node, step, memo))
+    return rebuilt(scenario, lambda node: transform(node, step, memo))
 
 
-def _rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
+def rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
+    """The scenario with each of its expressions changed."""
     objects = tuple(
         replace(thing, properties={name: replace(p, value=change(p.value)) for name, p in thing.properties.items()})
         for thing in scenario.objects

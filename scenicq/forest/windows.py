@@ -18,7 +18,7 @@ from typing import cast
 
 import numpy as np
 
-from scenicq.forest.bounds import Interval, scalar_bounds, vector_bounds
+from scenicq.forest.bounds import Box, Interval, scalar_bounds, vector_bounds
 from scenicq.forest.nodes import (
     Compare,
     CompareOp,
@@ -27,6 +27,8 @@ from scenicq.forest.nodes import (
     DiscAt,
     Identity,
     Intersects,
+    Logic,
+    LogicOp,
     Node,
     Norm,
     PointIn,
@@ -42,7 +44,7 @@ from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.geometry.sampling import sampler
 from scenicq.geometry.shapes import Coordinates
 
-__all__ = ["Window", "close_points"]
+__all__ = ["Window", "close_boxes", "close_points"]
 
 Vector = tuple[float, float]
 
@@ -204,6 +206,16 @@ def _all_close(conditions: Iterable[Node], order: Mapping[Identity, int]) -> Ite
                         yield leaf.identity, center, distance + away
 
 
+def close_boxes(condition: Node) -> Iterator[tuple[Node, Box]]:
+    """Points that a condition holds close to a known place, each with a box around that place."""
+    for part in condition.args if isinstance(condition, Logic) and condition.op is LogicOp.AND else (condition,):
+        for one, other, away in _distances(part):
+            for point, center in ((one, other), (other, one)):
+                if isinstance(center, Constant) and not isinstance(point, Constant) and math.isfinite(away):
+                    x, y = cast("tuple[float, float]", center.value)
+                    yield point, ((x - away, x + away), (y - away, y + away))
+
+
 def _distances(node: Node) -> Iterator[tuple[Node, Node, float]]:
     """Pairs of points that a condition holds only within a distance of each other."""
     match node:
@@ -238,6 +250,9 @@ def _difference(node: Node) -> tuple[Node, Node] | None:
         for one, other in ((node.left, node.right), (node.right, node.left)):
             if isinstance(other, Scale) and isinstance(other.factor, Constant) and other.factor.value == -1.0:
                 return one, other.vector
+            if isinstance(other, Constant):
+                x, y = cast("tuple[float, float]", other.value)
+                return one, Constant((-x, -y), span=other.span)
     return None
 
 

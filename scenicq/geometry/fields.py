@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scenicq.geometry.guards import Guard, narrowed
 from scenicq.geometry.shapes import Bounds
 
-__all__ = ["ConstantField", "FieldCell", "VectorField"]
+__all__ = ["FieldCell", "VectorField"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,20 +66,10 @@ class VectorField(Protocol):
         """Convex cells that hold every (point, heading) of the field within the bounds."""
         ...
 
+    def headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Pairs (box, heading) that hold every heading somewhere in each box, and few more; box by box.
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ConstantField:
-    """The same heading everywhere."""
-
-    heading: float
-    name: str = "constant"
-
-    def values(self, x: float, y: float) -> tuple[float, ...]:
-        """The one heading."""
-        return (self.heading,)
-
-    def cells(self, bounds: Bounds) -> list[FieldCell]:
-        """The bounds as one cell."""
-        west, south, east, north = bounds
-        corners = np.array([(west, south), (east, south), (east, north), (west, north)])
-        return [FieldCell(corners, self.heading, exact=True)]
+        Args:
+            boxes: Rows of `Bounds`, (n, 4).
+        """
+        ...

@@ -34,6 +34,8 @@ _BESIDE = 0.01
 _CHUNK = 20_000
 _MARGIN = 0.01
 """Metres by which a box of cells is grown."""
+_DIGITS = 9
+"""Of a radian, to which headings are one."""
 _LARGEST, _SMALLEST = 16.0, 2.0
 """Metres: sides of the squares that cover the surroundings of lanes, at first and where they are no longer split."""
 
@@ -97,6 +99,16 @@ class RoadDirection:
             if len(headings) == 1:
                 agreement += dy * math.cos(headings[0]) - dx * math.sin(headings[0])
         return line if agreement >= 0 else line.reverse()
+
+    def headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Pairs (box, heading) that hold every heading somewhere in each of some boxes, see `VectorField`."""
+        found: list[tuple[NDArray[np.intp], NDArray[np.float64]]] = []
+        for start in range(0, len(boxes), _CHUNK):
+            owner, heading = self._headings(boxes[start : start + _CHUNK])
+            found.append((owner + start, heading))
+        if not found:
+            return np.empty(0, dtype=np.intp), np.empty(0)
+        return np.concatenate([owner for owner, _ in found]), np.concatenate([heading for _, heading in found])
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes stay whole."""
@@ -163,6 +175,36 @@ class RoadDirection:
         for index, heading in zip(point[pair[chosen]].tolist(), headings[segment[chosen]].tolist(), strict=True):
             found[index][heading] = None
         return [tuple(sorted(values)) for values in found]
+
+    def _headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        segments, headings, starts = self._all
+        middle = (boxes[:, :2] + boxes[:, 2:]) / 2
+        radius = np.hypot(*(boxes[:, 2:] - boxes[:, :2]).T) / 2 + _TIE
+        centers = shapes.points(middle)
+        # inside of a lane only those that reach in can count, elsewhere those that may be the nearest
+        inside = np.zeros(len(boxes), dtype=bool)
+        box, lane = shapes.tree_pairs_within(self._tree, centers, radius)
+        held = shapes.covers_many(self._areas[lane], shapes.boxes(boxes[box]))
+        inside[box[held]] = True
+        outer = np.nonzero(~inside)[0]
+        if len(outer):
+            reach = REACH + radius[outer]
+            far, other = shapes.tree_pairs_within(self._tree, centers[outer], reach)
+            away = shapes.distances(centers[outer][far], self._areas[other])
+            least = np.full(len(outer), np.inf)
+            np.minimum.at(least, far, away)
+            near = away <= least[far] + 2 * radius[outer][far] + _TIE
+            kept = inside[box]
+            box, lane = np.concatenate([box[kept], outer[far[near]]]), np.concatenate([lane[kept], other[near]])
+        counts = starts[lane + 1] - starts[lane]
+        pair = np.repeat(np.arange(len(lane)), counts)
+        segment = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[lane][pair]
+        gap = segment_distances(middle[box[pair]], segments[segment])
+        best = np.full(len(lane), np.inf)
+        np.minimum.at(best, pair, gap)
+        chosen = gap <= best[pair] + 2 * radius[box[pair]] + _TIE
+        found = np.unique(np.stack([box[pair[chosen]], np.round(headings[segment[chosen]], _DIGITS)]), axis=1)
+        return found[0].astype(np.intp), found[1]
 
     def _nearest_lanes(self, xy: Coordinates) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Pairs (point, lane) of the lanes within reach that are nearest, ties included."""

@@ -7,6 +7,7 @@ import random
 from bisect import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from itertools import accumulate
 from typing import assert_never, cast
 
@@ -32,12 +33,16 @@ from scenicq.geometry.regions import (
     UnionOf,
 )
 from scenicq.geometry.shapes import XY
+from scenicq.geometry.terms import Term, UndecidedError, terms
 
 __all__ = ["sample", "sampler"]
 
-_TRIES = 100_000
 _FEW = 32
 """Tries in a disc or sector before the polygons that it is intersected with are cut to it."""
+_SOME = 1_000
+"""Tries before the region is taken apart, which takes as long as hundreds of them, and finds the smallest rest."""
+_TRIES = 100_000
+"""Tries in the parts; what they miss is as good as empty."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +74,22 @@ def sampler(region: Region) -> Callable[[random.Random], XY]:
     if proposal is None:
         raise ValueError("empty")
 
+    def closer() -> _Proposal | None:
+        cut = _cut_to_window(region)
+        return proposal if cut is None else _filtered(cut, region)
+
+    ways = [(lambda: proposal, _FEW), (cache(closer), _SOME), (cache(lambda: _apart(region, proposal)), _TRIES)]
+
     def draw(rng: random.Random) -> XY:
-        point = _tried(proposal, rng, _FEW)
-        if point is None:
-            cut = _cut_to_window(region)
-            closer = proposal if cut is None else _filtered(cut, region)
-            point = None if closer is None else _tried(closer, rng, _TRIES)
-        if point is None:
-            raise ValueError("empty")
-        return point
+        while ways:
+            way, tries = ways[0]
+            found = way()
+            point = None if found is None else _tried(found, rng, tries)
+            if point is not None:
+                return point
+            # a way that failed once is not gone again
+            del ways[: len(ways) if found is None else 1]
+        raise ValueError("empty")
 
     return draw
 
@@ -97,6 +109,33 @@ def _cut_to_window(region: Region) -> Region | None:
     base = min(sets, key=_size)
     near = cast("list[Polygon]", base.near(bounds(smallest)))
     return _clipped(PolygonSet(tuple(near), base.name), region.parts)
+
+
+def _apart(region: Region, proposal: _Proposal) -> _Proposal | None:
+    """What draws from exactly the parts of a region, up to its arcs; None if it has none, else the way known so far."""
+    west, south, east, north = bounds(region)
+    if west > east or south > north:
+        return None
+    if proposal.dimension == 0 or not math.isfinite(east - west + north - south):
+        return proposal
+    try:
+        pieces = shapes.simple_parts([_straightened(term) for term in terms(region, (west, south, east, north))])
+    except UndecidedError:
+        return proposal
+    if proposal.dimension == 1:
+        lines = tuple(piece for piece in pieces if isinstance(piece, LineString))
+        return _filtered(PolylineSet(lines, "parts"), region)
+    return _filtered(PolygonSet(tuple(piece for piece in pieces if isinstance(piece, Polygon)), "parts"), region)
+
+
+def _straightened(term: Term) -> shapes.Shape:
+    """A shape that holds a term, with polygons for its circles."""
+    shape = term.clip
+    for circle in term.inside:
+        shape = shapes.intersection(shape, _fan((circle.x, circle.y), circle.radius, 0.0, math.tau))
+    for circle in term.outside:
+        shape = shapes.difference(shape, shapes.disc_polygon(circle.x, circle.y, circle.radius))
+    return shape
 
 
 def _proposal(region: Region) -> _Proposal | None:

@@ -40,6 +40,11 @@ def box(xmin: float, ymin: float, xmax: float, ymax: float) -> Shape:
     return cast(Shape, shapely.box(xmin, ymin, xmax, ymax))
 
 
+def boxes(bounds: Coordinates) -> NDArray[Any]:
+    """Array (n,) of axis-parallel rectangles from rows xmin, ymin, xmax, ymax."""
+    return cast("NDArray[Any]", shapely.box(*bounds.T))
+
+
 def polygon(corners: Coordinates | Sequence[XY]) -> Shape:
     """A polygon without holes from its corners."""
     return cast(Shape, shapely.polygons(np.asarray(corners, dtype=float)))
@@ -127,6 +132,11 @@ def distances(a: NDArray[Any], b: NDArray[Any] | Shape) -> NDArray[np.float64]:
 def covers(a: Shape, b: Shape) -> bool:
     """Whether no point of b lies outside of a."""
     return bool(shapely.covers(a, b))
+
+
+def covers_many(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
+    """`covers`, pair by pair."""
+    return shapely.covers(a, b)
 
 
 def intersection(a: Shape, b: Shape) -> Shape:

@@ -20,6 +20,7 @@ from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
 from scenicq.importers.segments import Job, World, fingerprint, maps_digest, write_segments
+from scenicq.processes import as_many_as_pay
 from scenicq.store.manifest import LeftOut, Manifest, is_dataset
 from scenicq.store.segment import SEGMENT_OBJECTS, Segment, read_segments, segments_of
 from scenicq.store.writer import DatasetWriter
@@ -74,7 +75,7 @@ def ingest(
     strict: bool = False,
     force: bool = False,
     update: bool = False,
-    jobs: int = 1,
+    jobs: int | None = 1,
     progress: Callable[[Progress], None] | None = None,
     segment_objects: int = SEGMENT_OBJECTS,
 ) -> IngestSummary:
@@ -96,7 +97,7 @@ def ingest(
         force: Whether a dataset that is there already may be replaced, and everything is to be done anew.
         update: Whether a dataset that is there already is brought up to date: recordings that are new or have changed
             are read, those that the source no longer has go. The result is that of an ingest of the whole source.
-        jobs: Number of processes; the result does not depend on it.
+        jobs: Number of processes, None for as many as pays; the result does not depend on it.
         progress: Called after each recording; what it raises ends the ingest.
         segment_objects: About how many label objects a part of the tables has at most.
 
@@ -121,7 +122,9 @@ def ingest(
         ]
         reached = _Reached(opened.frames, progress)
         known = _known(writer, target_path if update and not force else None)
-        reused = _write_all(opened, writer, groups, known, strict=strict, jobs=jobs, reached=reached)
+        reused = _write_all(
+            opened, writer, groups, known, strict=strict, jobs=jobs or as_many_as_pay(), reached=reached
+        )
         for segment in writer.segments:
             report.merge(segment.counts, segment.told)
         if not any(segment.recordings for segment in writer.segments):

@@ -7,7 +7,6 @@ reads no crossings, and fails on some maps. What it gives is kept by the map's c
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 import subprocess
 import sys
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.report import Report
+from scenicq.store.whole_files import whole_file
 
 __all__ = ["SUFFIX", "convert_maps", "convert_xodr"]
 
@@ -82,9 +82,8 @@ def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeo
             _run(path, [python, "-I", str(_WORKER), str(copy), str(made)], Path(folder), timeout_s)
             if not made.is_file():
                 raise DataError(Diagnostic("file-invalid", f"map {path}: Scenic's parser gave nothing"))
-            beside = cache / f".{key}.{os.getpid()}.tmp"
-            shutil.copyfile(made, beside)
-            beside.replace(kept)
+            with made.open("rb") as result, whole_file(kept) as file:
+                shutil.copyfileobj(result, file)
     except OSError as error:
         message = f"the map cache {cache} cannot be written: {error.strerror or error}"
         raise DataError(Diagnostic("target-unwritable", message)) from error

@@ -41,7 +41,9 @@ def _main(source: str, target: str) -> int:
         return 3
     if resource is not None:
         _, most = resource.getrlimit(resource.RLIMIT_AS)
-        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, most))
+        # whoever runs this may be allowed less
+        soft = _MEMORY_BYTES if most == resource.RLIM_INFINITY else min(_MEMORY_BYTES, most)
+        resource.setrlimit(resource.RLIMIT_AS, (soft, most))
     try:
         # Neither reads nor writes Scenic's own cache, which would lie beside the map.
         network: Any = Network.fromFile(source, useCache=False, writeCache=False)

@@ -8,33 +8,25 @@ where single parts want it, or else is narrowed down by halving.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from scenicq.forest.bounds import Interval
 from scenicq.forest.condition import condition
-from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, Range, TruncatedNormal, Value
-from scenicq.forest.walk import leaves, postorder
+from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Node, Range, TruncatedNormal, Value
+from scenicq.forest.walk import leaves, postorder, transform
+from scenicq.match.following import decide_directions
 from scenicq.match.ground import holds, replay
 from scenicq.match.interval import ends
 from scenicq.match.ladder import LINEAR_SLACK, Item, Maybe, No, Outcome, Yes, decide, ground_cause
-from scenicq.match.narrowing import narrowed, within
 from scenicq.match.options import Tolerance
-from scenicq.match.shooting import shoot
 
 __all__ = ["decide_apart"]
 
 _TIGHT = 0.05
 """Share of the tolerance with which a part is asked first, so that its witness suits the others, too."""
 _MOST_HALVES = 60
-_PATIENCE = 8
-"""Parts of a group along a field that are put to the ladder at most; what is open then is for a solver."""
-
-
-@dataclass(slots=True)
-class _Patience:
-    """How many parts may still be put to the ladder."""
-
-    left: int = _PATIENCE
+_FEW = 2
+"""Fields at hidden points whose cells the ladder may go through one by one."""
 
 
 def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
@@ -44,70 +36,30 @@ def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
         items: The group's constraints, conditioned.
         tolerance: Per feature.
     """
-    return _apart(items, tolerance, _Patience())
-
-
-def _apart(items: list[Item], tolerance: Tolerance, patience: _Patience) -> Outcome:
     left: list[Item] = []
     for item in items:
         if not isinstance(item[1], Constant):
             left.append(item)
         elif not holds(item[0], item[1].value, item[2], tolerance):
             return No(item[0], ground_cause(item))
-    wide: tuple[Identity, Interval] | None = None
-    turning = any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in left]))
-    if turning:
-        narrower = narrowed(left, tolerance)
-        if isinstance(narrower, tuple):
-            return No(narrower[0])
-        left, wide = narrower.items, narrower.wide
     used = {id(item): {leaf.identity: leaf for leaf in leaves(item[1])} for item in left}
     alone = _components(left, used, None)
     if len(alone) > 1:
-        return _all(alone, items, tolerance, patience)
+        return _all(alone, items, tolerance)
+    fields = _fields([node for _, node, _ in left])
     shared = _shared(left, used)
+    if fields:
+        parts, number = ([left], None) if shared is None else (shared[2], shared[0].identity)
+        found = decide_directions(parts, number, tolerance)
+        return decide(left, tolerance) if isinstance(found, Maybe) and fields <= _FEW else found
     if shared is not None:
-        return _Sharing(items, left, *shared, tolerance, patience).decide()
-    choice = next((leaf for item in left for leaf in used[id(item)].values() if isinstance(leaf, Index)), None)
-    if choice is not None and turning:
-        return _either(
-            left[0],
-            (
-                (_given(left, {choice.identity: float(n)}), {choice.identity: float(n)})
-                for n in range(len(choice.weights))
-            ),
-            tolerance,
-            patience,
-        )
-    guessed = shoot(left, tolerance) if turning else None
-    if guessed is not None:
-        return guessed
-    if wide is not None:
-        identity, (low, high) = wide
-        middle = (low + high) / 2
-        halves = ((low, middle), (middle, high))
-        return _either(left[0], ((within(left, {identity: half}), {}) for half in halves), tolerance, patience)
-    if turning:
-        if patience.left <= 0:
-            return Maybe(items[0][0], "nonlinear")
-        patience.left -= 1
+        return _Sharing(items, left, *shared, tolerance).decide()
     return decide(left, tolerance)
 
 
-def _either(
-    first: Item,
-    cases: Iterator[tuple[list[Item], Mapping[Identity, Value]]],
-    tolerance: Tolerance,
-    patience: _Patience,
-) -> Outcome:
-    """Cases of a group, one of which must be satisfied; with each the values that it chooses."""
-    found: Outcome | None = None
-    for items, given in cases:
-        outcome = _apart(items, tolerance, patience)
-        if isinstance(outcome, Yes):
-            return Yes({**given, **outcome.values})
-        found = outcome if found is None or isinstance(outcome, Maybe) else found
-    return found or No(first[0])
+def _fields(nodes: list[Node]) -> int:
+    """At how many hidden points fields are asked for; the ranks of one look-up ask for one and the same."""
+    return len({id(node.point) for node in postorder(nodes) if isinstance(node, DirectionAt)})
 
 
 def _given(items: Sequence[Item], given: Mapping[Identity, Value]) -> list[Item]:
@@ -115,12 +67,12 @@ def _given(items: Sequence[Item], given: Mapping[Identity, Value]) -> list[Item]
     return [(c, condition(node, {}, given, memo), seen) for c, node, seen in items]
 
 
-def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, patience: _Patience) -> Outcome:
+def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance) -> Outcome:
     """Parts that have no random variable in common."""
     values: dict[Identity, Value] = {}
     doubt: Maybe | None = None
     for part in parts:
-        outcome = _apart(part, tolerance, patience)
+        outcome = decide_apart(part, tolerance)
         if isinstance(outcome, No):
             return outcome
         if isinstance(outcome, Maybe):
@@ -172,6 +124,19 @@ def _shared(
     return None if best is None else best[1:]
 
 
+def _within(items: Sequence[Item], identity: Identity, limits: Interval) -> list[Item]:
+    """The items with a random number kept in a narrower range."""
+    low, high = limits
+
+    def step(node: Node) -> Node:
+        if isinstance(node, Range | TruncatedNormal) and node.identity == identity:
+            return replace(node, low=Constant(low, span=node.low.span), high=Constant(high, span=node.high.span))
+        return node
+
+    memo: dict[int, Node] = {}
+    return [(c, transform(node, step, memo), seen) for c, node, seen in items]
+
+
 class _Sharing:
     """Parts that have one random number in common."""
 
@@ -183,9 +148,7 @@ class _Sharing:
         limits: tuple[float, float],
         parts: list[list[Item]],
         tolerance: Tolerance,
-        patience: _Patience,
     ) -> None:
-        self.patience = patience
         self.items = items
         self.left = left
         self.identity = leaf.identity
@@ -197,10 +160,10 @@ class _Sharing:
     def decide(self) -> Outcome:
         wanted: list[float] = []
         for part in self.parts:
-            outcome = _apart(part, self.tolerance, self.patience)
+            outcome = decide_apart(part, self.tolerance)
             if isinstance(outcome, No):
                 return outcome
-            tight = _apart(part, _scaled(self.tolerance, _TIGHT), self.patience)
+            tight = decide_apart(part, _scaled(self.tolerance, _TIGHT))
             witness = tight if isinstance(tight, Yes) else outcome
             value = witness.values.get(self.identity) if isinstance(witness, Yes) else None
             if isinstance(value, float):
@@ -217,7 +180,7 @@ class _Sharing:
             return None
         self.tried.add(value)
         given: dict[Identity, Value] = {self.identity: value}
-        outcome = _apart(_given(self.left, given), self.tolerance, self.patience)
+        outcome = decide_apart(_given(self.left, given), self.tolerance)
         if not isinstance(outcome, Yes):
             return None
         values = given | dict(outcome.values)
@@ -231,8 +194,7 @@ class _Sharing:
             if not todo:
                 return blamed
             low, high = todo.pop()
-            here = {self.identity: (low, high)}
-            outcomes = (_apart(within(part, here), self.tolerance, self.patience) for part in self.parts)
+            outcomes = (decide_apart(_within(part, self.identity, (low, high)), self.tolerance) for part in self.parts)
             excluded = next((outcome for outcome in outcomes if isinstance(outcome, No)), None)
             if excluded is not None:
                 blamed = excluded

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scenicq.forest.groups import Comparison, Constraint
+from scenicq.match.following import repaired
 from scenicq.match.ground import replay
 from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
 from scenicq.match.options import MatchOptions
@@ -34,7 +35,7 @@ def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: 
 
 
 def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None) -> Outcome:
-    """Decide groups together by a solver; a witness that does not replay is refined, then given up.
+    """Decide groups together by a solver; a witness that does not replay is repaired, refined, then given up.
 
     Args:
         items: The groups after conditioning.
@@ -64,6 +65,9 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
                 values = encoding.values(answer.witness)
                 if replay(flat, values, options.tolerance, options.precision):
                     return Yes(values)
+                close = repaired(flat, values, options.tolerance)
+                if close is not None:
+                    return close
         precision /= _REFINED
     return Maybe(blame, "precision")
 

@@ -1,8 +1,8 @@
 """One label with one of its things as the ego: the body of algorithm 1.
 
 Conditions about one object and the ego leave each object its candidates; necessary conditions of pairs thin them out;
-the search then finds correspondences that satisfy the groups about several objects. Each question is decided once: the
-answers are kept by the shape of the group and the label objects in its roles.
+the search then finds correspondences that satisfy the groups about several objects. Where there is little to try, it is
+tried before anything is thinned out.
 """
 
 from __future__ import annotations
@@ -10,35 +10,27 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import cast
 
 from scenicq.forest.compute import CannotEvaluate
-from scenicq.forest.groups import PARAMS, Constraint, Group
-from scenicq.forest.nodes import Value
+from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.scenario import Scenario
-from scenicq.match.apart import decide_apart
 from scenicq.match.casting import Cast
-from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes, condition_group, decide
+from scenicq.match.decisions import Asker, Decisions, translated
+from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes, decide
 from scenicq.match.options import MatchOptions
 from scenicq.match.planning import GroupPlan, MatchPlan
 from scenicq.match.quick import Places
 from scenicq.match.search import Answer, Exhausted, Reporter, Slot, find_assignments
-from scenicq.match.surroundings import within_radius
 from scenicq.match.thinning import thinned
 
 _FEW = 64
 """Decisions in closed form that cost less than arrays; steps of a search that cost hardly anything."""
 _FEW_SLOTS = 8
+_FEW_TRIES = 128
+"""Candidates, counted once for each condition on them, that are looked at before anything is thinned out."""
 
-__all__ = ["Asker", "Attempt", "Failure", "Solution"]
-
-
-class Asker(Protocol):
-    """Puts groups to a solver."""
-
-    def __call__(self, items: Sequence[Sequence[Item]]) -> Outcome:
-        """Decide groups together."""
-        ...
+__all__ = ["Attempt", "Failure", "Solution"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,9 +86,11 @@ class Attempt:
     places: Places = field(default_factory=Places)
     failure: Failure | None = None
     undecided: Failure | None = None
-    _cache: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
-        default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
-    )
+    _decisions: Decisions = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Begin with nothing decided."""
+        self._decisions = Decisions(self.options, self.cast, self.ask, self.places)
 
     def solutions(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
         """Every correspondence that matches, interchangeable objects in one order; what is left open is noted.
@@ -121,52 +115,21 @@ class Attempt:
         Raises:
             CannotEvaluate: Geometry cannot tell the value of an expression.
         """
-        observed: dict[tuple[int, str], Value] = {
-            (index, name): value for index in group.objects for name, value in self.cast.seen[assignment[index]].items()
-        }
-        observed.update({(PARAMS, name): value for name, value in self.cast.params.items()})
-        items = condition_group(group, observed)
-        return items if self.cast.disc is None else within_radius(items, *self.cast.disc)
+        return self._decisions.items(group, assignment)
 
     def decide(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome:
         """Decide a group for the things in its roles, or remember what was decided for them."""
-        key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
-        known = self._cache.get(key)
-        if known is None:
-            known = self._cache[key] = (
-                plan.group,
-                self._quick(plan, assignment) or self._decide_now(plan.group, assignment),
-            )
-        group, outcome = known
-        return outcome if group is plan.group else _translated(outcome, group, plan.group)
-
-    def _quick(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
-        """What a closed form says, if it is clear."""
-        if plan.quick is None or self.options.method != "auto":
-            return None
-        seen = self.cast.seen
-        return plan.quick.decide(
-            lambda index, name: seen[assignment[index]][name], self.cast.disc, self.options.tolerance, self.places
-        )
-
-    def _decide_now(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
-        try:
-            items = self.items(group, assignment)
-            if self.options.method == "smt":
-                return self.ask([items])
-            outcome = decide_apart(items, self.options.tolerance)
-            return self.ask([items]) if isinstance(outcome, Maybe) else outcome
-        except CannotEvaluate as error:
-            return Maybe(group.constraints[0], f"unsupported: {error}")
+        return translated(self._decisions.of(plan, assignment), plan.group)
 
     def _judge(self, plan: GroupPlan, assignment: Mapping[int, int], depth: int) -> Answer:
         """Decide a group, and remember what failed furthest."""
-        outcome = self.decide(plan, assignment)
-        if isinstance(outcome, Yes):
+        decided = self._decisions.of(plan, assignment)
+        if isinstance(decided[1], Yes):
             return Answer.YES
-        if isinstance(outcome, Maybe):
+        if isinstance(decided[1], Maybe):
             return Answer.UNKNOWN
-        self._fail(Failure(depth, plan.group, outcome, dict(assignment)))
+        if self.failure is None or depth > self.failure.depth:
+            self.failure = Failure(depth, plan.group, cast("No", translated(decided, plan.group)), dict(assignment))
         return Answer.NO
 
     def _fail(self, failure: Failure) -> None:
@@ -187,46 +150,78 @@ class Attempt:
         answers = [self._judge(group, ego, 1) for group in plan.ego_only]
         if Answer.NO in answers:
             return
-        judged = self._filter(plan, candidates, ego)
+        wanted = {index: numbers for index, numbers in candidates.items() if index != self.scenario.ego}
+        firm = Answer.UNKNOWN not in answers
+        given: list[dict[int, int]] = []
+        if firm and self.options.method == "auto" and _little(plan, wanted):
+            failure = self.failure
+            for assignment in self._at_once(plan, wanted, ego):
+                given.append(assignment)
+                yield self._solution(plan, assignment)
+            # what excludes a label is told by all of the conditions
+            self.failure = failure
+        judged = self._filter(plan, wanted, ego)
         if judged is None:
             return
         slots, doubtful = judged
-        found = False
-        if Answer.UNKNOWN not in answers:
-            firm = [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in doubtful)) for s in slots]
-            for assignment in self._firm(plan, firm, ego):
-                found = True
-                yield self._solution(plan, assignment)
+        found = bool(given)
+        if firm:
+            for assignment in self._firm(plan, _without(slots, doubtful), ego):
+                if assignment not in given:
+                    found = True
+                    yield self._solution(plan, assignment)
         if not found and self.undecided is None:
             # nothing matches; if some correspondence fails nowhere either, it may match
             open_one = next(self._search(plan, slots, ego, accept_unknown=True), None)
             if open_one is not None:
                 self.undecided = self._first_open(plan, open_one)
 
+    def _at_once(
+        self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+    ) -> Iterator[dict[int, int]]:
+        """The first correspondences in the order of the program, as far as few steps lead to them."""
+        judged = self._judged(plan, wanted, ego)
+        if judged is None:
+            return
+        try:
+            yield from self._search(plan, _without(*judged), ego, accept_unknown=False, budget=_FEW)
+        except Exhausted:
+            return
+
     def _filter(
-        self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+        self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
     ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
         """Candidates that pass the groups about them and the ego alone, and which of them are doubtful."""
-        wanted = {index: numbers for index, numbers in candidates.items() if index != self.scenario.ego}
+        left = wanted
         if self.options.method == "auto" and not _easy(plan, wanted):
-            wanted, failed = thinned(plan, wanted, self.cast, self.scenario.ego, self.options.tolerance)
+            left, failed = thinned(plan, wanted, self.cast, self.scenario.ego, self.options.tolerance)
             if failed is not None:
-                self._blame_thinning(*failed, candidates, ego)
+                self._blame_thinning(*failed, wanted, ego)
                 return None
+        return self._judged(plan, left, ego)
+
+    def _judged(
+        self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+    ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
+        """The same, candidate by candidate."""
         slots: list[Slot] = []
         doubtful: set[tuple[int, int]] = set()
+        known: dict[tuple[tuple[int, ...], tuple[int, ...]], tuple[tuple[int, ...], tuple[int, ...]]] = {}
         for index, numbers in wanted.items():
-            kept: list[int] = []
-            for number in numbers:
-                answer = self._passes(plan.unary.get(index, ()), {**ego, index: number})
-                if answer is Answer.NO:
-                    continue
-                kept.append(number)
-                if answer is Answer.UNKNOWN:
-                    doubtful.add((index, number))
+            groups = plan.unary.get(index, ())
+            # of objects about which the same is asked one is enough
+            key = tuple([group.kind for group in groups]), numbers
+            if key not in known:
+                answers = [(number, self._passes(groups, {**ego, index: number})) for number in numbers]
+                known[key] = (
+                    tuple([number for number, answer in answers if answer is not Answer.NO]),
+                    tuple([number for number, answer in answers if answer is Answer.UNKNOWN]),
+                )
+            kept, open_ones = known[key]
             if not kept:
                 return None
-            slots.append(Slot(index, tuple(kept)))
+            doubtful.update((index, number) for number in open_ones)
+            slots.append(Slot(index, kept))
         return slots, doubtful
 
     def _blame_thinning(
@@ -360,23 +355,32 @@ class Attempt:
 
 
 def _easy(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
-    """Whether all pairs of candidates are decided faster than they are thinned out."""
+    """Whether all pairs of candidates are decided faster than they are thinned out.
+
+    Conditions on known values alone are left to the thinning, which tells what no candidate satisfies.
+    """
     pairs = 0
     for group in plan.groups:
-        if group.quick is None:
+        if group.quick is None or not group.group.variables:
             return False
         pairs += math.prod(len(candidates[index]) for index in group.roles)
     return pairs <= _FEW
 
 
+def _little(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
+    """Whether there is little to try, all of it in closed form, in the order of the program."""
+    if len(candidates) > _FEW_SLOTS or any(group.quick is None for group in plan.groups):
+        return False
+    tries = {(group.kind, tuple([candidates[index] for index in group.roles])) for group in plan.groups if group.roles}
+    return sum(len(numbers) for _, options in tries for numbers in options) <= _FEW_TRIES
+
+
+def _without(slots: list[Slot], doubtful: set[tuple[int, int]]) -> list[Slot]:
+    """The slots without doubtful candidates."""
+    if not doubtful:
+        return slots
+    return [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in doubtful)) for s in slots]
+
+
 def _accept(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
     return Answer.YES, frozenset()
-
-
-def _translated(outcome: Outcome, source: Group, target: Group) -> Outcome:
-    """What was decided for a group, said of another one of the same shape."""
-    if isinstance(outcome, Yes):
-        pairs = zip(source.variables, target.variables, strict=True)
-        return Yes({new.identity: outcome.values[old.identity] for old, new in pairs if old.identity in outcome.values})
-    constraint = target.constraints[source.constraints.index(outcome.constraint)]
-    return No(constraint, outcome.detail) if isinstance(outcome, No) else Maybe(constraint, outcome.reason)

@@ -53,13 +53,17 @@ class Cast:
             Exhausted: There are too many combinations.
         """
         choices: list[list[tuple[frozenset[str], tuple[int, ...]]]] = []
+        split: dict[tuple[frozenset[str], tuple[int, ...]], list[tuple[frozenset[str], tuple[int, ...]]]] = {}
         for index, names in enumerate(relevant):
-            by_set: dict[frozenset[str], list[int]] = {}
-            for number in self.candidates.get(index, (self.ego,)):
-                by_set.setdefault(names.intersection(self.seen[number]), []).append(number)
-            # what is observed most completely first: the order must not depend on candidates that drop out anyway
-            ordered = sorted(by_set.items(), key=_completeness) if len(by_set) > 1 else by_set.items()
-            choices.append([(names_, tuple(numbers)) for names_, numbers in ordered])
+            key = names, self.candidates.get(index, (self.ego,))
+            if key not in split:
+                by_set: dict[frozenset[str], list[int]] = {}
+                for number in key[1]:
+                    by_set.setdefault(names.intersection(self.seen[number]), []).append(number)
+                # what is observed most completely first: the order must not depend on candidates that drop out anyway
+                ordered = sorted(by_set.items(), key=_completeness) if len(by_set) > 1 else by_set.items()
+                split[key] = [(names_, tuple(numbers)) for names_, numbers in ordered]
+            choices.append(split[key])
         params = frozenset(self.params)
         for count, chosen in enumerate(itertools.product(*choices)):
             if count >= _MOST_SIGNATURES:

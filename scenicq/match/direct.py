@@ -14,20 +14,17 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.attempt import Failure, Solution
 from scenicq.match.casting import Among
 from scenicq.match.constraints import Signature
+from scenicq.match.formulas import UnclearError
 from scenicq.match.ladder import No, Yes
-from scenicq.match.observe import observe, observe_params
+from scenicq.match.observe import observe, observe_params, observed_names
 from scenicq.match.options import MatchOptions
 from scenicq.match.planning import GroupPlan, MatchPlan
 from scenicq.match.quick import Disc, Places
-from scenicq.store.labels import Label, LabelObject
+from scenicq.store.labels import Label
 
 __all__ = ["Casting", "Direct", "direct_of", "signature_of"]
 
 _MOST_DECISIONS = 64
-
-
-class _UnclearError(Exception):
-    """A closed form does not say."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,11 +35,14 @@ class Direct:
         plan: The plan.
         ego_only: Groups about the ego alone.
         due: For each object but the ego, in program order, the groups that can be decided once it has a candidate.
+        words: Whether it also tells what keeps a label from matching. Conditions on known values alone are left to
+            `Attempt`, which tells what no candidate satisfies.
     """
 
     plan: MatchPlan
     ego_only: tuple[GroupPlan, ...]
     due: tuple[tuple[int, tuple[GroupPlan, ...]], ...]
+    words: bool
 
 
 def direct_of(plan: MatchPlan, scenario: Scenario) -> Direct | None:
@@ -54,7 +54,8 @@ def direct_of(plan: MatchPlan, scenario: Scenario) -> Direct | None:
     for group in sorted(plan.groups, key=lambda each: len(each.roles)):
         if group.roles:
             due[max(group.roles, key=order.index)].append(group)
-    return Direct(plan, plan.ego_only, tuple((index, tuple(due[index])) for index in order))
+    words = all(group.group.variables for group in plan.groups)
+    return Direct(plan, plan.ego_only, tuple((index, tuple(due[index])) for index in order), words)
 
 
 @dataclass(slots=True)
@@ -70,6 +71,8 @@ class Casting:
         disc: The area that is looked at.
         places: What is known of places.
         left: Decisions that may still be taken.
+        words: Whether it also tells what keeps the label from matching: for a narrow miss `Attempt` looks at all
+            candidates.
         failure: What excluded the correspondence that came furthest.
     """
 
@@ -81,6 +84,7 @@ class Casting:
     disc: Disc | None
     places: Places
     left: int = _MOST_DECISIONS
+    words: bool = True
     failure: Failure | None = None
     assignment: dict[int, int] = field(default_factory=dict["int", "int"])
     _seen: dict[int, Mapping[str, Value]] = field(default_factory=dict["int", "Mapping[str, Value]"])
@@ -90,8 +94,7 @@ class Casting:
         number = self.assignment[index]
         seen = self._seen.get(number)
         if seen is None:
-            thing = self.label.objects[number - 1] if number else self.label.ego
-            seen = self._seen[number] = observe(thing)
+            seen = self._seen[number] = observe(self.label.objects[number - 1] if number else self.label.ego)
         return seen[name]
 
     def _passes(self, group: GroupPlan) -> Yes | None:
@@ -100,10 +103,12 @@ class Casting:
         outcome = None
         if self.left >= 0 and group.quick is not None:
             outcome = group.quick.decide(self.get, self.disc, self.options.tolerance, self.places)
-        if outcome is None:
-            raise _UnclearError
+        if outcome is None or group.quick is None:
+            raise UnclearError
         if isinstance(outcome, Yes):
             return outcome
+        if outcome is group.quick.narrow:
+            self.words = False
         depth = len(self.assignment)
         if isinstance(outcome, No) and (self.failure is None or depth > self.failure.depth):
             self.failure = Failure(depth, group.group, outcome, dict(self.assignment))
@@ -121,7 +126,7 @@ class Casting:
                 found[id(group)] = outcome
             if not self._fill(found):
                 return self.failure
-        except _UnclearError:
+        except UnclearError:
             return None
         groups = self.direct.plan.groups
         return Solution(dict(self.assignment), tuple((group, found[id(group)]) for group in groups))
@@ -160,26 +165,14 @@ class Casting:
 def signature_of(label: Label, ego: int, among: Among, relevant: tuple[frozenset[str], ...]) -> Signature | None:
     """What is observed of all candidates, if it is the same for all of a role."""
     kinds: list[frozenset[str]] = []
-    known: dict[tuple[bool, ...], frozenset[str]] = {}
+    objects = label.objects
     for index, names in enumerate(relevant):
-        things = [label.ego] if index == ego else [label.objects[number - 1] for number in among[index]]
-        seen = {_observed(thing, known) for thing in things}
-        if len(seen) != 1:
-            return None
-        kinds.append(names & seen.pop())
+        if index == ego:
+            seen = names & observed_names(label.ego)
+        else:
+            first, *others = [names & observed_names(objects[number - 1]) for number in among[index]] or [None]
+            if first is None or any(other != first for other in others):
+                return None
+            seen = first
+        kinds.append(seen)
     return (*kinds, frozenset(observe_params(label)) if label.params else frozenset())
-
-
-def _observed(thing: LabelObject, known: dict[tuple[bool, ...], frozenset[str]]) -> frozenset[str]:
-    if thing.attributes:
-        return frozenset(observe(thing))
-    key = (
-        thing.heading is None,
-        thing.width is None,
-        thing.length is None,
-        thing.height is None,
-        thing.velocity is None,
-    )
-    if key not in known:
-        known[key] = frozenset(observe(thing))
-    return known[key]

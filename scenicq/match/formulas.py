@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
 
+from scenicq.forest.compute import compute
+from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
+    Bearing,
     Constant,
     Coordinate,
     DirectionAt,
@@ -17,19 +20,22 @@ from scenicq.forest.nodes import (
     Identity,
     Index,
     Node,
+    Norm,
+    Normal,
     Range,
     Rotate,
     Scale,
     Select,
     TruncatedNormal,
+    Undefined,
     Value,
     VectorOf,
     VectorSum,
 )
-from scenicq.forest.walk import children, postorder
+from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.match.interval import ends
 
-__all__ = ["Exact", "Form", "Formulas", "Get", "spread"]
+__all__ = ["Exact", "Form", "Formulas", "Get", "UnclearError", "spread", "truth"]
 
 Get: TypeAlias = Callable[[int, str], Value]
 """The observed value of an object's property."""
@@ -37,9 +43,16 @@ Exact: TypeAlias = Callable[[Get], "float | tuple[float, float]"]
 Scalar: TypeAlias = Callable[[Get], float]
 Vector: TypeAlias = Callable[[Get], "tuple[float, float]"]
 
+_MOST_STEPS = 400
+"""Operations that a formula may take: what is shared in an expression is worked out anew for each use of it."""
+
 _NUMBERS = frozenset({"heading", "width", "length", "height", "speed"})
 _VECTORS = frozenset({"position", "velocity"})
 """Properties that are numbers and pairs wherever they are observed."""
+
+
+class UnclearError(Exception):
+    """A closed form does not say."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +62,7 @@ class Form:
     Attributes:
         parts: Functions with factors, and a constant; their sum is the known part.
         constant: See there.
-        terms: For each random variable its factor and its ends.
+        terms: For each random variable its factor and its ends; one of them may be unbounded.
         fields: Directions that are added.
     """
 
@@ -76,8 +89,10 @@ class Form:
         return total
 
     def plus(self, other: Form) -> Form | None:
-        """The sum; None if a variable occurs in both."""
-        if self.terms.keys() & other.terms.keys():
+        """The sum; None if a variable occurs in both, or both are unbounded."""
+        if self.terms.keys() & other.terms.keys() or (self.unbounded and other.unbounded):
+            return None
+        if len(self.parts) + len(other.parts) > _MOST_STEPS:
             return None
         return Form(
             self.parts + other.parts,
@@ -96,6 +111,11 @@ class Form:
         return Form(tuple((factor * c, part) for c, part in self.parts), factor * self.constant, terms)
 
     @property
+    def unbounded(self) -> bool:
+        """Whether one of its variables is."""
+        return math.isinf(self.high - self.low)
+
+    @property
     def number(self) -> float | None:
         """Its value, if it is a number."""
         return None if self.parts or self.terms or self.fields else self.constant
@@ -106,11 +126,64 @@ def spread(form: Form, value: float) -> dict[Identity, Value]:
     if len(form.terms) == 1:
         ((identity, (factor, low, high)),) = form.terms.items()
         return {identity: min(max(value / factor, low), high)}
+    if form.unbounded:
+        # the unbounded one takes what the middles of the others leave
+        return _with_rest(form, value)
     share = 0.5 if form.high == form.low else min(1.0, max(0.0, (value - form.low) / (form.high - form.low)))
     return {
         identity: low + share * (high - low) if factor > 0 else high - share * (high - low)
         for identity, (factor, low, high) in form.terms.items()
     }
+
+
+def _with_rest(form: Form, value: float) -> dict[Identity, Value]:
+    middles = {
+        identity: (low + high) / 2 for identity, (_, low, high) in form.terms.items() if math.isfinite(high - low)
+    }
+    rest = value - math.fsum(form.terms[identity][0] * middle for identity, middle in middles.items())
+    return {
+        identity: middles[identity] if identity in middles else rest / factor
+        for identity, (factor, _, _) in form.terms.items()
+    }
+
+
+def truth(root: Node) -> Callable[[Get], bool] | None:
+    """A condition on what is observed alone as a function of it, which raises `UnclearError` where it has no value.
+
+    None if anything about it is random or it takes too many steps.
+    """
+    made: dict[int, Callable[[Get], Value]] = {}
+    steps: dict[int, int] = {}
+    for node in postorder((root,)):
+        below = children(node)
+        steps[id(node)] = 1 + sum([steps[id(child)] for child in below])
+        if is_leaf(node) or isinstance(node, DirectionAt) or steps[id(node)] > _MOST_STEPS:
+            return None
+        if isinstance(node, Feature) and node.object == PARAMS:
+            return None
+        made[id(node)] = _computed(node, [made[id(child)] for child in below])
+    whole = made[id(root)]
+    return lambda get: bool(whole(get))
+
+
+def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[Get], Value]:
+    """A node's own meaning as a function of what is observed."""
+    match node:
+        case Constant():
+            value = node.value
+            return lambda _: value
+        case Feature():
+            index, name = node.object, node.property
+            return lambda get: get(index, name)
+        case _:
+
+            def computed(get: Get) -> Value:
+                found = compute(node, tuple([arg(get) for arg in args]))
+                if isinstance(found, Undefined):
+                    raise UnclearError
+                return found
+
+            return computed
 
 
 class Formulas:
@@ -120,13 +193,17 @@ class Formulas:
         """Take the number of the option of each choice."""
         self._chosen = chosen
         self._exact: dict[int, Exact | None] = {}
+        self._steps: dict[int, int] = {}
         self._forms: dict[int, Form | None] = {}
 
     def exact(self, root: Node) -> Exact | None:
         """A scalar or vector as a function of what is observed; None if it is not one alone."""
         for node in postorder((root,)):
             if id(node) not in self._exact:
-                self._exact[id(node)] = _exact(node, [self._exact[id(child)] for child in children(node)])
+                below = children(node)
+                steps = self._steps[id(node)] = 1 + sum([self._steps[id(child)] for child in below])
+                args = [self._exact[id(child)] for child in below]
+                self._exact[id(node)] = _exact(node, args) if steps <= _MOST_STEPS else None
         return self._exact[id(root)]
 
     def form(self, root: Node) -> Form | None:
@@ -148,9 +225,13 @@ class Formulas:
                 return None if index is None else args[1 + int(index)]
             case Range() | TruncatedNormal():
                 limits = ends(node)
-                if limits is None or not all(map(math.isfinite, limits)) or limits[0] > limits[1]:
+                known = all(isinstance(part, Constant) for part in children(node))
+                if limits is None or not known or not all(map(math.isfinite, limits)) or limits[0] > limits[1]:
                     return None
                 return Form(terms={node.identity: (1.0, *limits)})
+            case Normal():
+                fixed = isinstance(node.mean, Constant) and isinstance(node.deviation, Constant)
+                return Form(terms={node.identity: (1.0, -math.inf, math.inf)}) if fixed else None
             case DirectionAt():
                 return Form(fields=(node,))
             case Arithmetic() if all(arg is not None for arg in args):
@@ -160,7 +241,9 @@ class Formulas:
             case _:
                 pass
         exact = self._exact[id(node)]
-        is_scalar = isinstance(node, Arithmetic | Coordinate) or (isinstance(node, Feature) and node.kind == "scalar")
+        is_scalar = isinstance(node, Arithmetic | Coordinate | Norm | Bearing) or (
+            isinstance(node, Feature) and node.kind == "scalar"
+        )
         return Form(parts=((1.0, cast(Scalar, exact)),)) if exact is not None and is_scalar else None
 
 
@@ -199,7 +282,8 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
         case _ if any(arg is None for arg in args):
             return None
         case Arithmetic():
-            return _scalar(node.op, cast("list[Scalar]", args))
+            own = _scalar(node.op, cast("list[Scalar]", args))
+            return own or cast(Exact, _computed(node, cast("list[Callable[[Get], Value]]", args)))
         case VectorOf():
             x, y = cast("list[Scalar]", args)
             return lambda get: (x(get), y(get))
@@ -231,6 +315,8 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
         case Coordinate():
             whole, axis = cast(Vector, args[0]), node.axis
             return lambda get: whole(get)[axis]
+        case Norm() | Bearing():
+            return cast(Exact, _computed(node, cast("list[Callable[[Get], Value]]", args)))
         case _:
             return None
 

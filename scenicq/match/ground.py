@@ -14,7 +14,7 @@ from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.geometry.angles import distance
 from scenicq.match.options import Tolerance
 
-__all__ = ["ROUNDING", "agrees", "holds", "replay", "show_value"]
+__all__ = ["ROUNDING", "agrees", "holds", "replay", "show_value", "unlike"]
 
 ROUNDING = 1e-9
 """Metres or radians that floating point may be off."""
@@ -60,12 +60,17 @@ def show_value(property_: str, value: Value) -> str:
     if isinstance(value, Undefined):
         return value.reason
     if isinstance(value, tuple):
-        return f"({value[0]:.2f}, {value[1]:.2f})"
+        return f"({value[0]:z.2f}, {value[1]:z.2f})"
     if isinstance(value, bool) or not isinstance(value, float):
         return str(value)
     if property_ in ("heading", "viewAngle"):
-        return f"{math.degrees(value):.1f} deg"
-    return f"{value:.3g}"
+        return f"{math.degrees(value):z.1f} deg"
+    return f"{value:z.3g}"
+
+
+def unlike(property_: str, value: Value, observed: Value) -> str:
+    """That a label's value is not the one that the scenario gives, in a person's units."""
+    return f"is {show_value(property_, observed)}, not {show_value(property_, value)}"
 
 
 def replay(
@@ -73,6 +78,7 @@ def replay(
     assignment: Mapping[Identity, Value],
     tolerance: Tolerance,
     slack: float,
+    headings: Mapping[int, float] | None = None,
 ) -> bool:
     """Whether a witness, evaluated plainly, satisfies every constraint within tolerance plus slack.
 
@@ -83,16 +89,26 @@ def replay(
         assignment: Values of the random variables.
         tolerance: Per feature.
         slack: The solver's precision.
+        headings: The direction of some uses of fields, by the node's id; if given, the nearest allowed one is taken.
     """
-    return all(
-        any(_holds_with(part, assignment, tolerance, slack, turn) for turn in range(_choices(part)))
-        for part in _sharing(items)
-    )
+    if headings is not None:
+
+        def nearest(node: DirectionAt, allowed: tuple[float, ...]) -> float:
+            wanted = headings.get(id(node), allowed[0])
+            return min(allowed, key=lambda heading: distance(heading, wanted))
+
+        return _holds_with(items, assignment, tolerance, slack, nearest)
+    for part in _sharing(items):
+        picks = _Picks()
+        while not _holds_with(part, assignment, tolerance, slack, picks):
+            if not picks.advance():
+                return False
+    return True
 
 
 _Items = list[tuple[Constraint, Node, Value]]
 
-MOST_CHOICES = 256
+MOST_CHOICES = 1024
 """Combinations of directions that are tried where a field allows several."""
 
 
@@ -110,27 +126,43 @@ def _sharing(items: _Items) -> list[_Items]:
     return [part for _, part in parts]
 
 
-def _choices(items: _Items) -> int:
-    fields = sum(isinstance(below, DirectionAt) for below in postorder([node for _, node, _ in items]))
-    return min(MOST_CHOICES, 4**fields) if fields else 1
+class _Picks:
+    """Picks directions, another combination after each `advance`; the last use of a field changes first."""
 
+    def __init__(self) -> None:
+        self.picked: list[int] = []
+        self.sizes: list[int] = []
+        self.left = MOST_CHOICES
 
-def _chooser(turn: int) -> Callable[[DirectionAt, tuple[float, ...]], float]:
-    state = [turn]
+    def __call__(self, _: DirectionAt, allowed: tuple[float, ...]) -> float:
+        if len(self.sizes) == len(self.picked):
+            self.picked.append(0)
+        self.sizes.append(len(allowed))
+        return allowed[self.picked[len(self.sizes) - 1]]
 
-    def choose(_: DirectionAt, allowed: tuple[float, ...]) -> float:
-        state[0], pick = divmod(state[0], 4)
-        return allowed[pick % len(allowed)]
-
-    return choose
+    def advance(self) -> bool:
+        """Go to the next combination, if there is one and it is not one too many."""
+        self.left -= 1
+        while self.sizes and self.picked[-1] + 1 == self.sizes[-1]:
+            self.picked.pop()
+            self.sizes.pop()
+        if not self.sizes or not self.left:
+            return False
+        self.picked[-1] += 1
+        self.sizes = []
+        return True
 
 
 def _holds_with(
-    items: _Items, assignment: Mapping[Identity, Value], tolerance: Tolerance, slack: float, turn: int
+    items: _Items,
+    assignment: Mapping[Identity, Value],
+    tolerance: Tolerance,
+    slack: float,
+    choose: Callable[[DirectionAt, tuple[float, ...]], float],
 ) -> bool:
     roots = tuple(node for _, node, _ in items)
     try:
-        values = evaluate_all(roots, assignment, None, _chooser(turn))
+        values = evaluate_all(roots, assignment, None, choose)
     except CannotEvaluate:
         return False
     for below in postorder(roots):

@@ -21,7 +21,7 @@ from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity,
 from scenicq.forest.walk import leaves, postorder
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.match.affine import AffineVector, affine_scalar, affine_vector
-from scenicq.match.ground import holds, replay, show_value
+from scenicq.match.ground import holds, replay, unlike
 from scenicq.match.interval import Reach, reach_heading, reach_number, reach_position
 from scenicq.match.linear import NotLinear, inside, position_boxes, solve_affine
 from scenicq.match.options import Tolerance
@@ -83,8 +83,7 @@ def ground_cause(item: Item) -> str:
     constraint, node, observed = item
     value = cast(Constant, node).value
     if isinstance(constraint, Comparison):
-        shown = show_value(constraint.property, value)
-        return f"is {show_value(constraint.property, observed)}, not {shown}"
+        return unlike(constraint.property, value, observed)
     return value.reason if isinstance(value, Undefined) else "does not hold"
 
 

@@ -28,10 +28,12 @@ from scenicq.forest.nodes import (
     Logic,
     LogicOp,
     Node,
+    Norm,
     PointIn,
     Value,
 )
 from scenicq.forest.walk import leaves
+from scenicq.forest.windows import close_boxes
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
@@ -40,7 +42,7 @@ from scenicq.match.interval import ends
 from scenicq.match.options import Tolerance
 from scenicq.match.program import LinearSystem, NotSolved, Row
 
-__all__ = ["NotLinear", "inside", "position_boxes", "solve_affine"]
+__all__ = ["Alternative", "NotLinear", "inside", "position_boxes", "solve_affine"]
 
 _SIDES = 32
 """Corners of the polygons around and inside a disc."""
@@ -49,7 +51,8 @@ _CULLING = 1e-6
 """Metres by which boxes are grown so that rounding loses nothing."""
 
 _Item = tuple[Constraint, Node, Value]
-_Alternative = list[list[Row]]
+Alternative = list[list[Row]]
+"""Sets of linear facts, one of which holds."""
 
 
 class NotLinear(Exception):
@@ -57,7 +60,9 @@ class NotLinear(Exception):
 
 
 def position_boxes(items: Sequence[_Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> dict[Identity, Box]:
-    """Where each random point can lie, from the positions that it leads to; a little too much, never too little.
+    """Where each random point can lie, from the positions that it leads to and what it must be close to.
+
+    A little too much, never too little.
 
     Args:
         items: The constraints after conditioning.
@@ -70,6 +75,8 @@ def position_boxes(items: Sequence[_Item], tolerance: Tolerance, rows: Sequence[
         if isinstance(constraint, Comparison) and constraint.property == "position":
             x, y = cast("tuple[float, float]", observed)
             targets.append((node, ((x - reach, x + reach), (y - reach, y + reach))))
+        elif not isinstance(constraint, Comparison):
+            targets += close_boxes(node)
     boxes = leaf_boxes(targets)
     for row in rows:
         if len(row.form.terms) == 1:
@@ -103,7 +110,11 @@ def inside(place: AffineVector, polygon: np.ndarray) -> list[Row]:
 
 
 def solve_affine(
-    items: Sequence[_Item], rows: Sequence[Row], tolerance: Tolerance, places: Sequence[Node] = ()
+    items: Sequence[_Item],
+    rows: Sequence[Row],
+    tolerance: Tolerance,
+    places: Sequence[Node] = (),
+    alternatives: Sequence[Alternative] = (),
 ) -> dict[Identity, Value] | None:
     """Values of the random variables that satisfy affine constraints, or None if there are none.
 
@@ -112,11 +123,12 @@ def solve_affine(
         rows: Linear facts that hold besides.
         tolerance: Per feature.
         places: Points that need values, too.
+        alternatives: Of each, one set of facts holds.
 
     Raises:
         NotLinear: Something is not affine, or lies between the inner and the outer polygons.
     """
-    problem = _Problem(tolerance, position_boxes(items, tolerance, rows), LinearSystem(list(rows)))
+    problem = _Problem(tolerance, position_boxes(items, tolerance, rows), LinearSystem(list(rows)), list(alternatives))
     for item in items:
         problem.add(item)
     variables = {leaf.identity: leaf for leaf in leaves(*(node for _, node, _ in items), *places)}
@@ -140,7 +152,7 @@ class _Problem:
     tolerance: Tolerance
     boxes: Mapping[Identity, Box]
     system: LinearSystem
-    alternatives: list[_Alternative] = field(default_factory=list["_Alternative"])
+    alternatives: list[Alternative] = field(default_factory=list["Alternative"])
     discs: list[tuple[Affine, Affine, float]] = field(default_factory=list[tuple[Affine, Affine, float]])
 
     def add(self, item: _Item) -> None:
@@ -191,6 +203,10 @@ class _Problem:
                 if place is None:
                     raise NotLinear
                 self._add_place(cast(Region, node.region.value), place, None)
+            case Compare(CompareOp.LT | CompareOp.LE, Norm() as norm, Constant(value=float() as radius)) | Compare(
+                CompareOp.GT | CompareOp.GE, Constant(value=float() as radius), Norm() as norm
+            ) if radius > 0 and (line := affine_vector(norm.vector)) is not None:
+                self.discs.append((*line, radius))
             case Compare() if node.op not in (CompareOp.EQ, CompareOp.NE):
                 left, right = affine_scalar(node.left), affine_scalar(node.right)
                 if left is None or right is None:
@@ -249,10 +265,10 @@ class _Problem:
         return found
 
 
-def _places(region: Region, limits: tuple[float, float, float, float], place: AffineVector) -> _Alternative:
+def _places(region: Region, limits: tuple[float, float, float, float], place: AffineVector) -> Alternative:
     """One set of rows for each convex piece of a region near a box."""
     x, y = place
-    found: _Alternative = []
+    found: Alternative = []
     for part in region.parts if isinstance(region, UnionOf) else (region,):
         match part:
             case PolygonSet() | Rectangle():
@@ -306,7 +322,7 @@ def _polygons(discs: Sequence[tuple[Affine, Affine, float]], *, outer: bool) -> 
 
 
 def _search(
-    system: LinearSystem, alternatives: list[_Alternative], rows: list[Row]
+    system: LinearSystem, alternatives: list[Alternative], rows: list[Row]
 ) -> Mapping[tuple[Identity, int], float] | None:
     """A solution under one choice of each alternative, depth first with early failure."""
     if not alternatives:

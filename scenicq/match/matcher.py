@@ -115,8 +115,11 @@ class Matcher:
         if direct is None:
             return None
         disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
-        found = Casting(direct, options, label, ego, among, disc, places).solve()
+        casting = Casting(direct, options, label, ego, among, disc, places)
+        found = casting.solve()
         if isinstance(found, Failure):
+            if not (direct.words and casting.words):
+                return None
             return NoMatch(self._cause(found), self._names(label, 0, found.assignment))
         return None if found is None else self._match(label, 0, found)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 
 from scenicq.forest.nodes import Value
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["observe", "observe_params"]
+__all__ = ["observe", "observe_params", "observed_names"]
 
 
 def observe(thing: LabelObject) -> Mapping[str, Value]:
@@ -24,6 +25,22 @@ def observe(thing: LabelObject) -> Mapping[str, Value]:
     for name, value in thing.attributes.items():
         seen.setdefault(name, value if isinstance(value, str | bool) else float(value))
     return seen
+
+
+def observed_names(thing: LabelObject) -> frozenset[str]:
+    """The names of the properties that a label object has."""
+    if thing.attributes:
+        return frozenset(observe(thing))
+    present = (thing.heading, thing.width, thing.length, thing.height, thing.velocity)
+    return _names(tuple([value is not None for value in present]))
+
+
+@cache
+def _names(present: tuple[bool, ...]) -> frozenset[str]:
+    parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"))
+    return frozenset(
+        ("position", *(name for names, there in zip(parts, present, strict=True) if there for name in names))
+    )
 
 
 def observe_params(label: Label) -> Mapping[str, Value]:

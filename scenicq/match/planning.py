@@ -9,6 +9,7 @@ from scenicq.forest.groups import Group
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.forest.walk import features
 from scenicq.match.constraints import Signature, build_groups
+from scenicq.match.necessary import Steps, steps_of
 from scenicq.match.options import MatchOptions
 from scenicq.match.parts import parts_of
 from scenicq.match.quick import Quick, quick_of
@@ -27,6 +28,7 @@ class GroupPlan:
         roles: The objects that it is about, the ego left out, in the order in which the question speaks of them.
         quick: Its closed form, if it has one.
         parts: What a group about many objects demands of one or two of them.
+        steps: In which its necessary conditions are evaluated.
     """
 
     group: Group
@@ -34,6 +36,7 @@ class GroupPlan:
     roles: tuple[int, ...]
     quick: Quick | None = None
     parts: tuple[GroupPlan, ...] = ()
+    steps: Steps = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +98,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
             number = kinds.setdefault(small.key, len(kinds))
             parts.append(GroupPlan(part, number, small.roles, quick_of(part)))
         number = kinds.setdefault(shape.key, len(kinds))
-        groups.append(GroupPlan(group, number, shape.roles, quick_of(group), tuple(parts)))
+        groups.append(GroupPlan(group, number, shape.roles, quick_of(group), tuple(parts), steps_of(group)))
         paired = [part.roles for part in parts if len(part.roles) > 1]
         # of a chain, the next one is what can be checked next
         chained = set(shape.roles) == {index for roles in paired for index in roles}

@@ -90,6 +90,13 @@ class _Matching:
         path: list[tuple[int, Iterator[int], int]] = [(name, iter(self.options[name]), -1)]
         while path:
             slot, options, _ = path[-1]
+            # a free one ends the path at once
+            free = next((c for c in self.options[slot] if c not in self.holder and c not in self.pinned), None)
+            if free is not None:
+                path[-1] = (slot, options, free)
+                for taker, _, taken in path:
+                    self.mate[taker], self.holder[taken] = taken, taker
+                return set()
             for candidate in options:
                 if candidate in seen:
                     continue

@@ -45,7 +45,7 @@ def thinned(
             continue
         options = tuple(candidates[index] for index in group.roles)
         if (group.kind, options) not in known:
-            known[group.kind, options] = possible(group.group, columns.of(group, options), tolerance)
+            known[group.kind, options] = possible(group.group, group.steps, columns.of(group, options), tolerance)
         answer: Any = known[group.kind, options]
         if len(group.roles) == 1:
             alive[group.roles[0]] &= np.broadcast_to(answer, len(options[0]))
@@ -63,19 +63,27 @@ def _propagate(
     alive: dict[int, NDArray[np.bool_]], pairs: Sequence[tuple[GroupPlan, NDArray[np.bool_]]]
 ) -> tuple[int, GroupPlan] | None:
     """Drop candidates without a partner in some pair, until nothing changes or an object has none."""
+    left = {index: int(each.sum()) for index, each in alive.items()}
+    seen: list[tuple[int, int] | None] = [None] * len(pairs)
     changed = True
     while changed:
         changed = False
-        for group, matrix in pairs:
+        for place, (group, matrix) in enumerate(pairs):
             first, second = group.roles
+            if seen[place] == (left[first], left[second]):
+                # candidates are only dropped, so nothing is new
+                continue
             one, other = alive[first], alive[second]
             supported = one & matrix[:, other].any(axis=1)
             backed = other & matrix[supported].any(axis=0)
-            if supported.sum() < one.sum() or backed.sum() < other.sum():
+            counts = int(supported.sum()), int(backed.sum())
+            if counts != (left[first], left[second]):
                 alive[first], alive[second] = supported, backed
+                left[first], left[second] = counts
                 changed = True
-                if not supported.any():
+                if not counts[0]:
                     return first, group
+            seen[place] = counts
     return None
 
 

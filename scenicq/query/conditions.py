@@ -297,11 +297,16 @@ def _sql(condition: str | bool) -> str:
     return condition if isinstance(condition, str) else "" if condition else "false"
 
 
+_MOST_SUMMANDS = 64
+
+
 def _summands(node: Node) -> list[Node]:
-    """The terms of a sum."""
+    """The terms of a sum; the sum itself if it has very many: terms that are shared count again and again."""
     found: list[Node] = []
     stack = [node]
     while stack:
+        if len(stack) + len(found) > _MOST_SUMMANDS:
+            return [node]
         part = stack.pop()
         if isinstance(part, Arithmetic) and part.op is ArithmeticOp.ADD:
             stack.extend(part.args)

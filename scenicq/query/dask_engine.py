@@ -22,8 +22,9 @@ from itertools import islice
 from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.processes import processors
 from scenicq.query.partitions import Partition
-from scenicq.query.pieces import Done, Engine, Progress, Question, alone, processors, run_piece
+from scenicq.query.pieces import Done, Engine, Progress, Question, alone, run_piece
 from scenicq.query.run import Query
 
 __all__ = ["dask_engine"]
@@ -42,7 +43,7 @@ def dask_engine(address: str | None = None) -> Engine:
     Args:
         address: Of a scheduler, such as `tcp://host:8786`, whose workers have this version of scenicq and see the
             dataset under the same path. By default workers are started on this machine for the time of the query, as
-            many as the query's `jobs` or, if that is 1, as there are processors.
+            many as the query's `jobs` or, if that is None, as there are processors.
 
     Raises:
         DataError: option-invalid: Dask is not installed.
@@ -87,7 +88,7 @@ def _client(query: Query, address: str | None) -> Generator[Any]:
         with client:
             yield client
         return
-    jobs = query.options.jobs if query.options.jobs > 1 else processors()
+    jobs = query.options.jobs or processors()
     with (
         tempfile.TemporaryDirectory(prefix="scenicq-dask-", ignore_cleanup_errors=True) as folder,
         LocalCluster(

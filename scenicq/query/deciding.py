@@ -118,7 +118,7 @@ class Decider:
             labels = [Candidate(label, None) for label in every_label(self.dataset, block)]
             return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
         missed = sift(self.dataset, self._connection, world.plan, block)
-        named = names(self._connection) if self.every else []
+        named = names(self.dataset, self._connection, block) if self.every else []
         left = candidates(self._connection, world.plan) if (missed < 0).any() else iter(())
         return Decided(missed, self._matched(matcher, left), named)
 

@@ -212,7 +212,7 @@ def _show_proofs(proofs: Sequence[Proof]) -> list[str]:
     rows: list[tuple[str, str, str]] = []
     for proof in proofs:
         value = proof.value
-        shown = f"({value[0]:.2f}, {value[1]:.2f})" if isinstance(value, tuple) else f"{value:.4g}"
+        shown = f"({value[0]:z.2f}, {value[1]:z.2f})" if isinstance(value, tuple) else f"{value:z.4g}"
         place = proof.span.place if proof.span else ""
         text = " ".join(proof.span.text.split()) if proof.span else ""
         rows.append((place, text if len(text) <= 60 else f"{text[:57]}...", shown))

@@ -148,7 +148,7 @@ def _frames(query: Query, plan: Plan) -> Iterator[str]:
         for block in query.blocks(plan.map):
             missed = sift(query.dataset, connection, plan, block).tolist()
             if min(missed, default=0) < 0:
-                rows = zip(names(connection), missed, strict=True)
+                rows = zip(names(query.dataset, connection, block), missed, strict=True)
                 yield from (frame for (frame, _, _), number in rows if number < 0)
 
 

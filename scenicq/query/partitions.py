@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby, pairwise
@@ -22,6 +21,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.query.results import Funnel
 from scenicq.query.run import QueryOptions, Stretch
 from scenicq.store.dataset import Dataset
+from scenicq.store.whole_files import whole_file
 
 __all__ = ["Gathered", "Partition", "fingerprint", "gather", "is_done", "partitions", "write_partition"]
 
@@ -110,21 +110,15 @@ def write_partition(
         DataError: target-unwritable.
     """
     target = _file(folder, question, piece.number, piece.count)
-    partial = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with partial.open("w", encoding="utf-8") as file:
+        with whole_file(target) as file:
             for each in records:
-                file.write(json.dumps(each, ensure_ascii=False) + "\n")
+                file.write((json.dumps(each, ensure_ascii=False) + "\n").encode())
             counts = {name: getattr(funnel, name) for name in _COUNTS}
-            file.write(json.dumps({"funnel": counts}) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(target)
+            file.write((json.dumps({"funnel": counts}) + "\n").encode())
     except OSError as error:
         raise DataError(Diagnostic("target-unwritable", f"{target} cannot be written: {error.strerror}")) from None
-    finally:
-        partial.unlink(missing_ok=True)
     return target
 
 

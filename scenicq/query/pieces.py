@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.match.verdict import Match
-from scenicq.processes import Lost, Workers
+from scenicq.processes import Lost, Workers, as_many_as_pay
 from scenicq.query.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
 from scenicq.query.restore import restore
 from scenicq.query.results import Funnel, Result, record
@@ -27,7 +26,6 @@ __all__ = [
     "in_order",
     "kept",
     "pieces_of",
-    "processors",
     "run_here",
     "run_piece",
 ]
@@ -110,14 +108,18 @@ def run_here(query: Query, pieces: Iterable[Partition], progress: Progress) -> G
     A process that dies costs the time of its piece. A piece that kills every process is run frame by frame where need
     be, so that only the frames that kill are unknown.
     """
-    if query.options.jobs <= 1:
-        own = replace(query)
+    jobs = query.options.jobs
+    if jobs is None:
+        worthwhile = query.dataset.manifest.total.frames // PIECE_FRAMES
+        jobs = max(1, min(as_many_as_pay(), worthwhile))
+    if jobs <= 1:
+        own = replace(query, options=replace(query.options, jobs=1))
         for piece in pieces:
             yield piece, run_piece(own, piece, progress)
         return
     question = Question.of(query)
     asked = ((question, piece) for piece in pieces)
-    workers: Workers[Asked, Done] = Workers(query.options.jobs, _start)
+    workers: Workers[Asked, Done] = Workers(jobs, _start)
     with workers:
         for (_, piece), done in workers.run(asked):
             yield piece, alone(query, piece) if isinstance(done, Lost) else done
@@ -188,8 +190,3 @@ def _start() -> Callable[[Asked, Callable[[object], None]], Done]:
         return run_piece(known[question.fingerprint], piece)
 
     return work
-
-
-def processors() -> int:
-    """How many processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

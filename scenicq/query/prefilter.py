@@ -161,7 +161,7 @@ def sift(dataset: Dataset, connection: duckdb.DuckDBPyConnection, plan: Plan, bl
 
     Args:
         dataset: The dataset.
-        connection: To it; keeps what `candidates` and `names` read.
+        connection: To it; keeps what `candidates` reads.
         plan: The plan.
         block: The block.
 
@@ -184,8 +184,9 @@ def sift(dataset: Dataset, connection: duckdb.DuckDBPyConnection, plan: Plan, bl
     return missed
 
 
-def names(connection: duckdb.DuckDBPyConnection) -> list[tuple[str, str, int]]:
-    """Frame, recording and timestamp of every frame of the block that was sifted last, in order."""
+def names(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block) -> list[tuple[str, str, int]]:
+    """Frame, recording and timestamp of every frame of a block, in order."""
+    _open(dataset, connection, block)
     return connection.execute(f"SELECT frame, recording, timestamp_us FROM {LABELS} ORDER BY number").fetchall()
 
 
@@ -216,16 +217,20 @@ def candidates(connection: duckdb.DuckDBPyConnection, plan: Plan) -> Iterator[Ca
     numbers, owners = frames["number"].to_numpy(), objects["f"].to_numpy()
     counts = np.searchsorted(owners, numbers, side="right") - np.searchsorted(owners, numbers)
     frames = frames.set_column(frames.column_names.index("object_count"), "object_count", [counts.astype(np.int32)])
-    may = [objects[f"r{place}"].to_pylist() for place in range(len(plan.roles))]
-    first = 0
-    for label in _assembled(frames, objects, sensors):
-        end = first + len(label.objects)
-        among = {
-            index: tuple([n for n, possible in enumerate(flags_[first:end], 1) if possible])
-            for index, flags_ in zip(plan.roles, may, strict=True)
-        }
-        first = end
-        yield Candidate(label, among)
+    ends = np.concatenate(([0], np.cumsum(counts)))
+    may = [
+        (index, *_numbered(np.array(objects[f"r{place}"].to_pylist(), dtype=bool), ends))
+        for place, index in enumerate(plan.roles)
+    ]
+    for place, label in enumerate(_assembled(frames, objects, sensors)):
+        yield Candidate(label, {index: tuple(mine[cuts[place] : cuts[place + 1]]) for index, mine, cuts in may})
+
+
+def _numbered(chosen: NDArray[np.bool_], ends: NDArray[np.int64]) -> tuple[list[int], list[int]]:
+    """Objects that are chosen, counted from 1 in each label, and where those of a label end; `ends` begins with 0."""
+    rows = np.flatnonzero(chosen)
+    cuts = np.searchsorted(rows, ends)
+    return (rows - np.repeat(ends[:-1], np.diff(cuts)) + 1).tolist(), cuts.tolist()
 
 
 def _assembled(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> Iterator[Label]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -17,6 +16,7 @@ from scenicq.query.partitions import fingerprint
 from scenicq.query.results import Result
 from scenicq.query.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
+from scenicq.store.whole_files import write_whole
 
 __all__ = ["note_question", "noted_question", "restore"]
 
@@ -72,15 +72,11 @@ def note_question(folder: Path, query: Query) -> None:
         "file": str((query.file or Path(query.source.name)).resolve()),
         "options": asdict(query.options),
     }
-    beside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        beside.write_text(json.dumps(content, default=sorted, ensure_ascii=False) + "\n", encoding="utf-8")
-        beside.replace(file)
+        write_whole(file, json.dumps(content, default=sorted) + "\n")
     except OSError as error:
         raise DataError(Diagnostic("target-unwritable", f"{file} cannot be written: {error.strerror}")) from None
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def noted_question(folder: Path, question: str) -> Query:

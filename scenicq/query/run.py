@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
 
@@ -19,11 +19,11 @@ from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
-from scenicq.processes import Lost, Workers
-from scenicq.query.deciding import Decided, Decider, World, every_label
+from scenicq.query.deciding import Decided, Decider, World
+from scenicq.query.hands import Hands
 from scenicq.query.maps import about_dataset, map_remark
 from scenicq.query.plan import Plan
-from scenicq.query.prefilter import Block, Extent, blocks, extents
+from scenicq.query.prefilter import Block, Extent, blocks, extents, names
 from scenicq.query.results import Funnel, Result
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
@@ -41,7 +41,7 @@ class QueryOptions:
         version: The version of Scenic; inferred if None.
         initial: Whether dynamic parts of the program are ignored.
         prefilter: Whether SQL narrows the frames first; the results are the same.
-        jobs: Processes that match.
+        jobs: Processes that match; None for as many as pays.
         limit: Matches after which to stop; None for all.
         every: Whether frames that do not match are results too.
         all_matches: Whether every correspondence of a frame is a result of its own.
@@ -52,7 +52,7 @@ class QueryOptions:
     version: Literal[1, 2, 3] | None = None
     initial: bool = False
     prefilter: bool = True
-    jobs: int = 1
+    jobs: int | None = 1
     limit: int | None = None
     every: bool = False
     all_matches: bool = False
@@ -175,28 +175,30 @@ class Query:
             worlds[map_name] = World.of(*self.compile(map_name), options.match, prefilter=options.prefilter)
         return worlds[map_name]
 
-    def _worlds(self) -> list[tuple[str, World]]:
-        """The scenario over each map that it fits; an error if it fits none."""
+    def _worlds(self) -> dict[str, World | Diagnostic]:
+        """The scenario over each map, or what the map lacks; an error if it fits none."""
         self._check_ego()
-        found: list[tuple[str, World]] = []
+        found: dict[str, World | Diagnostic] = {}
         errors: list[ScenarioError] = []
         for name in self.dataset.maps:
             try:
-                found.append((name, self.world(name)))
+                found[name] = self.world(name)
             except ScenarioError as error:
                 if error.diagnostics[0].code != "map-lacks":
                     raise
                 errors.append(error)
+                found[name] = error.diagnostics[0]
                 count = self.dataset.manifest.by_map.get(name, Counts()).frames
                 message = f"{count} frames on map `{name}` cannot match: {error.diagnostics[0].message}"
                 self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
                 if here := self._frames(name):
                     self.funnel.frames += here
                     self.funnel.excluded[f"map {name}"] += here
-        if errors and not found:
+        if errors and len(errors) == len(found):
             raise errors[0]
-        if found:
-            self.funnel.warnings += _remarks(found[0][1].scenario)
+        worlds = [world for world in found.values() if isinstance(world, World)]
+        if worlds:
+            self.funnel.warnings += _remarks(worlds[0].scenario)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
         return found
@@ -213,7 +215,8 @@ class Query:
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
-        return [world.plan for name, world in self._worlds() if self._frames(name)]
+        worlds = self._worlds().items()
+        return [world.plan for name, world in worlds if isinstance(world, World) and self._frames(name)]
 
     def blocks(self, map_name: str, least: int = 1) -> list[Block]:
         """The frames of a map that are looked at, cut into blocks in the order of the store.
@@ -227,15 +230,19 @@ class Query:
                 self._known.extents = extents(self.dataset, connection)
         return blocks(self._known.extents, map_name, self._between(map_name), least=least, whole=self.options.prefilter)
 
-    def decider(self) -> Decider:
-        """What decides the blocks of this query in one process; to be used in a `with` statement."""
+    def decider(self, threads: int | None = None) -> Decider:
+        """What decides the blocks of this query in one process; to be used in a `with` statement.
+
+        Args:
+            threads: Of the database; as many as it likes by default.
+        """
         options = self.options
         return Decider(
             self.dataset,
             options.match,
             options.solver,
             self.world,
-            threads=1 if options.jobs > 1 else None,
+            threads=threads,
             all_matches=options.all_matches,
             every=options.every,
         )
@@ -250,22 +257,34 @@ class Query:
             ScenarioError: The program is wrong or not supported.
         """
         worlds = self._worlds()
-        left = self.options.limit
+        left, progress = self.options.limit, progress or _ignore
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
-            pool = stack.enter_context(_Pool(self)) if self.options.jobs > 1 else None
-            decider = stack.enter_context(self.decider())
-            for name, world in worlds:
+            setup = (self.dataset.address, self.source, self.options, self.file)
+            hands = stack.enter_context(Hands(self.dataset, self.options.jobs, self.decider(), _start_worker, setup))
+            for name, world in worlds.items():
                 if not self._frames(name):
                     continue
-                cut = self.blocks(name, 4 * self.options.jobs if pool else 1)
-                decided = pool.run(cut) if pool else map(decider.decide, cut)
-                for result in self._merge(world.plan, decided, progress or _ignore):
+                if isinstance(world, Diagnostic):
+                    yield from self._lacking(name, world, progress)
+                    continue
+                cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1)
+                for result in self._merge(world.plan, hands.decide(cut), progress):
                     yield result
                     if isinstance(result.verdict, Match) and left is not None:
                         left -= 1
                         if left <= 0:
                             return
+
+    def _lacking(self, map_name: str, told: Diagnostic, progress: Callable[[int], None]) -> Iterator[Result]:
+        """The frames of a map that lacks what the program needs, which are counted already."""
+        if self.options.every:
+            cause = Cause(f"map {map_name}", told.message, told.span)
+            with closing(self.dataset.connect()) as connection:
+                for block in self.blocks(map_name):
+                    for frame, recording, time in names(self.dataset, connection, block):
+                        yield Result(frame, recording, time, NoMatch(cause))
+        progress(self._frames(map_name))
 
     def _merge(self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]) -> Iterator[Result]:
         for block in decided:
@@ -317,50 +336,11 @@ def _remarks(scenario: Scenario) -> list[Diagnostic]:
     return [*scenario.warnings, *scenario.ignored, *soft]
 
 
-_TRIES = 3
-"""Processes that a block, and then a frame alone, may cost."""
-
-
-class _Pool:
-    """Worker processes that each hold the compiled scenario; blocks come back in order.
-
-    A process that dies costs nothing but its block's time. Of a block that kills every process which takes it, the
-    frames that do so are found by halving, and are unknown.
-    """
-
-    def __init__(self, query: Query) -> None:
-        self.query = query
-        setup = (query.dataset.address, query.source, query.options, query.file)
-        self.workers: Workers[Block, Decided] = Workers(query.options.jobs, _start_worker, setup)
-
-    def __enter__(self) -> _Pool:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self.workers.__exit__(*error)
-
-    def run(self, blocks_: Iterable[Block], *, tries: int = _TRIES) -> Iterator[Decided]:
-        """Decide blocks side by side, a bounded number ahead."""
-        for block, found in self.workers.run(blocks_, tries=tries):
-            yield from self._halves(block) if isinstance(found, Lost) else (found,)
-
-    def _halves(self, block: Block) -> Iterator[Decided]:
-        if block.end - block.first > 1:
-            for half in block.halves():
-                # a half is lost at once: only what is left to blame, a frame, gets more chances
-                yield from self.run([half], tries=1 if half.end - half.first > 1 else _TRIES)
-            return
-        for label in every_label(self.query.dataset, block):
-            lost = Unknown("crash", Cause("process", "every process that matched this frame died"))
-            result = Result(label.frame, label.recording, label.timestamp_us, lost, label.sensors)
-            yield Decided(np.full(1, -1, np.int16), [[result]], [])
-
-
 def _start_worker(
     dataset: str, source: Source, options: QueryOptions, file: Path | None
 ) -> Callable[[Block, Callable[[object], None]], Decided]:
     """What a worker process keeps between blocks."""
-    decider = Query(open_dataset(dataset), source, options, file=file).decider()
+    decider = Query(open_dataset(dataset), source, options, file=file).decider(threads=1)
 
     def work(block: Block, _tell: Callable[[object], None]) -> Decided:
         decided = decider.decide(block)

@@ -87,6 +87,9 @@ def _hopeless(scenario: Scenario, improviser: Improviser, drawn: int) -> Scenari
     """What to say where no scene comes up: which condition rejects most, and how often."""
     times = improviser.times_rejected()
     total = sum(count for _, count in times)
+    if not times and improviser.impossible is None:
+        message = f"no scene came up on map `{scenario.map}`: it cannot be told {improviser.undecided}"
+        return ScenarioError(Diagnostic("impossible-requirement", message))
     if improviser.impossible is not None:
         worst, message = improviser.impossible, f"no scene on map `{scenario.map}` satisfies the program"
         label = f"{worst.text} cannot be met here"

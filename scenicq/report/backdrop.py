@@ -27,6 +27,8 @@ _DETAIL = 0.05
 """Metres by which a simplified outline may be off."""
 _APART = 12.0
 """Metres between marks of direction."""
+_CLEAR = 2.5
+"""Metres across the squares that have one mark at most: less than from one lane to the next."""
 _MARK = np.array([(-0.55, -0.45), (0.0, 0.45), (0.55, -0.45)])
 """A mark: metres to the right and ahead."""
 
@@ -59,7 +61,10 @@ class Backdrop:
         rows: list[Coordinates] = [np.empty((0, 3))]
         for lane in self.network.roadDirection.lanes:
             rows += map(_along, lane.centerline)
-        return np.concatenate(rows)
+        found = np.concatenate(rows)
+        # where lanes cross or part, marks over marks cannot be read
+        _, first = np.unique(np.floor(found[:, :2] / _CLEAR), axis=0, return_index=True)
+        return found[np.sort(first)]
 
     def draw(self, plane: Plane, bounds: Bounds) -> str:
         """The part of the map within bounds (metres), as one group.

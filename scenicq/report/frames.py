@@ -58,9 +58,9 @@ def _roles(shot: Shot) -> str:
         where: list[str] = []
         if ego is not None and thing is not ego and ego.heading is not None:
             right, ahead = rotate(thing.x - ego.x, thing.y - ego.y, -ego.heading)
-            where = [f"{ahead:+.1f} m ahead", f"{right:+.1f} m right"]
+            where = [f"{ahead:+z.1f} m ahead", f"{right:+z.1f} m right"]
             if thing.heading is not None:
-                where.append(f"{math.degrees(normalize(thing.heading - ego.heading)):+.0f}\N{DEGREE SIGN} turned")
+                where.append(f"{math.degrees(normalize(thing.heading - ego.heading)):+z.0f}\N{DEGREE SIGN} turned")
         name = element("span", escape(role.name), class_=f"chip {role.colour}")
         played = element("span", escape(thing.id), class_="id") + element("div", escape(thing.category), class_="time")
         rows.append((name, played, "<br>".join(element("span", escape(each), class_="where") for each in where)))
@@ -68,7 +68,7 @@ def _roles(shot: Shot) -> str:
 
 
 def _value(value: float | tuple[float, float]) -> str:
-    shown = f"({value[0]:.2f}, {value[1]:.2f})" if isinstance(value, tuple) else f"{value:.5g}"
+    shown = f"({value[0]:z.2f}, {value[1]:z.2f})" if isinstance(value, tuple) else f"{value:z.5g}"
     return element("span", escape(shown), class_="where")
 
 

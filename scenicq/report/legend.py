@@ -12,10 +12,8 @@ _SIGNS = (
     ("one with a role", f'<g class="box other c1">{_BOX}</g>'),
     ("the ego", f'<g class="box ego c0">{_BOX}</g>'),
     ("a size that the label does not have", f'<g class="box other nominal">{_BOX}</g>'),
-    (
-        "where a role may be; outlined if that depends on the frame",
-        '<path class="place local c1" d="M-230 -110h460v220h-460z"></path>',
-    ),
+    ("where a role may be", '<path class="place local c1" d="M-230 -110h460v220h-460z"></path>'),
+    ("the same, where the map alone says so", '<path class="place fixed c1" d="M-230 -110h460v220h-460z"></path>'),
     ("which way it may face", '<path class="facing c1" d="M-200 0L180 -110L220 0L180 110z"></path>'),
     ("a view region", '<path class="view" d="M-220 0L220 -125V125z"></path>'),
     ("a hidden point of the witness", '<path class="hidden-point" d="M-60 -60l120 120m0 -120l-120 120"></path>'),

@@ -104,7 +104,7 @@ def draw_overlay(
 
 
 def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.1f}\N{DEGREE SIGN}"
+    return f"{math.degrees(angle):z.1f}\N{DEGREE SIGN}"
 
 
 def draw_witness(verdict: Verdict | None, roles: tuple[Role, ...], plane: Plane, bounds: Bounds) -> str:
@@ -119,7 +119,7 @@ def draw_witness(verdict: Verdict | None, roles: tuple[Role, ...], plane: Plane,
         seen = any(math.hypot(role.thing.x - x, role.thing.y - y) < 0.05 for role in roles)
         if not seen and bounds[0] < x < bounds[2] and bounds[1] < y < bounds[3]:
             left, top = plane.at(x, y)
-            told = element("title", escape(f"hidden point of {place}: ({x:.2f}, {y:.2f})"))
+            told = element("title", escape(f"hidden point of {place}: ({x:z.2f}, {y:z.2f})"))
             cross = f"M{left - 60} {top - 60}l120 120m0 -120l-120 120"
             parts.append(element("path", told, class_="hidden-point", d=cross))
     return "".join(parts)

@@ -142,7 +142,7 @@ def _shown(name: str, value: Any) -> str:
         case bool():
             return "yes" if value else "no"
         case float() if name == "tolerance.heading":
-            return f"{math.degrees(value):.6g}\N{DEGREE SIGN}"
+            return f"{math.degrees(value):z.6g}\N{DEGREE SIGN}"
         case float() if name in _UNITS:
             return f"{value:g} {_UNITS[name]}"
         case frozenset():

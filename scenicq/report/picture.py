@@ -16,6 +16,7 @@ from scenicq.geometry.shapes import XY, Bounds
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.query.explain import Explanation
 from scenicq.report.backdrop import Backdrop
+from scenicq.report.hatching import hatching
 from scenicq.report.overlay import Blame, blames, draw_blame, draw_overlay, draw_witness
 from scenicq.report.scene import Role, box_of, draw_object, draw_text, find_roles
 from scenicq.report.svg import Plane, element, escape
@@ -278,7 +279,7 @@ def draw(
     return element(
         "svg",
         element("title", escape(shot.label.frame)),
-        element("style", stylesheet(dark=style == "adaptive")) if style != "none" else "",
+        element("style", stylesheet(dark=style == "adaptive")) + hatching() if style != "none" else "",
         element("rect", class_="paper", x=left, y=top, width=width, height=f"{height:.0f}"),
         picture,
         *texts,

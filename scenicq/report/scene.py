@@ -81,8 +81,8 @@ def _point_ahead(thing: LabelObject, heading: float, metres: float) -> XY:
 
 
 def _told(thing: LabelObject, role: str) -> str:
-    heading = "no heading" if thing.heading is None else f"heading {math.degrees(thing.heading):.1f}\N{DEGREE SIGN}"
-    where = f"({thing.x:.2f}, {thing.y:.2f}) m"
+    heading = "no heading" if thing.heading is None else f"heading {math.degrees(thing.heading):z.1f}\N{DEGREE SIGN}"
+    where = f"({thing.x:z.2f}, {thing.y:z.2f}) m"
     said = [role and f"role {role}", thing.id, thing.category, where, heading]
     if thing.velocity is not None:
         said.append(f"{math.hypot(*thing.velocity):.1f} m/s")

@@ -45,10 +45,15 @@ class Sensor:
     thumbnail: str | None = None
 
 
-def roots_of(dataset: Dataset) -> tuple[Path, ...]:
-    """The folders on this machine that the sensor files of a dataset may lie in: its source's, and its own."""
-    source = dataset.manifest.provenance.get("source")
-    return tuple(filter(None, (Path(source) if isinstance(source, str) else None, dataset.folder)))
+def roots_of(dataset: Dataset, source: Path | None) -> tuple[Path, ...]:
+    """The folders on this machine that the sensor files of a dataset may lie in: its source's, and its own.
+
+    Args:
+        dataset: The dataset.
+        source: Where the user says that it is from. What the dataset itself says is not taken: it may be a stranger's,
+            and name any folder.
+    """
+    return tuple(filter(None, (source, dataset.folder)))
 
 
 def can_make_thumbnails() -> bool:

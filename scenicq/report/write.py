@@ -69,6 +69,7 @@ def write_report(
     near: Sequence[Result] = (),
     command: str = "",
     elapsed_s: float = 0.0,
+    sensors: Path | None = None,
 ) -> Path:
     """Write a report into a folder; an earlier report there is replaced when the new one is complete.
 
@@ -79,6 +80,7 @@ def write_report(
         near: Near misses.
         command: The command line to run it again.
         elapsed_s: Seconds that the query took.
+        sensors: The folder that the paths of sensor files start from; only the dataset's own by default.
 
     Returns:
         The page.
@@ -91,7 +93,7 @@ def write_report(
         folder.mkdir(parents=True, exist_ok=True)
         work = Path(tempfile.mkdtemp(prefix=".report-", dir=folder))
         try:
-            text = _Report(query, folder, work).text(results, near, command, elapsed_s)
+            text = _Report(query, folder, work, sensors).text(results, near, command, elapsed_s)
             (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
             _replace(work, folder)
         finally:
@@ -123,10 +125,10 @@ class _World:
 class _Report:
     """What the parts of one report share."""
 
-    def __init__(self, query: Query, folder: Path, work: Path) -> None:
+    def __init__(self, query: Query, folder: Path, work: Path, sensors: Path | None) -> None:
         self.query, self.work = query, work
         self.worlds: dict[str, _World | None] = {}
-        self.files = SensorFiles(roots_of(query.dataset), folder, work, can_make_thumbnails())
+        self.files = SensorFiles(roots_of(query.dataset, sensors), folder, work, can_make_thumbnails())
         self.pictured = 0
 
     def world(self, name: str) -> _World | None:

@@ -78,7 +78,7 @@ from scenicq.smt.formula import (
     negation,
 )
 from scenicq.smt.inside import UnsupportedError, Vector, inside_region, picked
-from scenicq.smt.measure import Frame, box_meets, boxes_meet, distance_term
+from scenicq.smt.measure import Frame, box_meets, boxes_meet, disc_meets, distance_term, length, minus
 from scenicq.smt.unknowns import Unknowns
 
 __all__ = ["Expressions"]
@@ -254,6 +254,9 @@ class Expressions:
         return result
 
     def _meeting(self, node: Intersects) -> Formula:
+        for disc, other in ((node.left, node.right), (node.right, node.left)):
+            if isinstance(disc, DiscAt):
+                return self._disc_meets(disc, other)
         boxes = [side for side in (node.left, node.right) if is_box(side)]
         if len(boxes) == 2:
             return boxes_meet(self._frame(boxes[0]), self._frame(boxes[1]))
@@ -261,6 +264,19 @@ class Expressions:
             raise UnsupportedError("whether two random regions meet")
         other = node.right if boxes[0] is node.left else node.left
         return box_meets(self._frame(boxes[0]), known_region(other))
+
+    def _disc_meets(self, disc: DiscAt, other: Node) -> Formula:
+        center, radius = cast(Vector, self.code(disc.center)), cast(Term, self.code(disc.radius))
+        if is_box(other):
+            return disc_meets(self._frame(other), center, radius)
+        reach = compare(">=", radius, 0.0)
+        if isinstance(other, DiscAt):
+            size = cast(Term, self.code(other.radius))
+            other_center = cast(Vector, self.code(other.center))
+            away = length(minus(center, other_center))
+            sizes = compare(">=", size, 0.0), compare("<=", away, apply(Operator.ADD, radius, size))
+            return conjunction([reach, *sizes])
+        return conjunction([reach, compare("<=", self._distance(Distance(other, disc.center), center), radius)])
 
     def _frame(self, node: Node) -> Frame:
         """A box whose place may be random."""

@@ -16,13 +16,24 @@ import numpy as np
 import shapely
 
 from scenicq.forest.bounds import Box
+from scenicq.geometry.boxes import corners as box_corners
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
 from scenicq.smt.formula import Formula, Num, Operator, Term, apply, compare, conjunction, disjunction
 from scenicq.smt.inside import UnsupportedError, Vector, convex_cell, disc
 
-__all__ = ["Frame", "box_meets", "boxes_meet", "distance_term", "dot", "minus", "squared_distance"]
+__all__ = [
+    "Frame",
+    "box_meets",
+    "boxes_meet",
+    "disc_meets",
+    "distance_term",
+    "dot",
+    "length",
+    "minus",
+    "squared_distance",
+]
 
 _MOST_SEGMENTS = 200
 
@@ -79,7 +90,8 @@ def _square_length(a: Vector) -> Term:
     return apply(Operator.ADD, apply(Operator.POW, a[0], 2.0), apply(Operator.POW, a[1], 2.0))
 
 
-def _length(a: Vector) -> Term:
+def length(a: Vector) -> Term:
+    """The length of a vector."""
     return apply(Operator.SQRT, _square_length(a))
 
 
@@ -94,6 +106,9 @@ def _points(region: Region) -> np.ndarray:
                     corners = shapely.get_coordinates(line)
                     rows.append(np.concatenate([corners[:-1], corners[1:]], axis=1))
             return np.concatenate(rows)
+        case Rectangle():
+            outline = box_corners(*region.center, region.heading, region.width, region.length)
+            return np.concatenate([outline, np.roll(outline, -1, axis=0)], axis=1)
         case PointSet():
             points = np.array(region.points, dtype=float).reshape(-1, 2)
             return np.concatenate([points, points], axis=1)
@@ -113,13 +128,13 @@ def distance_term(region: Region, point: Vector, around: Box) -> tuple[Term, lis
         UnsupportedError: The region has no segments, or too many of them.
     """
     if isinstance(region, Disc):
-        away = _length(minus(point, (Num(region.center[0]), Num(region.center[1]))))
+        away = length(minus(point, (Num(region.center[0]), Num(region.center[1]))))
         return apply(Operator.MAX, apply(Operator.SUB, away, region.radius), 0.0), []
     segments = _nearest_only(_points(region), around)
     if not len(segments) or len(segments) > _MOST_SEGMENTS:
         raise UnsupportedError("the distance from a random point to a region of so many edges")
     outside = apply(Operator.MIN, *(_to_segment(point, segment) for segment in segments.tolist()))
-    if not isinstance(region, PolygonSet):
+    if not isinstance(region, PolygonSet | Rectangle):
         return outside, []
     (x0, x1), (y0, y1) = around
     west, south, east, north = region_bounds(region)
@@ -163,6 +178,16 @@ def boxes_meet(one: Frame, other: Frame) -> Formula:
     )
 
 
+def disc_meets(box: Frame, center: Vector, radius: Term) -> Formula:
+    """Whether a box and a disc have a point in common."""
+    offset = minus(center, box.center)
+    gaps = [
+        apply(Operator.MAX, apply(Operator.SUB, apply(Operator.ABS, dot(offset, axis)), half), 0.0)
+        for axis, half in ((box.right, box.half_width), (box.ahead, box.half_length))
+    ]
+    return conjunction([compare(">=", radius, 0.0), disc(gaps[0], gaps[1], radius)])
+
+
 def box_meets(box: Frame, region: Region) -> Formula:
     """Whether a box and a known region have a point in common.
 
@@ -178,12 +203,7 @@ def box_meets(box: Frame, region: Region) -> Formula:
             sizes = Num(region.heading), Num(region.width), Num(region.length)
             return boxes_meet(box, Frame.of((Num(region.center[0]), Num(region.center[1])), *sizes))
         case Disc():
-            offset = minus((Num(region.center[0]), Num(region.center[1])), box.center)
-            gaps = [
-                apply(Operator.MAX, apply(Operator.SUB, apply(Operator.ABS, dot(offset, axis)), half), 0.0)
-                for axis, half in ((box.right, box.half_width), (box.ahead, box.half_length))
-            ]
-            return disc(gaps[0], gaps[1], region.radius)
+            return disc_meets(box, (Num(region.center[0]), Num(region.center[1])), Num(region.radius))
         case PolygonSet():
             cells = convex_cells(region, region_bounds(region))
             if len(cells) > _MOST_SEGMENTS:

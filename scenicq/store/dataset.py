@@ -97,6 +97,8 @@ class Dataset:
         if memory_limit is not None:
             config["memory_limit"] = memory_limit
         connection = duckdb.connect(":memory:", config=config)
+        # shapes are not for SQL, and DuckDB 1.5.0 refuses those without a coordinate reference system
+        connection.execute("SET enable_geoparquet_conversion = false")
         self.place.admit(connection, (part for parts in self.manifest.tables.values() for part in parts))
         every: list[str] = []
         for table in self.manifest.tables:

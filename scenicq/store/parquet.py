@@ -16,8 +16,9 @@ import pyarrow.parquet as pq
 from scenicq.store.manifest import Part
 from scenicq.store.regions import GEO_METADATA
 from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS, ArrowTable
+from scenicq.store.whole_files import sync_folder
 
-__all__ = ["TableWriter", "part_path", "sync_folder", "write_synced"]
+__all__ = ["TableWriter", "part_path"]
 
 _ROW_GROUP = 122_880
 _DISTINCT = ("id", "properties")
@@ -103,25 +104,3 @@ class TableWriter:
         rest = table.slice(rows)
         self._pending = [rest] if len(rest) else []
         self._pending_rows = len(rest)
-
-
-def write_synced(path: Path, text: str) -> None:
-    """Write a text file so that it is there completely or not at all, even if the machine stops."""
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    with temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
-    sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Make renames in a folder last, where the system can."""
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

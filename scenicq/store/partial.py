@@ -18,8 +18,8 @@ from typing import IO
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.manifest import is_dataset
-from scenicq.store.parquet import sync_folder
 from scenicq.store.reading import nobody_reads
+from scenicq.store.whole_files import sync_folder
 
 try:
     import fcntl

@@ -13,16 +13,18 @@ import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, Self
 from urllib.parse import unquote, urlsplit
 
-import duckdb
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.manifest import MANIFEST, Part
 from scenicq.store.reading import Reading
 from scenicq.store.remote import RemoteFile, RemoteFolder
+
+if TYPE_CHECKING:  # an ingest needs no DuckDB, which is slow to load
+    import duckdb
 
 __all__ = ["LocalFolder", "Place", "StoreFile", "find_place", "open_parquet"]
 

@@ -21,12 +21,13 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cache
 from importlib.util import find_spec
-from typing import Any, BinaryIO, Self, cast
-
-import duckdb
+from typing import TYPE_CHECKING, Any, BinaryIO, Self, cast
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.manifest import MANIFEST, Part
+
+if TYPE_CHECKING:  # an ingest needs no DuckDB, which is slow to load
+    import duckdb
 
 __all__ = ["RemoteFile", "RemoteFolder"]
 

@@ -20,10 +20,11 @@ from typing import Any
 
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.manifest import Counts, Part
-from scenicq.store.parquet import TableWriter, part_path, write_synced
+from scenicq.store.parquet import TableWriter, part_path
 from scenicq.store.placement import MapIndex
 from scenicq.store.rows import recording_rows
 from scenicq.store.schema import SEGMENT_TABLES
+from scenicq.store.whole_files import write_whole
 
 __all__ = ["SEGMENT_OBJECTS", "Problem", "Segment", "SegmentWriter", "read_segments", "segments_of", "take_over"]
 
@@ -191,7 +192,7 @@ class SegmentWriter:
         )
         self._tables.clear()
         (self.folder / _FOLDER).mkdir(exist_ok=True)
-        write_synced(_description(self.folder, self.number), _to_json(segment))
+        write_whole(_description(self.folder, self.number), _to_json(segment))
         return segment
 
     def abandon(self) -> None:

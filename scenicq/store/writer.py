@@ -23,12 +23,13 @@ from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.frame_index import frame_hashes, index_rows, repeated_rows
 from scenicq.store.labels import Recording
 from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest
-from scenicq.store.parquet import TableWriter, write_synced
+from scenicq.store.parquet import TableWriter
 from scenicq.store.partial import Partial, check_target
 from scenicq.store.placement import MapIndex
 from scenicq.store.regions import lane_rows, region_rows
 from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import SEGMENT_OBJECTS, Segment, SegmentWriter, read_segments, take_over
+from scenicq.store.whole_files import write_whole
 
 __all__ = ["DatasetWriter", "write_dataset"]
 
@@ -215,7 +216,7 @@ class DatasetWriter:
                 provenance=dict(provenance or {}),
                 **_totals(segments),
             )
-            write_synced(self.folder / MANIFEST, manifest.to_json())
+            write_whole(self.folder / MANIFEST, manifest.to_json())
             parts = [Path(part.path) for files in tables.values() for part in files]
             about = [Path("segments") / f"part-{number:05}.json" for number in range(len(segments))]
             self._partial.keep([*parts, *about, Path(MANIFEST)])

@@ -1,6 +1,7 @@
 """An interrupt that gets lost on its way ends the command all the same."""
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -42,6 +43,122 @@ def test_an_interrupt_arrives(name, then):
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=False)
     assert "went on" not in done.stdout
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+LOST = """
+import os, signal, sys, time
+import click
+from scenicq_cli import main
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+@click.command()
+def info():
+    try:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)
+        except KeyboardInterrupt:
+            {during}
+    except RuntimeError:
+        pass
+    {after}
+    print("went on")
+
+main.Commands.get_command = lambda *_: info
+sys.argv = ["scenicq", "info"]
+main.main()
+"""
+
+
+@pytest.mark.parametrize("during", ["pass", "raise RuntimeError"])
+def test_an_interrupt_that_a_library_swallows_is_raised_again_soon(during):
+    program = LOST.format(during=during, after="time.sleep(30)")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=15, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
+def test_cleaning_up_is_left_its_time():
+    program = LOST.format(during='time.sleep(1.5); os.write(1, b"cleaned"); raise', after="pass")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=15, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "cleaned", "interrupted\n")
+
+
+DROPPED = """
+import os, signal, sys, time, weakref
+import click
+from scenicq_cli import main
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+class Thing: {method}
+
+@click.command()
+def info():
+    thing = Thing()
+    watched = weakref.ref(thing, lambda _: {callback})
+    for _ in range(3):
+        del thing
+        thing, watched = Thing(), None
+    time.sleep(5)
+    print("went on")
+
+main.Commands.get_command = lambda *_: info
+sys.argv = ["scenicq", "info"]
+main.main()
+"""
+KILL = "os.kill(os.getpid(), signal.{name})"
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("where", ["callback", "method"])
+def test_an_interrupt_that_python_drops_arrives_at_once(name, where):
+    kill = KILL.format(name=name)
+    parts = {"callback": kill, "method": "pass"} if where == "callback" else {"callback": None, "method": ""}
+    program = DROPPED.format(**parts | ({} if where == "callback" else {"method": f"__del__ = lambda _: {kill}"}))
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=4, check=False)
+    assert "went on" not in done.stdout
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+WORKERS = """
+import os, signal, sys, time
+os.write(1, b"importing\\n")
+time.sleep(0.5)
+import click
+from scenicq.processes import Workers
+from scenicq_cli import main
+
+def start():
+    return lambda task, tell: task
+
+@click.command()
+def info():
+    with Workers(2, start) as workers:
+        for _ in workers.run(range(1000000)):
+            pass
+    print("went on")
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    main.Commands.get_command = lambda *_: info
+    sys.argv = ["scenicq", "info"]
+    main.main()
+"""
+
+
+def test_processes_that_are_only_starting_say_nothing_when_interrupted(tmp_path):
+    (tmp_path / "program.py").write_text(WORKERS)
+    command = [sys.executable, "-u", str(tmp_path / "program.py")]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stdout is not None
+    for _ in range(3):  # this process and both workers have begun, and these import for half a second
+        assert process.stdout.readline() == "importing\n"
+    os.killpg(process.pid, signal.SIGINT)
+    told = process.communicate(timeout=20)
+    assert (process.returncode, *told) == (130, "", "interrupted\n")
 
 
 def test_an_ignored_interrupt_stays_ignored():

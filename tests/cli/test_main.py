@@ -30,6 +30,12 @@ def test_help_and_version_import_nothing_heavy(option):
     assert HEAVY.isdisjoint(done.stderr.split())
 
 
+def test_an_ingest_loads_nothing_that_only_queries_need():
+    program = "import sys, scenicq_cli.ingest; print(*{name.partition('.')[0] for name in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert {"duckdb", "highspy", "dreal", "tqdm"}.isdisjoint(done.stdout.split())
+
+
 def test_the_list_of_commands_is_what_their_own_help_says():
     context = click.Context(cli)
     for name, summary in COMMANDS.items():

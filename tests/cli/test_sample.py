@@ -101,3 +101,32 @@ def test_the_forest_and_its_groups_are_shown(run, tmp_path):
     groups = run("check", program, "--groups").stdout
     assert "left.position, right.position" in groups
     assert "1. ego.position" in groups
+
+
+def test_what_geometry_cannot_tell_is_said_not_counted_as_no_scene(run, tmp_path):
+    program = tmp_path / "endless.scenic"
+    program.write_text(
+        "ego = new Object at (Range(0, 1), 0)\n"
+        "here = everywhere.difference(everywhere.difference(CircularRegion(ego.position, 1)))\n"
+        "there = everywhere.difference(everywhere.difference(CircularRegion((9, 9), 1)))\n"
+        "require here.intersects(there)\n"
+    )
+    found = run("sample", program)
+    assert found.exit_code == 2
+    assert "it cannot be told whether" in found.stderr
+    assert "internal error" not in found.stderr
+
+
+def test_boxes_are_told_to_be_in_regions_of_every_kind(run, tmp_path):
+    program = tmp_path / "regions.scenic"
+    program.write_text(
+        "ego = new Object at (Range(-3, 3), Range(-3, 3))\n"
+        "require ego in SectorRegion((0, 0), 4, 0, 90 deg)\n"
+        "require not (ego in nowhere)\n"
+        "require ego in CircularRegion((0, 0), 5).difference(CircularRegion((0, 2), 0.2))\n"
+    )
+    found = run("sample", program, "-n", 20)
+    assert found.exit_code == 0, found.stderr
+    places = [json.loads(line)["ego"]["position"] for line in found.stdout.splitlines()]
+    assert all(y > 1.0 and abs(x) < y for x, y in places)
+    assert all(max(abs(x), abs(y - 2)) > 0.5 for x, y in places)

@@ -12,6 +12,9 @@ END = "ego = new Object\n"
 HOSTILE = {
     "endless loop": "while True:\n    pass\n",
     "growing list": "l = []\nwhile True:\n    l.append(1)\n",
+    "list added to itself": "l = [1]\nfor i in range(99):\n    l += l\n",
+    "any without end": "while True:\n    any([0] * 99999)\n",
+    "rounding without end": "x = Range(0, 10 ** 15)\nfor i in range(2000):\n    x = int(x) + round(x, 3)\n",
     "growing string": "s = 'a'\nfor i in range(100):\n    s = s + s\n",
     "growing replacement": "s = 'a' * 50000\nt = s.replace('a', s)\n",
     "many long lists": "l = []\nfor i in range(50000):\n    l.append(list(range(50000)))\n",

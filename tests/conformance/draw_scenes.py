@@ -1,25 +1,55 @@
-"""Draws scenes with the original Scenic. Runs in an environment of its own, which has `scenic` and not `scenicq`.
+"""Draws scenes with the original Scenic, 3.1.1 in its 2D mode or 2.1.0. Runs in an environment of its own, which has
+`scenic` and not `scenicq`.
 
-Usage: python draw_scenes.py MAP.xodr OUT SCENES PROGRAM...
+Usage: python draw_scenes.py MAP.xodr OUT
 
-Writes OUT/map.geojson (Scenic's own network of the map, as interchange features) and OUT/NAME.json for each program:
-either {"error": text} or {"scenes": [[object, ...], ...]}, the ego first, headings in Scenic's convention.
+Writes OUT/map.geojson (Scenic's own network of the map, as interchange features), then answers requests, one JSON
+object a line on standard input and standard output: {"text": program, "count": scenes, "seed": number, "seconds":
+limit} with {"scenes": [...]}, each with its objects (the ego first, headings in Scenic's convention) and parameters,
+or with {"error": text} where Scenic refuses the program. No scenes at all means that none was found in time.
 """
 
 from __future__ import annotations
 
+import functools
+import importlib.metadata
 import json
 import random
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scenic
 from network_features import features_of
+from scenic.core.distributions import RejectionException
+from scenic.core.errors import InvalidScenarioError
 from scenic.domains.driving.roads import Network
 
 MOST_ATTEMPTS = 20_000
+MODE = {} if importlib.metadata.version("scenic").startswith("2.") else {"mode2D": True}
+
+
+class OutOfTimeError(BaseException):
+    """Drawing took too long; not an `Exception`, so that nothing of Scenic takes it for its own."""
+
+
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """Raise OutOfTimeError after so many seconds of processor time."""
+
+    def expired(*_: object) -> None:
+        raise OutOfTimeError
+
+    signal.signal(signal.SIGPROF, expired)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
 
 
 def thing(thing: Any) -> dict[str, Any]:
@@ -34,33 +64,43 @@ def thing(thing: Any) -> dict[str, Any]:
     }
 
 
-def draw(text: str, chart: Path, count: int, seed: int) -> dict[str, Any]:
+def plain(scene: Any) -> dict[str, Any]:
+    """A scene as plain data."""
+    values = {name: value for name, value in scene.params.items() if isinstance(value, str | int | float | bool)}
+    return {
+        "objects": [thing(each) for each in scene.objects],
+        "params": {name: value for name, value in values.items() if name != "map"},
+    }
+
+
+def draw(text: str, chart: Path, count: int, seed: int, seconds: float) -> dict[str, Any]:
     """Scenes of a program, or why there are none."""
     random.seed(seed)
     np.random.seed(seed)
+    scenes: list[dict[str, Any]] = []
     try:
-        scenario = scenic.scenarioFromString(text, params={"map": str(chart)}, mode2D=True)
-        drawn = [scenario.generate(maxIterations=MOST_ATTEMPTS)[0] for _ in range(count)]
+        with at_most(seconds):
+            scenario = scenic.scenarioFromString(text, params={"map": str(chart)}, **MODE)
+            while len(scenes) < count:
+                scenes.append(plain(scenario.generate(maxIterations=MOST_ATTEMPTS)[0]))
+    except (OutOfTimeError, RejectionException, InvalidScenarioError) as end:
+        return {"scenes": scenes, "ended": f"{type(end).__name__}: {end}"}
     except Exception as error:  # whatever Scenic says of the program is its answer
         return {"error": f"{type(error).__name__}: {error}"}
-    plain = [
-        {
-            "objects": [thing(each) for each in scene.objects],
-            "params": {k: v for k, v in scene.params.items() if isinstance(v, str | int | float | bool) and k != "map"},
-        }
-        for scene in drawn
-    ]
-    return {"scenes": plain}
+    return {"scenes": scenes}
 
 
 def main(arguments: list[str]) -> None:
-    """Draw for every program."""
-    chart, out, count = Path(arguments[0]), Path(arguments[1]), int(arguments[2])
-    collection = {"type": "FeatureCollection", "features": features_of(Network.fromFile(chart))}
+    """Write the map, then answer requests."""
+    chart, out = Path(arguments[0]), Path(arguments[1])
+    Network.fromFile = functools.cache(Network.fromFile)  # one map for all programs
+    collection = {"type": "FeatureCollection", "features": features_of(Network.fromFile(str(chart)))}
     (out / "map.geojson").write_text(json.dumps(collection), encoding="utf-8")
-    for seed, path in enumerate(map(Path, arguments[3:])):
-        answer = draw(path.read_text(encoding="utf-8"), chart, count, seed)
-        (out / f"{path.stem}.json").write_text(json.dumps(answer), encoding="utf-8")
+    answers, sys.stdout = sys.stdout, sys.stderr  # programs may print
+    for line in sys.stdin:
+        request = json.loads(line)
+        answer = draw(request["text"], chart, request["count"], request["seed"], request["seconds"])
+        print(json.dumps(answer), file=answers, flush=True)
 
 
 if __name__ == "__main__":

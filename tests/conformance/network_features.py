@@ -6,6 +6,9 @@ from typing import Any
 
 from shapely.geometry import mapping
 
+CRACK = 5e-4
+"""Half of the metres between neighbouring sidewalks that Scenic closes."""
+
 
 def _polylines(region: Any) -> list[list[list[float]]]:
     line = region.lineString
@@ -20,7 +23,7 @@ def _feature(element: Any, kind: str, **properties: Any) -> dict[str, Any]:
     known = {name: value for name, value in properties.items() if value not in (None, [])}
     return {
         "type": "Feature",
-        "geometry": mapping(element.polygon),
+        "geometry": mapping(element.polygon.buffer(CRACK) if kind in ("sidewalk", "shoulder") else element.polygon),
         "properties": {"id": element.uid, "kind": kind, **known},
     }
 

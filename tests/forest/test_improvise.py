@@ -200,3 +200,11 @@ def test_a_truncated_normal_keeps_its_shape_far_out(mean: float, deviation: floa
     expected = float((grid * density).sum() / density.sum())
     spread = math.sqrt(float(((grid - expected) ** 2 * density).sum() / density.sum()))
     assert statistics.fmean(found) == pytest.approx(expected, abs=4 * spread / math.sqrt(len(found)))  # type: ignore[type-var]
+
+
+@pytest.mark.parametrize("turn", [0, 17, -150])
+def test_boxes_that_touch_do_not_collide(turn: int) -> None:
+    ego = f"ego = new Object at (3, -4), facing {turn} deg, with width 2, with length 5\n"
+    rng = random.Random(0)
+    assert Improviser(compiled(ego + "new Object ahead of ego\n"), ALL).draw(rng, 10) is not None
+    assert Improviser(compiled(ego + "new Object ahead of ego by -0.01\n"), ALL).draw(rng, 10) is None

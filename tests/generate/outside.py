@@ -5,7 +5,6 @@ Sound, not complete: where it says "outside", no correspondence of objects has v
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -17,35 +16,128 @@ from scenicq.forest.condition import condition, expand
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.nodes import Constant, Feature, Node, PointIn, Undefined, Value
 from scenicq.forest.scenario import Scenario
+from scenicq.forest.walk import features
 from scenicq.geometry.regions import PolygonSet
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label, LabelObject
 
 MARGIN = 0.01
 """Metres and radians: ten times the default tolerance of a match."""
-MOST_ORDERS = 130
+MOST_STEPS = 3000
+"""Partial correspondences that are looked at."""
 
 Features = Mapping[tuple[int, str], Value]
 
 
 def outside(scenario: Scenario, label: Label) -> bool:
-    """Whether it is certain that the label does not match."""
-    return all(_excluded(scenario, seen) for seen in _orders(scenario, label))
+    """Whether it is certain that the label does not match.
 
-
-def _orders(scenario: Scenario, label: Label) -> Iterator[Features]:
-    """What each correspondence observes."""
-    roles = [thing.index for thing in scenario.objects if thing.index != scenario.ego]
-    if math.perm(len(label.objects), len(roles)) > MOST_ORDERS:
-        raise TooManyError
-    for chosen in itertools.permutations(label.objects, len(roles)):
-        things = dict(zip(roles, chosen, strict=True)) | {scenario.ego: label.ego}
-        if all(class_matches(scenario.objects[i].category, things[i].category, "fine") for i in things):
-            yield {key: value for index, thing in things.items() for key, value in _seen(index, thing)}
+    Roles are given to label objects one by one, and what a condition excludes for those that it is about is not tried
+    any further.
+    """
+    return not _Search(scenario, label).possible()
 
 
 class TooManyError(Exception):
     """More correspondences than anyone would go through."""
+
+
+class _Search:
+    """Correspondences that are not known to be excluded."""
+
+    def __init__(self, scenario: Scenario, label: Label) -> None:
+        self.scenario = scenario
+        self.things = (label.ego, *label.objects)
+        self.roles = [thing.index for thing in scenario.objects if thing.index != scenario.ego]
+        self.steps = 0
+        self.known: dict[tuple[object, ...], bool] = {}
+        self.checks: list[tuple[frozenset[int], int, str]] = []
+        for thing in scenario.objects:
+            for name in ("position", "heading", "width", "length"):
+                given = thing.properties.get(name)
+                if given is not None:
+                    self.checks.append((self._about(given.value) | {thing.index}, thing.index, name))
+        for number, requirement in enumerate(scenario.requirements):
+            if requirement.built_in is None:
+                self.checks.append((self._about(requirement.condition), number, "requirement"))
+
+    def _about(self, node: Node) -> frozenset[int]:
+        """The objects whose features an expression refers to, those that are not observed by what they are made of."""
+        return frozenset(index for index, _ in features(_expanded(self.scenario, node, _Everything())))
+
+    def possible(self) -> bool:
+        ego = {self.scenario.ego: 0}
+        if self._excluded(ego, None):
+            return False
+        options = {
+            role: [
+                number
+                for number in range(1, len(self.things))
+                if class_matches(self.scenario.objects[role].category, self.things[number].category, "fine")
+                and not self._excluded({**ego, role: number}, role)
+            ]
+            for role in self.roles
+        }
+        return self._matched(options) and self._extended(ego, options)
+
+    def _matched(self, options: Mapping[int, list[int]]) -> bool:
+        """Whether all roles can be given at once as far as each alone is concerned: augmenting paths."""
+        player: dict[int, int] = {}
+
+        def given(role: int, tried: set[int]) -> bool:
+            for number in options[role]:
+                if number not in tried:
+                    tried.add(number)
+                    if number not in player or given(player[number], tried):
+                        player[number] = role
+                        return True
+            return False
+
+        return all(given(role, set()) for role in self.roles)
+
+    def _extended(self, chosen: dict[int, int], options: Mapping[int, list[int]]) -> bool:
+        left = [role for role in self.roles if role not in chosen]
+        if not left:
+            return True
+        taken = set(chosen.values())
+        role = min(left, key=lambda role: len([number for number in options[role] if number not in taken]))
+        for number in options[role]:
+            self.steps += 1
+            if self.steps > MOST_STEPS:
+                raise TooManyError
+            more = {**chosen, role: number}
+            if number not in taken and not self._excluded(more, role) and self._extended(more, options):
+                return True
+        return False
+
+    def _excluded(self, chosen: Mapping[int, int], last: int | None) -> bool:
+        """Whether a condition about objects that are chosen, the last among them, fails."""
+        return any(
+            self._fails(check, chosen)
+            for check in self.checks
+            if check[0] <= chosen.keys() and (last is None or last in check[0])
+        )
+
+    def _fails(self, check: tuple[frozenset[int], int, str], chosen: Mapping[int, int]) -> bool:
+        about, number, name = check
+        key = (number, name, *(chosen[index] for index in sorted(about)))
+        if key not in self.known:
+            seen = {key: value for index in about for key, value in _seen(index, self.things[chosen[index]])}
+            if name == "requirement":
+                self.known[key] = _requirement_excluded(
+                    self.scenario, self.scenario.requirements[number].condition, seen
+                )
+            else:
+                value = seen.get((number, name))
+                self.known[key] = value is not None and _feature_excluded(self.scenario, (number, name), value, seen)
+        return self.known[key]
+
+
+class _Everything(dict[tuple[int, str], Value]):
+    """Whatever a label can observe is observed."""
+
+    def __contains__(self, key: object) -> bool:
+        return isinstance(key, tuple) and key[1] in ("position", "heading", "width", "length")
 
 
 def _seen(index: int, thing: LabelObject) -> Iterator[tuple[tuple[int, str], Value]]:
@@ -56,14 +148,10 @@ def _seen(index: int, thing: LabelObject) -> Iterator[tuple[tuple[int, str], Val
             yield (index, name), value
 
 
-def _excluded(scenario: Scenario, seen: Features) -> bool:
-    if any(_feature_excluded(scenario, key, value, seen) for key, value in seen.items()):
-        return True
-    for requirement in scenario.requirements:
-        if requirement.built_in is None:
-            known = _conditioned(scenario, requirement.condition, seen)
-            if isinstance(known, Constant) and (isinstance(known.value, Undefined) or not known.value):
-                return _clearly(scenario, requirement.condition, seen)
+def _requirement_excluded(scenario: Scenario, wanted: Node, seen: Features) -> bool:
+    known = _conditioned(scenario, wanted, seen)
+    if isinstance(known, Constant) and (isinstance(known.value, Undefined) or not known.value):
+        return _clearly(scenario, wanted, seen)
     return False
 
 

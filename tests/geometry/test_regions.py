@@ -3,9 +3,8 @@
 # pyright: basic
 
 import pytest
-from shapely.geometry import MultiPolygon, box
+from shapely.geometry import LineString, MultiPolygon, box
 
-from scenicq.geometry.fields import ConstantField
 from scenicq.geometry.regions import (
     DifferenceOf,
     Disc,
@@ -19,6 +18,7 @@ from scenicq.geometry.regions import (
     orientation_of,
     union,
 )
+from scenicq.geometry.road_direction import along_lines
 
 A, B, C = (Disc((float(x), 0.0), 1.0) for x in range(3))
 
@@ -67,7 +67,7 @@ def test_a_polygon_set_finds_the_pieces_of_its_polygons() -> None:
 
 @pytest.mark.parametrize("wrap", [lambda r: intersection(A, r), lambda r: difference(r, A), lambda r: union(A, r)])
 def test_combinations_keep_the_orientation(wrap) -> None:  # pyright: ignore
-    field = ConstantField(1.0)
+    field = along_lines([LineString([(0, 0), (1, 1)])], "diagonal")
     oriented = PolygonSet((box(0, 0, 1, 1),), "oriented", field)
     assert orientation_of(wrap(oriented)) is field
     assert orientation_of(A) is None

@@ -3,6 +3,7 @@
 # pyright: basic
 
 import math
+import random
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon, box
 
 from scenicq.geometry.angles import distance
-from scenicq.geometry.fields import ConstantField, FieldCell, VectorField
+from scenicq.geometry.fields import VectorField
 from scenicq.geometry.road_direction import DirectedLane, RoadDirection, along_lines
 
 NORTH, WEST, SOUTH, EAST = 0.0, math.pi / 2, math.pi, -math.pi / 2
@@ -154,15 +155,27 @@ def test_headings_southward_are_pi() -> None:
     assert RoadDirection((down,)).values(0, 0) == (math.pi,)
 
 
-def test_constant_field() -> None:
-    field = ConstantField(1.5)
+@settings(deadline=None, max_examples=60)
+@given(fields(), st.integers(0, 2**32))
+def test_boxes_have_all_headings_of_their_points(field: RoadDirection, seed: int) -> None:
+    rng = random.Random(seed)
+    corners = np.array([(rng.uniform(-30, 30), rng.uniform(-30, 30)) for _ in range(8)])
+    sizes = np.array([(rng.uniform(0, span), rng.uniform(0, span)) for span in (0, 0.1, 0.1, 1, 1, 5, 5, 20)])
+    owner, heading = field.headings(np.concatenate([corners, corners + sizes], axis=1))
+    assert np.all(np.diff(owner) >= 0)
+    for number, (corner, size) in enumerate(zip(corners, sizes, strict=True)):
+        held = heading[owner == number]
+        points = corner + size * np.array([(rng.random(), rng.random()) for _ in range(40)])
+        for values in field.values_many(points):
+            assert all(np.any(np.abs(held - value) < 2e-9) for value in values)
+
+
+def test_a_small_box_has_few_headings() -> None:
+    field = along_lines([LineString([(0, 0), (0, 10), (-10, 10)])], "bend")
     assert isinstance(field, VectorField)
-    assert field.values(1e9, 0) == (1.5,)
-    (cell,) = field.cells((0, 1, 2, 3))
-    assert isinstance(cell, FieldCell)
-    assert cell.exact
-    assert Polygon(cell.polygon).equals(box(0, 1, 2, 3))
-    assert cell.heading == pytest.approx(1.5)
+    owner, heading = field.headings(np.array([(0, 3, 0.1, 4), (50, 50, 51, 51), (-6, 10, -5, 10)], dtype=float))
+    assert owner.tolist() == [0, 2]
+    assert heading.tolist() == pytest.approx([0.0, math.pi / 2])
 
 
 def test_a_polyline_is_its_own_direction() -> None:

@@ -26,7 +26,7 @@ from scenicq.geometry.regions import (
     UnionOf,
     difference,
 )
-from scenicq.geometry.sampling import sample
+from scenicq.geometry.sampling import sample, sampler
 
 from . import oracle
 
@@ -34,8 +34,8 @@ COUNT = 2000
 
 
 def share(region: Region, part: Region) -> float:
-    rng = random.Random(7)
-    return sum(contains(part, *sample(region, rng)) for _ in range(COUNT)) / COUNT
+    rng, draw = random.Random(7), sampler(region)
+    return sum(contains(part, *draw(rng)) for _ in range(COUNT)) / COUNT
 
 
 @settings(max_examples=60, deadline=None)
@@ -58,6 +58,9 @@ def test_samples_lie_inside(region: Region, seed: int) -> None:
         (UnionOf((Disc((0, 0), 1), PointSet(((9.0, 9.0),), "p"))), Disc((0, 0), 1), 1.0),
         (IntersectionOf((Everywhere(), Disc((0, 0), 2))), Disc((0, 0), 1), 0.25),
         (difference(Disc((0, 0), 2), Disc((0, 0), 1)), Disc((0, 0), math.sqrt(2.5)), 0.5),
+        # what is left is a hundred-thousandth of what it is left from
+        (difference(Rectangle((0, 0), 0, 9, 8), Rectangle((-1e-4, 0), 0, 9, 8)), Rectangle((4, 2), 0, 2, 4), 0.5),
+        (difference(Disc((0, 0), 2), Sector((0, 0), 3, 0, math.tau - 6e-5)), Disc((0, 0), 1), 0.25),
     ],
 )
 def test_samples_are_uniform(region: Region, part: Region, expected: float) -> None:
@@ -79,9 +82,15 @@ def test_empty(region: Region) -> None:
 
 
 def test_empty_combinations_end() -> None:
-    region = IntersectionOf((Disc((0, 0), 1), Disc((1.5, 0), 0.4)))
-    with pytest.raises(ValueError, match="empty"):
-        sample(region, random.Random(1))
+    for region in (
+        IntersectionOf((Disc((0, 0), 1), Disc((1.5, 0), 0.4))),
+        difference(Rectangle((0, 0), 0, 1, 1), Sector((0, -2), 4, 0, math.pi)),
+    ):
+        draw = sampler(region)
+        # that nothing is there is found out once
+        for _ in range(200):
+            with pytest.raises(ValueError, match="empty"):
+                draw(random.Random(1))
 
 
 def test_the_plane_has_no_uniform_point() -> None:

@@ -36,5 +36,8 @@ PROGRAMS: dict[str, str] = {
     "follow": "ego = new Car on network.laneRegion\nother = new Car following roadDirection from ego for Range(5, 10)",
     "badly parked": "ego = new Car\nspot = new OrientedPoint on visible curb\n"
     "parked = new Car left of spot by 0.5, facing Uniform(-1, 1) * Range(10, 20) deg relative to roadDirection",
+    "random discs": "ego = new Car\nspot = new OrientedPoint offset by (Range(-9, 9), Range(2, 6))\n"
+    "other = new Car ahead of ego by Range(2, 9)\nrequire CircularRegion(spot, 2) intersects other\n"
+    "require CircularRegion(spot, 1) intersects CircularRegion(spot offset by (Range(0, 3), 0), 1)",
     "wide view": "ego = new Car with viewAngle 300 deg, with visibleDistance 30\nother = new Pedestrian in visible road, facing Range(0, 360) deg",
 }

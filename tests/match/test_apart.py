@@ -10,12 +10,13 @@ from scenes import STREET, compiled, drawn, label_of
 
 from scenicq.match.apart import decide_apart
 from scenicq.match.attempt import Attempt
+from scenicq.match.branches import Branches
 from scenicq.match.casting import cast_roles
 from scenicq.match.ground import replay
 from scenicq.match.ladder import Maybe, No, Yes, decide
 from scenicq.match.matcher import Matcher
-from scenicq.match.narrowing import Narrower, narrowed
 from scenicq.match.options import MatchOptions
+from scenicq.match.tape import Tape
 
 ROW = """
 shift = Range(-0.5, 0.5)
@@ -65,7 +66,7 @@ def test_parts_and_narrower_ranges_lose_no_solution(name):
             whole = decide(items, tolerance)
             if true:
                 assert not isinstance(outcome, No)
-                assert isinstance(narrowed(items, tolerance), Narrower)
+                assert Branches.start(Tape(items, tolerance), {}).narrowed().size == 1
             if not isinstance(outcome, Maybe) and not isinstance(whole, Maybe):
                 assert type(outcome) is type(whole)
             if isinstance(outcome, Yes):

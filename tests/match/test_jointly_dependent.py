@@ -49,8 +49,10 @@ def test_sampled_labels_match_and_perturbed_ones_do_not(program, name, network):
         pytest.skip(error.diagnostics[0].message)
     scenario = jointly.compiled(jointly.HEADER + jointly.PROGRAMS[program], network)
     with opened as solver:
-        run = jointly.decided(scenario, jointly.examples(scenario, 25), "auto", solver)
+        labels = jointly.examples(scenario, 25)
+        run, asked = (jointly.decided(scenario, labels, method, solver) for method in jointly.METHODS)
     assert not run.wrong
+    assert not asked.wrong
     assert run.right == 50
     # the bar of 20 ms is for a quiet machine; what is far from it is a mistake
     assert sorted(run.times_ms)[25] < 5 * jointly.BAR_MS

@@ -13,7 +13,7 @@ from scenes import compiled, drawn, label_of
 
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
-from scenicq.match import attempt, program
+from scenicq.match import decisions, program
 from scenicq.match.casting import cast_roles
 from scenicq.match.ladder import Maybe
 from scenicq.match.matcher import Matcher
@@ -220,10 +220,10 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
     def decide(items, tolerance):
         return Maybe(items[0][0], "nonlinear") if (2.0, 57.0) in [item[2] for item in items] else real(items, tolerance)
 
-    real = attempt.decide_apart
+    real = decisions.decide_apart
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(attempt.Attempt, "_quick", lambda *_: None)
-        patch.setattr(attempt, "decide_apart", decide)
+        patch.setattr(decisions.Decisions, "_in_closed_form", lambda *_: None)
+        patch.setattr(decisions, "decide_apart", decide)
         assert (
             Matcher(scenario, MatchOptions(), Fixed(Undecided("timeout"))).match(label).correspondence["other"] == "b"
         )
@@ -239,9 +239,9 @@ def test_what_geometry_cannot_tell_is_unknown(monkeypatch):
     def fails(*_):
         raise CannotEvaluate("whether moons meet")
 
-    monkeypatch.setattr(attempt, "condition_group", fails)
+    monkeypatch.setattr(decisions, "condition_group", fails)
     for method in ("auto", "smt", "monolithic"):
-        found = verdict("ego = new Car\nother = new Car", frame(THERE), Fixed(Unsat()), method=method)
+        found = verdict(NONLINEAR, frame(THERE), Fixed(Unsat()), method=method)
         assert isinstance(found, Unknown)
         assert found.reason == "unsupported: whether moons meet"
 

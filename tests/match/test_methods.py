@@ -72,9 +72,7 @@ def check_against_brute_force(name, seeds, solver):
         for method in METHODS:
             matcher = Matcher(scenario, replace(options, method=method), solver)
             verdict = matcher.match(label)
-            # dReal can lose itself in the directions of many lanes; what it does not decide in time is unknown
-            late = solver.name == "dreal" and isinstance(verdict, Unknown) and verdict.reason == "timeout"
-            assert method != "auto" or late or not isinstance(verdict, Unknown), (seed, verdict)
+            assert method != "auto" or not isinstance(verdict, Unknown), (seed, verdict)
             if Unknown not in (expected, type(verdict)):
                 assert type(verdict) is expected, (seed, method, verdict)
             if isinstance(verdict, Match) and expected is Match:

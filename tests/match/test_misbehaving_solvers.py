@@ -11,8 +11,10 @@ import time
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from scenicq.smt import pool, solver
+from scenicq_cli.main import cli
 
 HERE = Path(__file__).parent
 
@@ -21,24 +23,20 @@ PROGRAM = """
 model scenic.domains.driving.model
 angle = Range(-60, 60) deg
 ego = new Car
-other = new Car offset along angle relative to ego.heading by (Range(-30, 30), Range(0, 40)),
+other = new Car offset along angle relative to ego.heading by (Range(-6, 6), Range(0, 14)),
     facing angle relative to ego.heading
 """
 
 
-@pytest.fixture
-def scenario(tmp_path):
-    file = tmp_path / "hidden.scenic"
-    file.write_text(PROGRAM)
-    return file
-
-
-@pytest.fixture
-def verdicts(run, scenario, crossroads):
+@pytest.fixture(scope="module")
+def verdicts(crossroads, tmp_path_factory):
     """Verdict and cause by frame, under options."""
+    file = tmp_path_factory.mktemp("program") / "hidden.scenic"
+    file.write_text(PROGRAM)
 
     def decide(*options):
-        told = run("match", scenario, crossroads, "--all", "--format", "jsonl", "--exit-zero", *options)
+        words = ["match", str(file), str(crossroads), "--all", "--format", "jsonl", "--exit-zero", *options]
+        told = CliRunner().invoke(cli, words, prog_name="scenicq")
         assert told.exit_code == 0, told.stderr
         rows = [json.loads(line) for line in told.stdout.splitlines()]
         return {row["frame"]: row for row in rows}
@@ -51,7 +49,7 @@ def reason_of(row):
     return json.dumps(row.get("cause"))
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def honest(verdicts):
     found = verdicts("--solver", "portable")
     assert {row["verdict"] for row in found.values()} == {"match", "no_match"}
@@ -62,7 +60,7 @@ def test_frames_that_a_broken_solver_decides_are_as_ever_and_the_others_are_name
     monkeypatch.syspath_prepend(str(HERE))
     monkeypatch.setattr(solver, "PORTABLE", "mixed_checks:check")
     monkeypatch.setattr(pool, "GRACE_S", 0.05)
-    found = verdicts("--solver", "portable", "--timeout", "0.5")
+    found = verdicts("--solver", "portable", "--timeout", "0.2")
     assert found.keys() == honest.keys()
     unknown = {frame: reason_of(row) for frame, row in found.items() if row["verdict"] == "unknown"}
     assert all(found[frame]["verdict"] == honest[frame]["verdict"] for frame in found.keys() - unknown.keys())
@@ -85,7 +83,7 @@ COMMANDS = {
 def test_a_command_that_misbehaves_leaves_its_frames_unknown(reason, honest, verdicts, tmp_path):
     stub = tmp_path / "stub.py"
     stub.write_text(COMMANDS[reason])
-    found = verdicts("--solver", f"'{sys.executable}' -S '{stub}'", "--timeout", "0.3" if reason == "timeout" else "20")
+    found = verdicts("--solver", f"'{sys.executable}' -S '{stub}'", "--timeout", "0.1" if reason == "timeout" else "20")
     assert found.keys() == honest.keys()
     unknown = [row for row in found.values() if row["verdict"] == "unknown"]
     assert unknown

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from dataclasses import replace
 
@@ -9,6 +10,8 @@ import pytest
 from programs import HEADER, PROGRAMS
 from scenes import STREET, compiled, drawn, label_of
 
+from scenicq.forest.walk import leaves
+from scenicq.match import attempt
 from scenicq.match.attempt import Attempt
 from scenicq.match.casting import cast_roles
 from scenicq.match.ground import replay
@@ -16,13 +19,17 @@ from scenicq.match.ladder import No, Yes, decide
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions, Tolerance
 from scenicq.match.quick import Places
+from scenicq.match.verdict import Match, NoMatch
 
 OPTIONS = (
     MatchOptions(),
     MatchOptions(tolerance=Tolerance(x=0.5, y=0.2, heading=0.1), radius=30.0),
     MatchOptions(tolerance=Tolerance(position=1.0, heading=0.3)),
 )
-NAMES = ["ahead", "offset", "left of", "facing field", "visible road", "picked lane", "discrete", "row", "crowd"]
+NAMES = [
+    "ahead", "offset", "left of", "facing field", "visible road", "picked lane", "discrete", "row", "crowd", "figure 3",
+    "normal", "requirement", "beyond", "apparently", "toward", "speed",
+]  # fmt: skip
 
 
 def labels(scenario, seed):
@@ -42,6 +49,16 @@ def labels(scenario, seed):
         yield replace(label, objects=tuple(moved))
 
 
+def replays(items, values, tolerance):
+    """Whether a witness replays with one of the directions that fields allow where the label is."""
+    turns = [leaf for leaf in leaves(*(node for _, node, _ in items)) if leaf.identity not in values]
+    picks = itertools.product(*(range(len(turn.weights)) for turn in turns))
+    return any(
+        replay(items, {**values, **{t.identity: float(n) for t, n in zip(turns, pick, strict=True)}}, tolerance, 1e-6)
+        for pick in picks
+    )
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_clear_answer_is_that_of_the_ladder(name):
     scenario = compiled(HEADER + PROGRAMS[name], STREET)
@@ -53,7 +70,7 @@ def test_a_clear_answer_is_that_of_the_ladder(name):
                 matcher = Matcher(scenario, options)
                 cast = cast_roles(scenario, label, 0, replace(options, radius=None), {})
                 disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
-                attempt = Attempt(scenario, options, replace(cast, disc=disc), matcher.ask)
+                tried = Attempt(scenario, options, replace(cast, disc=disc), matcher.ask)
                 for signature, candidates in cast.signatures(matcher._relevant):
                     for group in matcher.plan(signature).groups:
                         if group.quick is None:
@@ -72,11 +89,32 @@ def test_a_clear_answer_is_that_of_the_ladder(name):
                             if answer is None:
                                 continue
                             said[type(answer)] += 1
-                            items = attempt.items(group.group, assignment)
-                            assert type(decide(items, options.tolerance)) is type(answer)
+                            items = tried.items(group.group, assignment)
+                            outcome = decide(items, options.tolerance)
+                            assert type(outcome) is type(answer)
+                            if isinstance(answer, No):
+                                assert answer == outcome
                             if isinstance(answer, Yes):
-                                assert replay(items, answer.values, options.tolerance, 1e-6)
+                                assert replays(items, answer.values, options.tolerance)
     assert said[Yes] > 0
+
+
+DOUBLED = """
+ego = new Car on road
+{start}
+for number in range(60):
+    turn = turn + turn
+other = new Car at (3, 40), facing turn
+require {condition}
+"""
+
+
+@pytest.mark.parametrize("start", ["turn = ego.heading", "turn = Range(0, 1e-20) + ego.heading"])
+@pytest.mark.parametrize("condition", ["turn > 1e9 or ego.heading < 10", "sin(ego.heading) < 1 / (ego.heading + 9)"])
+def test_what_grows_beyond_bounds_is_left_to_the_ladder(start, condition):
+    scenario = compiled(HEADER + DOUBLED.format(start=start, condition=condition), STREET)
+    label = label_of(scenario, drawn(scenario, 0), random.Random(0))
+    assert isinstance(Matcher(scenario).match(label), Match)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -95,3 +133,18 @@ def test_a_label_with_known_candidates_has_the_verdict_that_a_search_finds(name)
                 short = matcher.match(label, among=among, places=places)
                 assert type(short) is type(full)
                 assert getattr(short, "correspondence", None) == getattr(full, "correspondence", None)
+
+
+@pytest.mark.parametrize("name", ["ahead", "normal", "requirement", "row", "crowd"])
+def test_what_is_tried_at_once_changes_neither_matches_nor_reasons(name, monkeypatch):
+    scenario = compiled(HEADER + PROGRAMS[name], STREET)
+    given = [(label, options) for seed in range(2) for label in labels(scenario, seed) for options in OPTIONS]
+
+    def decided():
+        matchers = {options: Matcher(scenario, options) for options in OPTIONS}
+        return [(matchers[options].match(label), [*matchers[options].matches(label)]) for label, options in given]
+
+    at_once = decided()
+    monkeypatch.setattr(attempt, "_FEW_TRIES", -1)
+    assert decided() == at_once
+    assert {type(verdict) for verdict, _ in at_once} == {Match, NoMatch}

@@ -8,8 +8,12 @@ from typing import Any
 
 import five_scenarios
 import pytest
+import road_map
+import scene_conditions
 import shapely
-from five_scenarios import Body, RoadMap, Scene, Tolerances, frames
+from five_scenarios import frames
+from road_map import RoadMap
+from scene_conditions import Body, Scene, Tolerances
 
 EPS = 1e-6
 Item = dict[str, Any]
@@ -62,11 +66,12 @@ ADULT = "human.pedestrian.adult"
 
 
 def test_independence() -> None:
-    tree = ast.parse(Path(five_scenarios.__file__).read_text())
+    own = (five_scenarios, road_map, scene_conditions)
+    tree = ast.parse("\n".join(Path(str(module.__file__)).read_text() for module in own))
     roots = {alias.name.split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.Import) for alias in n.names}
     roots |= {(n.module or ".").split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     standard = {"collections", "dataclasses", "itertools", "json", "math", "pathlib", "typing"}
-    assert roots <= standard | {"numpy", "shapely"}
+    assert roots <= standard | {"numpy", "shapely"} | {module.__name__ for module in own}
 
 
 class TestPedestrian:

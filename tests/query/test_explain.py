@@ -9,6 +9,7 @@ import pytest
 from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.standin import street
 from scenicq.errors import Source
+from scenicq.match.ground import show_value
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions, Tolerance
 from scenicq.match.verdict import Match, NoMatch
@@ -126,6 +127,12 @@ def test_a_shown_tolerance_is_never_too_small():
     shown = show_tolerance(Tolerance(position=0.12341, heading=math.radians(5.001)))
     assert shown == "position=0.124,heading=5.01deg"
     assert show_tolerance(Tolerance(x=1.0, y=2.0, heading=0.0)) == "x=1,y=2,heading=0deg"
+
+
+def test_no_number_is_shown_as_minus_zero():
+    assert show_value("heading", -1e-9) == "0.0 deg"
+    assert show_value("position", (-1e-9, -0.001)) == "(0.00, 0.00)"
+    assert show_value("width", -0.0) == "0"
 
 
 def test_what_matches_needs_no_wider_tolerance():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,11 @@ import pytest
 from scenicq.compiler.named_map import named_map
 from scenicq.errors import DataError, ScenarioError, Source
 from scenicq.importers.ingest import ingest
+from scenicq.match.verdict import NoMatch
 from scenicq.query.maps import program_network, read_network
-from scenicq.query.run import Query
+from scenicq.query.partitions import partitions
+from scenicq.query.pieces import in_order, run_here
+from scenicq.query.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
@@ -101,3 +105,34 @@ def test_what_a_map_lacks_is_told_with_the_dataset(tmp_path: Path) -> None:
             list(Query(open_dataset(tmp_path / name), Source("p", text)).results())
         (diagnostic,) = error.value.diagnostics
         assert (diagnostic.code, diagnostic.message) == ("map-lacks", message)
+
+
+@pytest.mark.parametrize("prefilter", [True, False])
+def test_frames_of_a_map_that_lacks_something_have_their_rows(tmp_path: Path, prefilter: bool) -> None:
+    source = Path(shutil.copytree(SAMPLES / "crossroads", tmp_path / "source"))
+    labels = [json.loads(line) for line in (source / "labels.jsonl").read_text().splitlines()]
+    moved = sorted({label["recording"] for label in labels})[1]
+    for label in labels:
+        label["map"] = "bare" if label["recording"] == moved else label["map"]
+    (source / "labels.jsonl").write_text("".join(json.dumps(label) + "\n" for label in labels))
+    town = json.loads(TOWN.read_text())
+    town["features"] = [each for each in town["features"] if each["properties"]["kind"] != "crossing"]
+    (source / "maps" / "bare.geojson").write_text(json.dumps(town))
+    ingest(source, tmp_path / "d")
+    dataset, program = open_dataset(tmp_path / "d"), Source("p", BODY + "walker = new Pedestrian on crossing\n")
+    on_bare = [label["id"] for label in labels if label["recording"] == moved]
+    reached: list[int] = []
+    query = Query(dataset, program, QueryOptions(every=True, prefilter=prefilter))
+    results = list(query.results(reached.append))
+    assert sorted(result.frame for result in results) == sorted(label["id"] for label in labels)
+    assert sum(reached) == query.funnel.frames == len(labels)
+    told = [
+        result for result in results if isinstance(result.verdict, NoMatch) and result.verdict.cause.what == "map bare"
+    ]
+    assert [result.frame for result in told] == on_bare
+    assert query.funnel.excluded["map bare"] == len(on_bare)
+    assert all("nothing for `crossing`" in str(result.verdict) for result in told)
+    again = Query(dataset, program, query.options)
+    assert list(in_order(again, run_here, partitions(dataset, 3), reached.append)) == results
+    few = Query(dataset, program, replace(query.options, every=False))
+    assert not any(result.frame in on_bare for result in few.results())

@@ -171,6 +171,7 @@ def test_dask_gives_the_same_and_listens_on_the_loopback_only(dataset: Dataset, 
 
 @needs_signals
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 @pytest.mark.usefixtures("needs_dask")
 def test_dask_workers_that_are_killed(dataset: Dataset, undisturbed: Found) -> None:
     chance, killed = random.Random(0), 0
@@ -215,8 +216,9 @@ if __name__ == "__main__":
 
 
 @needs_signals
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize(
-    ("jobs", "kills"), [(1, 2), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((1, 20), (2, 8)))]
+    ("jobs", "kills"), [(1, 2), *(pytest.param(jobs, 20, marks=pytest.mark.slow) for jobs in (1, 2))]
 )
 def test_a_resumed_run_that_is_killed(crossroads: Path, tmp_path: Path, run: Any, kills: int, jobs: int) -> None:
     given = ["match", PROGRAM, crossroads, "--tolerance", "heading=5deg,position=0.3", "--classes", "coarse", "--all"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import multiprocessing
 import random
 import sys
 from contextlib import closing
@@ -26,32 +27,13 @@ from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset
 
+sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "match"))
+from made_up import RANDOM, TIED
 from programs import HEADER, PROGRAMS
 from scenes import label_of
 
 STREET = street()
-TIED: dict[str, str] = {
-    "ahead of another": "ego = new Car\nfirst = new Car offset by (Range(-6, 6), Range(4, 12))\n"
-    "second = new Car ahead of first by (Range(-1, 1), Range(2, 10))",
-    "beside another": "ego = new Car\nfirst = new Car offset by (Range(-6, 6), Range(4, 12))\n"
-    "second = new Pedestrian left of first by Range(0.5, 3), facing Range(-20, 20) deg relative to first.heading",
-    "near another": "ego = new Car\nfirst = new Car\nsecond = new Pedestrian\n"
-    "require (distance from first to second) < 8",
-    "facing another": "ego = new Car\nfirst = new Car\nsecond = new Car\n"
-    "require abs(relative heading of first from second) > 100 deg",
-    "either side": "ego = new Car\n"
-    "other = new Car offset by (Uniform(-1, 1) * Range(3, 5), Range(2, 12)),\n"
-    "    facing Uniform(1, -1) * Range(60, 120) deg relative to roadDirection",
-    "two gaps": "gap = Uniform(Range(3, 5), Range(14, 18))\nego = new Car\nother = new Car ahead of ego by gap",
-    "one or the other": "ego = new Car\nfirst = new Car\nsecond = new Pedestrian\n"
-    "require first.position.x - second.position.x > 6 or not (distance from ego to second) > 10",
-    "behind a walker": "ego = new Car\n"
-    "walker = new Pedestrian offset by (Range(-5, 5), Range(2, 20)), facing Range(0, 180) deg\n"
-    "other = new Pedestrian behind walker by Range(0.5, 2), facing Uniform(0, 90, 180) deg relative to walker.heading",
-    "weather": "param weather = Uniform('rain', 'snow')\nparam hour = Range(6, 12)\nego = new Car\nother = new Car",
-}
-"""Programs whose objects are tied to each other, and whose bounds are unions."""
 OPTIONS = {
     "default": MatchOptions(),
     "wide box": MatchOptions(tolerance=Tolerance(x=0.5, y=0.25, heading=math.radians(10)), classes="coarse"),
@@ -59,57 +41,6 @@ OPTIONS = {
     "radius": MatchOptions(tolerance=Tolerance(position=0.5), radius=25.0),
     "any ego": MatchOptions(tolerance=Tolerance(position=0.2, heading=0.1), ego="any"),
 }
-
-
-PLACES = (
-    "offset by (Range({a}, {b}), Range({c}, {d}))",
-    "offset by (Uniform(-1, 1) * Range({a}, {b}), Range({c}, {d}))",
-    "ahead of {one} by Range({c}, {d})",
-    "behind {one} by (Range({a}, {b}), Range({c}, {d}))",
-    "left of {one} by Range({a}, {b})",
-    "beyond {one} by Range({c}, {d})",
-    "on road",
-    "on intersection",
-)
-FACINGS = (
-    "",
-    ", facing Range(-{h}, {h}) deg relative to roadDirection",
-    ", facing Uniform(1, -1) * Range({h}, {k}) deg relative to {one}.heading",
-    ", facing Uniform(0, {h}, {k}) deg relative to ego.heading",
-    ", facing -1 * Range({h}, {k}) deg",
-)
-DEMANDS = (
-    "require (distance from {one} to {two}) < {d}",
-    "require abs(relative heading of {one} from {two}) > {h} deg",
-    "require {one}.position.x > {two}.position.x or {one} in road",
-    "require not ({two} in intersection) and (distance to {two}) < {d} * 3",
-    "require (angle from {one} to {two}) > 0",
-    "require abs(apparent heading of {two}) < {k} deg",
-)
-
-
-def made_up(seed: int) -> str:
-    """A random program of two or three objects around the ego."""
-    rng = random.Random(seed)
-    names, lines = ["ego"], ["ego = new Car on road"]
-
-    def filled(text: str) -> str:
-        low, near = rng.randint(0, 3), rng.randint(0, 4)
-        one = rng.choice(names)
-        two = rng.choice([name for name in names if name != one] or names)
-        sizes = {"a": low, "b": low + rng.randint(1, 4), "c": near, "d": near + rng.randint(3, 10)}
-        return text.format(one=one, two=two, h=rng.randint(10, 80), k=rng.randint(90, 170), **sizes)
-
-    for name in ("first", "second", "third")[: rng.randint(2, 3)]:
-        category = rng.choice(("Car", "Car", "Pedestrian"))
-        lines.append(f"{name} = new {category} {filled(rng.choice(PLACES))}{filled(rng.choice(FACINGS))}")
-        names.append(name)
-    names.remove("ego")
-    lines += [filled(rng.choice(DEMANDS)) for _ in range(rng.randint(0, 2))]
-    return "\n".join(lines)
-
-
-RANDOM = {f"random {seed}": made_up(seed) for seed in range(24)}
 
 
 def nudged(thing: LabelObject, rng: random.Random) -> LabelObject:
@@ -290,8 +221,10 @@ def test_blocks_cover_every_frame_once(dataset):
     assert blocks(where, "elsewhere") == []
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, 2, None])
 def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
+    monkeypatch.setattr("scenicq.query.hands.as_many_as_pay", lambda: 2)
+    monkeypatch.setattr("scenicq.query.hands._PAYS_S", 0.0)
     monkeypatch.setattr("scenicq.query.prefilter._FEWEST_FRAMES", 20)
     monkeypatch.setattr("scenicq.query.prefilter._MOST_FRAMES", 40)
     source = Source("test.scenic", HEADER + TIED["ahead of another"])
@@ -302,3 +235,17 @@ def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
     query = Query(dataset, source, QueryOptions(every=True, solver="portable", jobs=jobs))
     assert [record(result) for result in query.results()] == expected
     assert query.funnel == whole.funnel
+
+
+@pytest.mark.parametrize("pays", [True, False])
+def test_processes_are_started_once_it_is_clear_that_it_takes_long(dataset, pays, monkeypatch):
+    monkeypatch.setattr("scenicq.query.prefilter._FEWEST_FRAMES", 20)
+    monkeypatch.setattr("scenicq.query.hands.as_many_as_pay", lambda: 2)
+    monkeypatch.setattr("scenicq.query.hands._PAYS_S", 0.0 if pays else 3600.0)
+    query = Query(dataset, Source("test.scenic", HEADER + TIED["near another"]), QueryOptions(every=True, jobs=None))
+    processes = []
+    for _ in query.results():
+        processes.append(len(multiprocessing.active_children()))
+    assert processes[0] == 0
+    assert max(processes) == (2 if pays else 0)
+    assert len(processes) == dataset.manifest.total.frames

@@ -126,7 +126,8 @@ def driven(tmp_path, scenarios):
 def test_a_page_of_one_frame_has_its_camera_inside(driven, run, tmp_path):
     page = tmp_path / "alone" / "frame.html"
     page.parent.mkdir()
-    assert run("show", tmp_path / "dataset", "03-busy-intersection/09", "-o", page).output == ""
+    frame = (tmp_path / "dataset", "03-busy-intersection/09", "-o", page)
+    assert run("show", *frame, "--sensors", tmp_path / "source").output == ""
     text = page.read_text(encoding="utf-8")
     assert text.count('<img src="data:image/jpeg;base64,') == 1
     assert "./../source/samples/CAM_FRONT/03-busy-intersection/09.jpg" in text
@@ -134,7 +135,7 @@ def test_a_page_of_one_frame_has_its_camera_inside(driven, run, tmp_path):
 
 
 def test_a_report_has_its_cameras_inside(driven, tmp_path):
-    text = write_report(*driven, tmp_path / "r").read_text(encoding="utf-8")
+    text = write_report(*driven, tmp_path / "r", sensors=tmp_path / "source").read_text(encoding="utf-8")
     assert [path.name for path in (tmp_path / "r").iterdir()] == ["index.html"]
     shown = [part.partition('"')[0] for part in text.split('<img src="data:image/jpeg;base64,')[1:]]
     assert len(shown) == 3
@@ -155,11 +156,17 @@ def test_the_cameras_in_front_come_first_where_there_are_too_many(root, report):
 
 def test_cameras_lie_beside_a_report_that_is_too_large(driven, tmp_path, monkeypatch):
     monkeypatch.setattr(sensors, "_INSIDE_BYTES", 0)
-    write_report(*driven, tmp_path / "few")
+    write_report(*driven, tmp_path / "few", sensors=tmp_path / "source")
     assert len(list((tmp_path / "few" / "thumbnails").iterdir())) == 3
     monkeypatch.setattr(write, "INLINE", 1)
     monkeypatch.setattr(sensors, "_INSIDE_BYTES", 10**9)
-    text = write_report(*driven, tmp_path / "many").read_text(encoding="utf-8")
+    text = write_report(*driven, tmp_path / "many", sensors=tmp_path / "source").read_text(encoding="utf-8")
     small = {path.name for path in (tmp_path / "many" / "thumbnails").iterdir()}
     assert {part[:24] for part in text.split('<img src="thumbnails/')[1:]} == small
     assert len(small) == 3
+
+
+def test_the_folder_that_a_dataset_names_is_not_taken(driven, tmp_path):
+    text = write_report(*driven, tmp_path / "r").read_text(encoding="utf-8")
+    assert "data:image" not in text
+    assert text.count("(not found here)") == len(driven[1])

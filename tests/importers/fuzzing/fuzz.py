@@ -3,7 +3,8 @@
 Each case is a sample source with a few changes, read in a process of its own with limits of time and memory. A case is
 a crash if it ends with anything but a dataset that can be used or a `DataError`, takes more than 20 s or 1 GB, leaves
 something behind, or opens a file outside of what it was given. Each crash is kept: the source, what it said and its
-number; `--only N` runs one case again. Linux only.
+number; `--only N` runs one case again. Linux only. Maps in OpenDRIVE get as far as Scenic's parser where that is
+installed, and else to the message that says so.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ FORMATS = {
     "kitti_tiny": "kitti",
     "openlabel_tiny": "openlabel",
     "interaction_tiny": "interaction",
+    "street.xodr": "interchange",
 }
+"""The importer of each sample; of a map, that of the labels which lie on it."""
 LONGEST_S = 20.0
 MOST_BYTES = 1 << 30
 # Processor time is what counts: a machine may be busy.
@@ -63,9 +66,14 @@ class Outside(Exception):
 def prepare(name: str, folder: Path, random: random.Random) -> None:
     """Make the changed copy."""
     root = folder / "source"
-    shutil.copytree(SAMPLES / name, root)
-    if name == "crossroads":
+    is_map = name.endswith(".xodr")
+    shutil.copytree(SAMPLES / ("crossroads" if is_map else name), root)
+    if is_map or name == "crossroads":
         _shrink(root, random)
+    if is_map:
+        root = folder / "given"
+        root.mkdir()
+        shutil.copy(Path(__file__).with_name(name), root)
     mutate_source(root, folder / "outside.txt", random)
 
 
@@ -78,6 +86,8 @@ def run_case(name: str, folder: Path, random: random.Random) -> str:
     if random.random() < 0.1:
         given = Path(shutil.copy(SAMPLES / "crossroads" / "maps" / "crossroads.geojson", folder / "given.geojson"))
         options["maps"] = [f"{random.choice(['tiny-town', 'x', '../x', 'TINY_Street'])}={given}"]
+    if name.endswith(".xodr"):
+        options["maps"] = [f"crossroads={file}" for file in sorted((folder / "given").rglob("*")) or ["none.xodr"]]
     if random.random() < 0.05:
         options["format"] = None
     files = _files(root)

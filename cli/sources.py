@@ -1,0 +1,97 @@
+"""Where the sensor files of a dataset are, by the word of this user and of nobody else.
+
+A dataset says where it was made from; but it may be a stranger's, and a report has small images in it of the files that
+it names. So the folder counts that this user gave to `ingest` when making just this dataset, or gives now.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scenicq.errors import Diagnostic
+from scenicq.store.manifest import MANIFEST
+
+from .report import show
+
+if TYPE_CHECKING:  # an ingest needs no DuckDB, which comes with this
+    from scenicq.store.dataset import Dataset
+
+__all__ = ["SENSORS", "recorded", "remember", "sensor_root"]
+
+SENSORS = click.option(
+    "--sensors",
+    metavar="DIR",
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    help="The folder that the paths of sensor files start from.  [default: the source, if you ingested it here]",
+)
+"""The option by which a user says so."""
+
+
+def remember(folder: Path, source: Path) -> None:
+    """Note that this user has made a dataset from a source; a home that cannot be written costs no more than that.
+
+    Args:
+        folder: Of the dataset.
+        source: What it was made from.
+    """
+    with contextlib.suppress(OSError, RuntimeError):
+        line = json.dumps({"dataset": _digest((folder / MANIFEST).read_bytes()), "source": str(source.resolve())})
+        notes = _notes()
+        notes.parent.mkdir(parents=True, exist_ok=True)
+        with notes.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
+
+def recorded(dataset: Dataset) -> Path | None:
+    """The source from which this user has made a dataset, wherever it lies now; None for one of somebody else's."""
+    digest = _digest(dataset.place.manifest())
+    found = None
+    with contextlib.suppress(OSError, RuntimeError, ValueError), _notes().open(encoding="utf-8") as file:
+        for line in file:
+            if digest in line:
+                found = Path(json.loads(line)["source"])
+    return found
+
+
+def sensor_root(dataset: Dataset, given: Path | None) -> Path | None:
+    """The folder that the paths of sensor files start from; a warning where nobody has said so.
+
+    Args:
+        dataset: The dataset, in whose own folder they may always lie.
+        given: By the user.
+    """
+    root = given or recorded(dataset)
+    if root is None and any(part.rows for part in dataset.manifest.tables["sensors"]):
+        message = f"sensor files are looked for in {dataset.name} alone: it was not made here, or not by you"
+        hint = "`--sensors DIR` gives the folder that their paths start from"
+        show([Diagnostic("file-missing", message, hints=(hint,), severity="warning")])
+    return root
+
+
+def _digest(manifest: bytes) -> str:
+    return hashlib.sha256(manifest).hexdigest()
+
+
+def _notes() -> Path:
+    """The file of this user with one line a dataset.
+
+    Raises:
+        RuntimeError: The user has no home.
+    """
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA")
+        folder = Path(base) if base else Path.home() / "AppData" / "Local"
+    elif sys.platform == "darwin":
+        folder = Path.home() / "Library" / "Application Support"
+    else:
+        base = os.environ.get("XDG_STATE_HOME", "")
+        folder = Path(base) if Path(base).is_absolute() else Path.home() / ".local" / "state"
+    return folder / "scenicq" / "ingested.jsonl"

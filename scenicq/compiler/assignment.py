@@ -1,0 +1,93 @@
+"""What gets a value: names, items, several names at once, the names of comprehensions."""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from scenicq.compiler.arithmetic import hashed
+from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.items import items_of
+from scenicq.compiler.logic import condition
+from scenicq.compiler.settled import decided
+from scenicq.compiler.values import ModelValue, describe, fail
+from scenicq.errors import Span
+from scenicq.syntax import ast
+
+__all__ = ["assign", "assign_around", "go_through"]
+
+
+def assign(run: Runner, target: ast.Expression, value: ModelValue, scope: Environment) -> None:
+    """Give a name, an item or several names a value."""
+    match target:
+        case ast.Name():
+            run.name_value(target.id, value, scope, target.span)
+        case ast.Tuple() | ast.List():
+            _assign_each(run, target.items, items_of(run, value, target.span), scope, target.span)
+        case ast.Subscript(index=index) if not isinstance(index, ast.Slice):
+            holder = run.evaluate(target.value, scope)
+            if not isinstance(holder, list | dict):
+                raise fail("wrong-type", f"an item of {describe(holder)} cannot be set", target.span)
+            place = run.evaluate(index, scope)
+            try:
+                cast(Any, holder)[hashed(place, target.span) if isinstance(holder, dict) else place] = value
+            except (IndexError, TypeError):
+                raise fail("runtime-error", "there is no item with this index", target.span) from None
+        case ast.Subscript() | ast.Slice() | ast.Starred():
+            raise fail("unsupported-construct", "this cannot be assigned to", target.span, "not a name",
+                       ("make a new list",))  # fmt: skip
+        case _:
+            raise fail("unsupported-construct", "this cannot be assigned to", target.span, "not a name",
+                       ("give objects their properties with `with`",))  # fmt: skip
+
+
+def _assign_each(
+    run: Runner, targets: tuple[ast.Expression, ...], items: list[ModelValue], scope: Environment, span: Span
+) -> None:
+    """Give several names a value each; one with a star takes what the others leave."""
+    starred = [number for number, target in enumerate(targets) if isinstance(target, ast.Starred)]
+    spare = len(items) - len(targets)
+    if len(starred) > 1 or (spare != 0 and not (starred and spare >= -1)):
+        raise fail("wrong-value", f"{len(items)} values for {len(targets)} names", span)
+    if starred:
+        first = starred[0]
+        taken = items[first : first + spare + 1]
+        items = [*items[:first], taken, *items[first + spare + 1 :]]
+    for target, item in zip(targets, items, strict=True):
+        assign(run, target.value if isinstance(target, ast.Starred) else target, item, scope)
+
+
+def assign_around(run: Runner, target: ast.Name, value: ModelValue, scope: Environment) -> None:
+    """`name := value`, which binds outside of comprehensions."""
+    while scope.comprehension and scope.parent is not None:
+        scope = scope.parent
+    assign(run, target, value, scope)
+
+
+def go_through(
+    run: Runner, clauses: tuple[ast.Clause, ...], scope: Environment, visit: Callable[[Environment], None]
+) -> None:
+    """Visit every combination of a comprehension, whose names live in one scope of their own."""
+    _nest(run, clauses, scope, Environment({}, scope, comprehension=True), visit)
+
+
+def _nest(
+    run: Runner,
+    clauses: tuple[ast.Clause, ...],
+    around: Environment,
+    inner: Environment,
+    visit: Callable[[Environment], None],
+) -> None:
+    if not clauses:
+        visit(inner)
+        return
+    clause = clauses[0]
+    for item in items_of(run, run.evaluate(clause.iterable, around), clause.iterable.span):
+        run.budget.step(clause.span)
+        assign(run, clause.target, item, inner)
+        if all(decided(run, condition(run, test, inner), test.span) for test in clause.conditions):
+            _nest(run, clauses[1:], inner, inner, visit)

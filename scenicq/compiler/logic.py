@@ -1,0 +1,84 @@
+"""`and`, `or`, `not`: as conditions, of which only the truth counts, and as the values that Python makes of them."""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from scenicq.compiler import operators
+from scenicq.compiler.arithmetic import is_random
+from scenicq.compiler.builtins import truth
+from scenicq.compiler.choices import distribute, is_choice
+from scenicq.compiler.coerce import kind_of_model
+from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.values import Delayed, ModelValue, fail
+from scenicq.errors import Span
+from scenicq.syntax import ast
+
+__all__ = ["condition", "connected", "inverted"]
+
+
+def condition(run: Runner, node: ast.Expression, scope: Environment) -> ModelValue:
+    """The value of an expression of which only the truth counts."""
+    match node:
+        case ast.BoolOp():
+            values = (condition(run, part, scope) for part in node.values)
+            return _joined(node.operator, _until_decided(node.operator, values, node.span), node.span)
+        case ast.UnaryOp(operator="not"):
+            return inverted(condition(run, node.operand, scope), node.span)
+        case _:
+            return run.evaluate(node, scope)
+
+
+def inverted(value: ModelValue, span: Span) -> ModelValue:
+    """`not value`."""
+    return operators.combine("not", [value], span) if is_random(value) else not truth(value, span)
+
+
+def connected(run: Runner, node: ast.BoolOp, scope: Environment) -> ModelValue:
+    """The value of `a and b` or `a or b`: the operand that decides, else the last one."""
+    values = (run.evaluate(part, scope) for part in node.values)
+    return _deciding(node.operator, _until_decided(node.operator, values, node.span), node.span)
+
+
+def _until_decided(op: str, values: Iterable[ModelValue], span: Span) -> list[ModelValue]:
+    """Operands up to the first known one that decides: Python does not evaluate the others."""
+    found: list[ModelValue] = []
+    for value in values:
+        if isinstance(value, Delayed):
+            raise fail("wrong-type", "this needs the object's position, which is not known here", span)
+        found.append(value)
+        if not is_random(value) and truth(value, span) == (op == "or"):
+            break
+    return found
+
+
+def _joined(op: str, values: list[ModelValue], span: Span) -> ModelValue:
+    """The truth of operands together."""
+    pending = [value for value in values if is_random(value)]
+    if not pending or not (is_random(values[-1]) or truth(values[-1], span) != (op == "or")):
+        return values[-1]
+    return operators.combine(op, pending, span)
+
+
+def _deciding(op: str, values: list[ModelValue], span: Span) -> ModelValue:
+    """The operand that Python would take.
+
+    Raises:
+        ScenarioError: random-branch, where that depends on the truth of random numbers or strings.
+    """
+    # a known operand that does not decide counts only if it is the last one
+    left = [value for value in values[:-1] if is_random(value)] + values[-1:]
+    if len(left) == 1 or all(kind_of_model(value) == "boolean" and not is_choice(value) for value in left):
+        return _joined(op, left, span)
+    if any(map(is_choice, left[:-1])):
+
+        def taken(*outcome: ModelValue) -> ModelValue:
+            return _deciding(op, _until_decided(op, outcome, span), span)
+
+        return distribute(taken, tuple(left), span, spread=is_choice)
+    raise fail("random-branch", f"which operand `{op}` gives depends on a random value", span, "random here",
+               ("compare the values, as in `a > 0`", "state conditions with `require`"))  # fmt: skip

@@ -1,0 +1,78 @@
+"""`require`: a condition on every scene, over the names that the program has at that moment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from scenicq.compiler.coerce import to_boolean
+from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.logic import condition
+from scenicq.compiler.values import Delayed, Instance, ModelValue, fail
+from scenicq.errors import Span
+from scenicq.forest.nodes import Node
+from scenicq.syntax import ast
+
+__all__ = ["Requirement", "requirement"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Requirement:
+    """A `require` statement: its condition, or what computes it once the ego is known."""
+
+    condition: Callable[[], Node]
+    span: Span
+    probability: float = 1.0
+
+
+class _Requirer(Runner, Protocol):
+    """What a requirement asks of the interpreter."""
+
+    current_ego: Instance | None
+
+
+def requirement(run: _Requirer, node: ast.Require, scope: Environment) -> Requirement | None:
+    """The requirement that a statement makes; None where it is about time and ignored.
+
+    Raises:
+        ScenarioError: wrong-value for what is no probability.
+    """
+    probability = 1.0 if node.probability is None else _probability(run, node.probability, scope)
+    wanted = node.condition
+    if isinstance(wanted, ast.Temporal | ast.Until):
+        run.dynamic(f"require {wanted.operator if isinstance(wanted, ast.Temporal) else 'until'}", wanted.span)
+        if not (isinstance(wanted, ast.Temporal) and wanted.operator == "always"):
+            return None
+        wanted = wanted.operand
+    names: dict[str, ModelValue] = {}
+    current = scope
+    while current.parent is not None:
+        names = current.names | names
+        current = current.parent
+    run.budget.step(node.span, 20 + len(names))
+    frozen, ego = Environment(names, current), run.current_ego
+    module = scope.module
+    then = dict(module.names)
+
+    def held() -> Node:
+        # names and the ego are those of the moment of the statement, also in the functions that the condition calls
+        now, before = module.names, run.current_ego
+        module.names, run.current_ego = now | then, ego
+        try:
+            value = condition(run, wanted, frozen)
+        finally:
+            module.names, run.current_ego = now, before
+        if isinstance(value, Delayed):
+            raise fail("wrong-type", "this needs the position of an object", wanted.span, "no object here",
+                       ("write `F at V`",))  # fmt: skip
+        return to_boolean(value, wanted.span)
+
+    return Requirement(held, node.span, probability)
+
+
+def _probability(run: Runner, node: ast.Expression, scope: Environment) -> float:
+    value = run.evaluate(node, scope)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        raise fail("wrong-value", "a probability must be a known number from 0 to 1", node.span)
+    return float(value)

@@ -1,0 +1,66 @@
+"""`int` and `round` of random numbers, exactly, in terms of floor and ceiling."""
+
+from __future__ import annotations
+
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.nodes import (
+    ArithmeticOp,
+    DiscreteRange,
+    Feature,
+    Index,
+    Node,
+    Normal,
+    Range,
+    TruncatedNormal,
+)
+from scenicq.forest.walk import children
+
+__all__ = ["rounded", "truncated"]
+
+
+def truncated(value: Node, span: Span) -> Node:
+    """A number without its fraction."""
+    zero = build.constant(0.0, span)
+    below = build.arithmetic(ArithmeticOp.FLOOR, value, span=span)
+    above = build.arithmetic(ArithmeticOp.CEIL, value, span=span)
+    return build.add(
+        build.arithmetic(ArithmeticOp.MAX, below, zero, span=span),
+        build.arithmetic(ArithmeticOp.MIN, above, zero, span=span),
+        span,
+    )
+
+
+def rounded(value: Node, digits: int, span: Span) -> Node:
+    """A number to a number of decimals; the one in the middle between two goes to the even one, as in Python."""
+    if digits:
+        factor = build.constant(10.0**digits, span)
+        scaled = build.arithmetic(ArithmeticOp.MUL, value, factor, span=span)
+        return build.arithmetic(ArithmeticOp.DIV, rounded(scaled, 0, span), factor, span=span)
+    half = build.arithmetic(ArithmeticOp.ADD, value, build.constant(0.5, span), span=span)
+    up = build.arithmetic(ArithmeticOp.FLOOR, half, span=span)
+    if _never_between(value):
+        return up
+    # (2 x - 1) / 4 is whole only in the middle below an odd number: there the even one is one less
+    quarter = build.minus(
+        build.arithmetic(ArithmeticOp.MUL, value, build.constant(0.5, span), span=span),
+        build.constant(0.25, span),
+        span,
+    )
+    above = build.arithmetic(ArithmeticOp.CEIL, quarter, span=span)
+    odd = build.minus(above, build.arithmetic(ArithmeticOp.FLOOR, quarter, span=span), span)
+    return build.add(up, build.minus(odd, build.constant(1.0, span), span), span)
+
+
+_SMALL = 16
+
+
+def _never_between(value: Node) -> bool:
+    """Whether a number certainly lies in the middle between two whole ones with probability 0 only."""
+    found: list[Node] = [value]
+    for node in found:
+        if len(found) > _SMALL:
+            return False
+        found += children(node)
+    continuous = any(isinstance(node, Range | Normal | TruncatedNormal) for node in found)
+    return continuous and not any(isinstance(node, Feature | DiscreteRange | Index) for node in found)

@@ -1,0 +1,57 @@
+"""Strings with values in them: f-strings, with the formats of numbers and texts that cannot grow large."""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+import re
+
+from scenicq.compiler.arithmetic import LARGEST
+from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.settled import settled
+from scenicq.compiler.values import ModelValue, describe, fail
+from scenicq.errors import Span
+from scenicq.forest.nodes import Constant
+from scenicq.syntax import ast
+
+__all__ = ["formatted"]
+
+_FORMAT = re.compile(r"(.?[<>=^])?[-+ ]?#?0?\d{0,3}[,_]?(\.\d{1,2})?[bcdeEfFgGnosxX%]?", re.DOTALL)
+"""Format specifications whose result is at most about a thousand characters long."""
+
+
+def formatted(run: Runner, node: ast.FormattedString, scope: Environment) -> str:
+    """The text of an f-string.
+
+    Raises:
+        ScenarioError: What is put in is random or no plain value, or the text grows too long.
+    """
+    text: list[str] = []
+    for part in node.parts:
+        if isinstance(part, ast.Constant):
+            text.append(str(part.value))
+            continue
+        value = settled(run, run.evaluate(part.value, scope))
+        value = value.value if isinstance(value, Constant) else value
+        if not isinstance(value, str | int | float | bool | None):
+            raise fail("unsupported-construct", "only known numbers and strings can be put in a string", part.span,
+                       f"this is {describe(value)}",
+                       ("choose between known strings with `Uniform(...)`",))  # fmt: skip
+        value = {"r": repr, "a": ascii, "s": str}[part.conversion](value) if part.conversion else value
+        text.append(_laid_out(value, formatted(run, part.format, scope) if part.format else "", part.span))
+        run.budget.pay(len(text[-1]), node.span)
+    if sum(map(len, text)) > LARGEST:
+        raise fail("budget-exceeded", f"a string grows beyond {LARGEST:,} characters", node.span, "grows here")
+    return "".join(text)
+
+
+def _laid_out(value: ModelValue, wanted: str, span: Span) -> str:
+    if not _FORMAT.fullmatch(wanted):
+        raise fail("unsupported-construct", "a format like this is not supported", span, "a format",
+                   ("widths go up to 999 and precisions up to 99",))  # fmt: skip
+    try:
+        return format(value, wanted)
+    except (ValueError, TypeError, OverflowError):
+        raise fail("runtime-error", f"this format does not apply to {describe(value)}", span, "a format") from None

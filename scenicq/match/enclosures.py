@@ -1,0 +1,137 @@
+"""Intervals and boxes by the thousand: outer bounds of the same expression in many cases at once.
+
+An interval is an array (2, n) of lower and upper ends, a box an array (2, 2, n): coordinate, end, case. The functions
+take either where that makes sense, and never return too little.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "Enclosure",
+    "angle_of",
+    "common",
+    "divide",
+    "everything",
+    "negative",
+    "nothing_left",
+    "projected",
+    "rotate",
+    "subtract",
+    "times",
+    "turning",
+    "turns_near",
+]
+
+Enclosure: TypeAlias = NDArray[np.float64]
+_ROUNDING = 1e-9
+"""By how much two intervals may miss each other and still meet."""
+
+
+def everything(like: Enclosure) -> Enclosure:
+    """All numbers, in the shape of another enclosure."""
+    found = np.empty_like(like)
+    found[..., 0, :], found[..., 1, :] = -np.inf, np.inf
+    return found
+
+
+def negative(a: Enclosure) -> Enclosure:
+    """The same below zero."""
+    return -a[..., ::-1, :]
+
+
+def subtract(a: Enclosure, b: Enclosure) -> Enclosure:
+    """The difference."""
+    return a - b[..., ::-1, :]
+
+
+def times(a: Enclosure, b: Enclosure) -> Enclosure:
+    """The product; nothing times an infinite end is nothing."""
+    with np.errstate(invalid="ignore"):
+        ends = a[..., :, None, :] * b[..., None, :, :]
+    ends[np.isnan(ends)] = 0.0
+    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    found[..., 0, :], found[..., 1, :] = ends.min(axis=(-3, -2)), ends.max(axis=(-3, -2))
+    return found
+
+
+def divide(a: Enclosure, b: Enclosure) -> Enclosure:
+    """The quotient; everything where the divisor may be close to zero."""
+    vague = (b[..., 0, :] <= _ROUNDING) & (b[..., 1, :] >= -_ROUNDING)
+    safe = np.where(vague[..., None, :], 1.0, b)
+    found = times(a, 1.0 / safe[..., ::-1, :])
+    return np.where(vague[..., None, :], everything(found), found)
+
+
+def common(a: Enclosure, b: Enclosure) -> Enclosure:
+    """What two have in common; ends that miss each other by rounding alone change places."""
+    low, high = np.maximum(a[..., 0, :], b[..., 0, :]), np.minimum(a[..., 1, :], b[..., 1, :])
+    swap = (low > high) & (low <= high + _ROUNDING)
+    return np.stack([np.where(swap, high, low), np.where(swap, low, high)], axis=-2)
+
+
+def nothing_left(a: Enclosure) -> NDArray[np.bool_]:
+    """In which cases an enclosure is empty, (n,)."""
+    empty = a[..., 0, :] > a[..., 1, :]
+    return np.logical_or.reduce(np.atleast_2d(empty), axis=0)
+
+
+def _sine(a: Enclosure) -> Enclosure:
+    low, high = a[0], a[1]
+    wide = ~(high - low < math.tau)
+    low, high = np.where(wide, 0.0, low), np.where(wide, 0.0, high)
+    ends = np.sin(np.stack([low, high]))
+    quarter = math.pi / 2
+    top = wide | (np.ceil((low - quarter) / math.tau) * math.tau + quarter <= high)
+    bottom = wide | (np.ceil((low + quarter) / math.tau) * math.tau - quarter <= high)
+    return np.stack([np.where(bottom, -1.0, ends.min(axis=0)), np.where(top, 1.0, ends.max(axis=0))])
+
+
+def turning(angle: Enclosure) -> tuple[Enclosure, Enclosure]:
+    """The sine and the cosine of angles."""
+    return _sine(angle), _sine(angle + math.pi / 2)
+
+
+def rotate(box: Enclosure, turn: tuple[Enclosure, Enclosure]) -> Enclosure:
+    """Boxes turned counter-clockwise by the angles of a sine and a cosine."""
+    s, c = turn
+    x, y = box[0], box[1]
+    across = subtract(times(x, c), times(y, s))
+    along = times(x, s) + times(y, c)
+    reach = np.hypot(np.abs(x).max(axis=0), np.abs(y).max(axis=0))
+    return common(np.stack([across, along]), np.stack([-reach, reach]))
+
+
+def angle_of(box: Enclosure) -> Enclosure:
+    """The headings of the vectors of boxes, counter-clockwise from ahead; everything where they may be all."""
+    around = (box[:, 0] <= 0).all(axis=0) & (box[:, 1] >= 0).all(axis=0)
+    vague = around | ~np.isfinite(box).all(axis=(0, 1))
+    safe = np.where(vague, 1.0, box)
+    middle = np.arctan2(-safe[0].mean(axis=0), safe[1].mean(axis=0))
+    corners = np.arctan2(-safe[0][:, None], safe[1][None, :])
+    # seen from outside, a box covers less than half a turn
+    off = np.remainder(corners - middle + math.pi, math.tau) - math.pi
+    found = middle + np.stack([off.min(axis=(0, 1)), off.max(axis=(0, 1))])
+    return np.where(vague, everything(found), found)
+
+
+def turns_near(a: Enclosure, within: Enclosure) -> Enclosure:
+    """The hull of angles plus whole turns, as far as they meet intervals; what cannot be told stays as it is."""
+    vague = ~(np.isfinite(a).all(axis=0) & np.isfinite(within).all(axis=0))
+    a, safe = np.where(vague, 0.0, a), np.where(vague, 0.0, within)
+    first = np.ceil((safe[0] - a[1]) / math.tau - _ROUNDING)
+    last = np.floor((safe[1] - a[0]) / math.tau + _ROUNDING)
+    found = np.where(last < first, [[np.inf], [-np.inf]], a + math.tau * np.stack([first, last]))
+    return np.where(vague, within, found)
+
+
+def projected(box: Enclosure, along: NDArray[np.float64]) -> Enclosure:
+    """The extent of boxes along directions (2, n)."""
+    ends = np.stack([along, along], axis=1)
+    found = times(box, ends)
+    return found[0] + found[1]

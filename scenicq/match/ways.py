@@ -1,0 +1,220 @@
+"""One way through a group with fields: each points as chosen, so that the rest is linear.
+
+For each hidden point there is one map cell to choose, out of the few that are left where the point can be.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from scenicq.forest.bounds import Interval
+from scenicq.forest.condition import condition
+from scenicq.forest.groups import Comparison
+from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn, Value
+from scenicq.geometry.fields import FieldCell, VectorField
+from scenicq.geometry.shapes import Bounds
+from scenicq.match.affine import AffineVector, affine_scalar, affine_vector
+from scenicq.match.branches import Branches
+from scenicq.match.ground import holds, replay
+from scenicq.match.ladder import LINEAR_SLACK, Item, Maybe, No, Outcome, Yes
+from scenicq.match.linear import Alternative, NotLinear, inside, solve_affine
+from scenicq.match.options import Tolerance
+from scenicq.match.program import Row
+
+__all__ = ["MARGIN", "SAME", "Way", "solved", "way_of"]
+
+MARGIN = 2e-6
+"""Metres by which boxes are grown, so that rounding loses nothing."""
+SAME = 2e-9
+"""Radians by which the heading of a cell may differ from one that was rounded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A part with all its directions chosen.
+
+    Attributes:
+        case: The case that it was made of.
+        items: Its constraints with these directions, affine.
+        places: The points of its fields.
+        cells: For each of them where a border may matter, the cells that it may lie in.
+        given: The options that were picked.
+        headings: The directions that were chosen, by the id of the use of the field.
+        limits: Where the number can be that it shares with other parts.
+        middles: A value for each random variable, should nothing be said of it.
+        exact: Whether it has no solution where its linear program has none.
+        sharp: Whether the fields do point so everywhere in the cells.
+    """
+
+    case: Branches
+    items: list[Item]
+    places: list[Node]
+    cells: list[Alternative]
+    given: Mapping[Identity, Value]
+    headings: Mapping[int, float]
+    limits: Interval
+    middles: Mapping[Identity, Value]
+    exact: bool
+    sharp: bool
+
+
+def solved(ways: Sequence[Way], tolerance: Tolerance) -> Outcome:
+    """Whether parts have a solution together in which the fields point as chosen."""
+    items = [item for way in ways for item in way.case.tape.items]
+    open_ended = Maybe(items[0][0], "nonlinear")
+    headings: dict[int, float] = {}
+    values: dict[Identity, Value] = {}
+    for way in ways:
+        headings |= way.headings
+        values.update(way.middles)
+        values.update(way.given)
+    # a solution on the border of two cells may count to the other one: the second time it keeps away from borders
+    for strict in (False, True):
+        try:
+            found = _program(ways, tolerance, strict=strict)
+        except NotLinear:
+            return open_ended
+        if found is None:
+            sure = not strict and all(way.exact for way in ways)
+            return No(items[0][0]) if sure else open_ended
+        if replay(items, values | found, tolerance, LINEAR_SLACK, headings):
+            return Yes(values | found)
+    return open_ended
+
+
+def _program(ways: Sequence[Way], tolerance: Tolerance, *, strict: bool) -> dict[Identity, Value] | None:
+    cells = [cells for way in ways for cells in way.cells]
+    if strict:
+        cells = [[[replace(row, strict=row.low < row.high) for row in rows] for rows in options] for options in cells]
+    return solve_affine(
+        [item for way in ways for item in way.items],
+        [row for options in cells if len(options) == 1 for row in options[0]],
+        tolerance,
+        [place for way in ways for place in way.places],
+        [options for options in cells if len(options) > 1],
+    )
+
+
+def way_of(cases: Branches, number: int, shared: Identity | None) -> Way | None:
+    """A case in which all choices are made, as constraints; None if a field does not point so where its point is.
+
+    Args:
+        cases: Narrowed cases.
+        number: Which of them.
+        shared: The random number that several parts share, if any.
+    """
+    tape = cases.tape
+    given: dict[Identity, Value] = {}
+    headings: dict[int, float] = {}
+    memo: dict[int, Node] = {}
+    for node in tape.choices:
+        chosen = float(cases.chosen[id(node)][number])
+        if isinstance(node, Index):
+            given[node.identity] = chosen
+        else:
+            headings[id(node)] = chosen
+            memo[id(node)] = Constant(chosen, span=node.span)
+    items = [(c, condition(node, {}, given, memo), seen) for c, node, seen in tape.items]
+    if any(isinstance(node, Constant) and not holds(c, node.value, seen, tape.tolerance) for c, node, seen in items):
+        return None
+    exact = all(_is_affine(node, seen) for c, node, seen in items if isinstance(c, Comparison))
+    cells: list[Alternative] = []
+    pinned = {} if exact else _pinned(cases, number, items, cells)
+    straight: list[Item] = [
+        (c, condition(node, {}, None, pinned) if isinstance(seen, tuple) else node, seen) for c, node, seen in items
+    ]
+    places: list[Node] = []
+    sharp = True
+    for node in tape.choices:
+        if isinstance(node, Index):
+            continue
+        place = condition(condition(node.point, {}, given, memo), {}, None, pinned)
+        options = _cells(cases, number, node, affine_vector(place))
+        if options is None:
+            continue
+        if not options[0]:
+            return None
+        places.append(place)
+        cells.append(options[0])
+        sharp = sharp and options[1]
+    limits = (-math.inf, math.inf)
+    if shared in tape.leaves:
+        low, high = cases.ranges[shared][:, number].tolist()
+        limits = (low, high)
+    middles = {identity: _middle(leaf, cases, number) for identity, leaf in tape.leaves.items()}
+    case = cases.take(np.array([number]))
+    return Way(case, straight, places, cells, given, headings, limits, middles, exact, sharp)
+
+
+def _is_affine(node: Node, seen: Value) -> bool:
+    return (affine_vector(node) if isinstance(seen, tuple) else affine_scalar(node)) is not None
+
+
+def _pinned(cases: Branches, number: int, items: list[Item], cells: list[Alternative]) -> dict[int, Node]:
+    """Headings that the label observes, taken to be as observed: what hangs on them is then affine, too."""
+    pinned: dict[int, Node] = {}
+    for (constraint, node, seen), (_, whole, _) in zip(items, cases.tape.items, strict=True):
+        if not (isinstance(constraint, Comparison) and constraint.property == "heading" and isinstance(seen, float)):
+            continue
+        form = affine_scalar(node)
+        if form is not None and form.terms:
+            low, high = cases.value(whole)[:, number].tolist()
+            turns = math.tau * round(((low + high) / 2 - seen) / math.tau)
+            value = min(max(seen + turns, low), high)
+            pinned[id(node)] = Constant(value, span=node.span)
+            cells.append([[Row(form, value, value)]])
+    return pinned
+
+
+def _cells(
+    cases: Branches, number: int, node: DirectionAt, place: AffineVector | None
+) -> tuple[Alternative, bool] | None:
+    """Facts of which one set holds where a field points as chosen; None if it does wherever the point can be.
+
+    With them whether it does point so wherever one of the sets holds.
+    """
+    (x0, x1), (y0, y1) = cases.place(node)[:, :, number].tolist()
+    box = (x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN)
+    heading = float(cases.chosen[id(node)][number])
+    field = cast(VectorField, cast(Constant, node.field).value)
+    found: Alternative = []
+    sharp = True
+    for whole in field.cells(box):
+        cell = whole.part(box) if abs(whole.heading - heading) <= SAME and _meets(whole, box) else None
+        if cell is None:
+            continue
+        if cell.exact and _covers(cell, box):
+            return None
+        sharp = sharp and cell.exact
+        if place is not None:
+            around = (Row(place[0], box[0], box[2]), Row(place[1], box[1], box[3]))
+            found.append([*inside(place, cell.polygon), *around])
+    return (found, sharp) if place is not None else ([[]], False)
+
+
+def _middle(leaf: Leaf, cases: Branches, number: int) -> Value:
+    limits = cases.ranges[leaf.identity][..., number]
+    if isinstance(leaf, PointIn):
+        return float(limits[0].mean()), float(limits[1].mean())
+    low, high = limits.tolist()
+    return (low + high) / 2 if np.isfinite(low + high) else 0.0
+
+
+def _meets(cell: FieldCell, box: Bounds) -> bool:
+    west, south, east, north = cell.bounds
+    return west <= box[2] and east >= box[0] and south <= box[3] and north >= box[1]
+
+
+def _covers(cell: FieldCell, box: Bounds) -> bool:
+    """Whether a cell holds all corners of a box."""
+    west, south, east, north = box
+    corners = np.array([(west, south), (east, south), (east, north), (west, north)])
+    start, end = cell.polygon, np.roll(cell.polygon, -1, axis=0)
+    along = end - start
+    off = corners[:, None] - start[None]
+    return bool((along[:, 0] * off[..., 1] - along[:, 1] * off[..., 0] >= 0).all())

@@ -1,0 +1,98 @@
+"""Files that are there completely or not at all: written under another name, synced, then renamed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+__all__ = ["WholeFile", "sync_folder", "whole_file", "write_whole"]
+
+
+class WholeFile:
+    """A file that gets its name when it is complete.
+
+    What a reader finds under the name is what was there before or all of it, even if the machine stops. `whole_file`
+    is the same as a `with` statement; this is for those who tell errors of the file from those of who writes it.
+    """
+
+    def __init__(self, path: Path, folder: Path | None = None) -> None:
+        """Choose the names; nothing is written yet.
+
+        Args:
+            path: The file.
+            folder: Where it is written, on the same file system; beside its place by default.
+        """
+        self._path = path
+        self._temporary = (folder or path.parent) / f".{path.name}.{os.getpid()}.tmp"
+        self._file: BinaryIO | None = None
+
+    def open(self) -> BinaryIO:
+        """The file, to be written.
+
+        Raises:
+            OSError: The folder cannot be written.
+        """
+        self._file = self._temporary.open("wb")
+        return self._file
+
+    def finish(self) -> None:
+        """Give the file its name.
+
+        Raises:
+            OSError: What was written does not reach the disk.
+        """
+        assert self._file is not None
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+        self._temporary.replace(self._path)
+        sync_folder(self._path.parent)
+
+    def abandon(self) -> None:
+        """Remove what is not finished; nothing where all is."""
+        if self._file is None:
+            return
+        with suppress(OSError):  # what is left in the buffer may not fit on the disk
+            self._file.close()
+        with suppress(OSError):
+            self._temporary.unlink()
+
+
+@contextmanager
+def whole_file(path: Path) -> Generator[BinaryIO]:
+    """A file to be written, which gets its name at the end of the block unless that fails.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    whole = WholeFile(path)
+    try:
+        yield whole.open()
+        whole.finish()
+    finally:
+        whole.abandon()
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file in UTF-8, completely or not at all.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    with whole_file(path) as file:
+        file.write(text.encode())
+
+
+def sync_folder(folder: Path) -> None:
+    """Make renames in a folder last, where the system can: some file systems have no such thing."""
+    if os.name != "posix":
+        return
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

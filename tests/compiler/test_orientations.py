@@ -1,0 +1,35 @@
+"""The heading that a place on the map brings with it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from scenicq.compiler.program import compile_scenario
+from scenicq.compiler.standin import street
+from scenicq.errors import Source
+from scenicq.forest.bounds import scalar_bounds
+from scenicq.forest.nodes import DirectionAt, Node, Range
+from scenicq.forest.walk import postorder
+
+MODEL = "model scenic.domains.driving.model\nego = new Car\n"
+
+
+def heading_of_the_last(text: str) -> Node:
+    scenario = compile_scenario(Source("test.scenic", MODEL + text), street())
+    return scenario.objects[-1].properties["heading"].value
+
+
+@pytest.mark.parametrize("place", ["sidewalk", "crossing", "Uniform(*network.sidewalks)", "visible sidewalk"])
+def test_where_the_map_gives_no_direction_it_is_any(place: str) -> None:
+    heading = heading_of_the_last(
+        f"spot = new OrientedPoint on {place}\nnew Object at spot, facing 0 relative to spot\n"
+    )
+    assert [type(node) for node in postorder([heading]) if isinstance(node, Range | DirectionAt)] == [Range]
+    assert scalar_bounds(heading) == pytest.approx((-math.pi, math.pi))
+
+
+def test_on_the_road_it_is_that_of_traffic() -> None:
+    heading = heading_of_the_last("spot = new OrientedPoint on road\nnew Object at spot, facing 0 relative to spot\n")
+    assert [type(node) for node in postorder([heading]) if isinstance(node, Range | DirectionAt)] == [DirectionAt]

@@ -1,0 +1,3 @@
+model scenic.domains.driving.model
+ego = new Car
+new Car on visible road

@@ -1,0 +1,87 @@
+"""The original Scenic, in an environment and a process of its own."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+
+
+def environment(folder: Path, package: str, *needed: str) -> Path:
+    """The Python that has Scenic; installs it at the first run.
+
+    Args:
+        folder: Where the environment is or will be.
+        package: Scenic with its version.
+        needed: What its version needs besides.
+
+    Raises:
+        SystemExit: It cannot be imported there.
+    """
+    python = folder / "bin" / "python"
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        subprocess.run([str(python), "-m", "pip", "install", "--quiet", package, *needed], check=True)
+    probe = subprocess.run([str(python), "-c", "import scenic"], capture_output=True, text=True, check=False)
+    if probe.returncode:
+        last = probe.stderr.strip().splitlines()[-1]
+        raise SystemExit(f"Scenic cannot be imported: {last}\n(OpenCV needs the packages libgl1 and libglib2.0-0)")
+    return python
+
+
+class Original:
+    """Draws scenes with the original Scenic.
+
+    Attributes:
+        map: Its road network, as features of the interchange format.
+    """
+
+    def __init__(self, python: Path, chart: Path, work: Path) -> None:
+        """Start the process.
+
+        Args:
+            python: The one that has Scenic.
+            chart: An OpenDRIVE map.
+            work: A folder for the map and for what Scenic keeps beside it.
+        """
+        work.mkdir(parents=True, exist_ok=True)
+        copy = work / chart.name
+        if not copy.exists():
+            shutil.copy(chart, copy)  # Scenic writes its cache beside the map
+        command = [python, "-W", "ignore", HERE / "draw_scenes.py", copy, work]
+        self._log = (work / "scenic.log").open("w", encoding="utf-8")
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True, encoding="utf-8"
+        )
+        self.map = work / "map.geojson"
+
+    def draw(self, text: str, count: int, seed: int, seconds: float = 60.0) -> dict[str, Any]:
+        """Scenes of a program, or the error that Scenic reports for it.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        request = {"text": text, "count": count, "seed": seed, "seconds": seconds}
+        try:
+            self._process.stdin.write(json.dumps(request) + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            pass
+        answer = self._process.stdout.readline()
+        if not answer:
+            raise SystemExit(f"Scenic has ended: see {self._log.name}")
+        return json.loads(answer)
+
+    def close(self) -> None:
+        """End the process."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+        self._log.close()

@@ -1,0 +1,3 @@
+# sharp: position heading
+ego = Object at 3 @ -4, facing 40 deg, with width 2, with length 5
+Object at ego.position + 3 @ 9, facing -20 deg

@@ -1,0 +1,6 @@
+class Box:
+    position: Range(10, 20) @ 9
+    width: 2
+
+ego = Object
+Box

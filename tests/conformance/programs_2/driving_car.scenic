@@ -1,0 +1,3 @@
+# sharp: heading
+model scenic.domains.driving.model
+ego = Car

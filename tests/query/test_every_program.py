@@ -1,0 +1,107 @@
+"""Every program of the repository on every dataset that tests have: with the prefilter and without it the same."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from scenicq.errors import ScenicqError, Source
+from scenicq.importers.ingest import ingest
+from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.query.results import record
+from scenicq.query.run import Query, QueryOptions
+from scenicq.store.dataset import Dataset, open_dataset
+
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "match"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "generate"))
+from examples import Example, examples
+from made_up import TIED, made_up
+from programs import HEADER
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = ROOT / "sample_data"
+REAL = ROOT.parent / "shared" / "data"
+SOURCES = {path.parent.name: path.parent for path in sorted(SAMPLES.glob("crossroads/dataset.json"))}
+SOURCES |= {path.name: path for path in sorted(SAMPLES.glob("*_tiny"))}
+SOURCES |= {name: REAL / name for name in ("boston", "nuscenes-mini", "argoverse2")}
+MAPS = {"nuscenes-mini": [REAL / "boston" / "maps" / "boston-seaport.geojson"]}
+RANDOM, PARTS = 80, 8
+"""Random programs, and parts in which all programs are tried on a dataset."""
+PAPER = MatchOptions(
+    tolerance=Tolerance(x=0.25, y=0.25, heading=math.radians(5)), classes="coarse", radius=50.0, ego="any"
+)
+EXACT = MatchOptions(tolerance=Tolerance(position=0.5, heading=0.1))
+BUDGET = {"timeout_s": 0.1, "budget": 2000}
+"""So that no program takes long; a frame that is unknown then proves nothing, and is passed over."""
+
+
+@cache
+def programs() -> list[Example]:
+    """All of them, in an order that mixes where they are from."""
+    tied = {f"tied:{name}": text for name, text in TIED.items()}
+    tied |= {f"random:{seed}": made_up(seed) for seed in range(RANDOM)}
+    every = [*examples().values(), *(Example(name, HEADER + text) for name, text in tied.items())]
+    return [each for part in range(PARTS) for each in every[part::PARTS]]
+
+
+@pytest.fixture(scope="module")
+def dataset(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    name = request.param
+    if not SOURCES[name].exists():
+        pytest.skip(f"{SOURCES[name]} is not on this machine")
+    target = tmp_path_factory.mktemp("every") / name
+    ingest(SOURCES[name], target, maps=MAPS.get(name, []))
+    return open_dataset(target)
+
+
+def found(dataset: Dataset, program: Example, options: MatchOptions, *, prefilter: bool) -> dict[str, object] | str:
+    """What a query gives for each frame that is not excluded, or its error."""
+    source = Source(f"{program.name}.scenic", program.text)
+    how = QueryOptions(
+        options, solver="portable", version=program.version, initial=program.initial, prefilter=prefilter
+    )  # type: ignore[arg-type]
+    try:
+        return {result.frame: record(result) for result in Query(dataset, source, how).results()}
+    except ScenicqError as error:
+        return str(error)
+
+
+def compare(dataset: Dataset, chosen: list[Example]) -> tuple[list[str], int]:
+    """Frames for which the two disagree, though both know; and matches of both."""
+    told: list[str] = []
+    matches = 0
+    for number, program in enumerate(chosen):
+        options = replace(PAPER if number % 2 else EXACT, **BUDGET)
+        with_it, without = (found(dataset, program, options, prefilter=each) for each in (True, False))
+        if isinstance(with_it, str) or isinstance(without, str):
+            told += [f"{program.name}: {with_it} is not {without}"] * (with_it != without)
+            continue
+        for frame in with_it.keys() | without.keys():
+            pair = with_it.get(frame), without.get(frame)
+            if not any(each is not None and each["verdict"] == "unknown" for each in pair):
+                told += [f"{program.name}, {frame}: {pair[0]} is not {pair[1]}"] * (pair[0] != pair[1])
+                matches += pair[0] == pair[1]
+    return told, matches
+
+
+@pytest.mark.parametrize(
+    ("dataset", "step"), [("crossroads", 64), ("nuscenes_tiny", 48), ("waymo_tiny", 48)], indirect=["dataset"]
+)
+def test_some_programs_find_the_same(dataset: Dataset, step: int) -> None:
+    told, matches = compare(dataset, programs()[::step])
+    assert told == []
+    assert matches > 0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("dataset", SOURCES, indirect=True)
+def test_every_program_finds_the_same(dataset: Dataset, part: int) -> None:
+    assert compare(dataset, programs()[part::PARTS])[0] == []
