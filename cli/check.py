@@ -18,6 +18,7 @@ from scenicq.forest.show import show_forest
 from scenicq.geometry.network import Network
 from scenicq.match.constraints import build_groups, describe_constraint
 from scenicq.match.options import MatchOptions
+from scenicq.match.ready import ready
 from scenicq.query.maps import program_network, read_network
 from scenicq.query.run import beside, read_program
 from scenicq.store.dataset import open_dataset
@@ -85,7 +86,7 @@ Details = list[Callable[[Scenario], list[str]]]
 
 def _groups(scenario: Scenario) -> list[str]:
     """The groups of jointly dependent constraints in dependency order, all positions and headings observed."""
-    seen = frozenset({"position", "heading"})
+    scenario, seen = ready(scenario), frozenset({"position", "heading"})
     signature = (*(seen for _ in scenario.objects), frozenset[str](scenario.params))
     groups = build_groups(scenario, signature, MatchOptions())
     return [

@@ -53,7 +53,7 @@ def sample(scenario: Path, dataset: str | None, *, map_file: Path | None, number
     source = read_program(scenario)
     version = read_version(scenic)
     network = next(networks_of(dataset, map_file, scenario, version))
-    compiled = compile_scenario(source, network, version=version, initial=initial, loader=beside(scenario), drawn=True)
+    compiled = compile_scenario(source, network, version=version, initial=initial, loader=beside(scenario))
     labels = sample_labels(compiled, number, seed, built_ins(waive))
     if output is not None:
         write_sample(labels, network, scenario.stem, output)

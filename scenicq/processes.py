@@ -32,8 +32,8 @@ Answer = TypeVar("Answer")
 Work = Callable[[Task, Callable[[Any], None]], Answer]
 """Does a task in a worker; the second argument sends a value to whoever waits for the answer."""
 
-_STARTS = 3
-"""Processes in a row that may end before they have started."""
+_STARTS, _KILLED_STARTS = 3, 30
+"""Processes in a row that may end before they have started: of those that end by themselves, and of those killed."""
 _AT_MOST = 8
 """Processes where nobody says how many: each may take some 300 MB."""
 _END_S = 2.0
@@ -209,13 +209,13 @@ class Workers(Generic[Task, Answer]):
     def _bury(self, worker: _Worker) -> None:
         """Take a dead worker away; its task goes first to the next one."""
         self._workers.remove(worker)
-        _end(worker)
+        killed = (_end(worker) or 0) < 0
         piece = worker.piece
         if piece is None:
             return
         piece.tries += worker.ready
         self._stillborn += not worker.ready
-        if self._stillborn >= _STARTS:
+        if self._stillborn >= (_KILLED_STARTS if killed else _STARTS):
             message = "worker processes end before they have started"
             raise DataError(Diagnostic("engine-failed", message, hints=("`--jobs 1` needs none",)))
         if piece.tries >= piece.most:
@@ -246,11 +246,14 @@ def _interrupts() -> set[signal.Signals]:
     return {signal.SIGINT, signal.SIGTERM, signal.SIGALRM}
 
 
-def _end(worker: _Worker) -> None:
+def _end(worker: _Worker) -> int | None:
+    """End a worker; its exit code, which is negative if it was killed."""
     worker.process.kill()
     worker.process.join()
+    code = worker.process.exitcode
     worker.process.close()
     worker.connection.close()
+    return code
 
 
 def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]], setup: tuple[Any, ...]) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import scenicq.processes
 from scenicq.errors import DataError
 from scenicq.processes import Lost, Workers
 
@@ -56,6 +57,16 @@ def failing(_):
         raise Local("there")
 
     return work
+
+
+def killed_at_the_start(connection, start, setup):
+    """Serves at the sixth attempt, or never."""
+    (folder,) = setup
+    mark = folder / str(len(list(folder.iterdir())))
+    if mark.name != "5":
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    scenicq.processes._serve(connection, start, setup)
 
 
 def broken(_):
@@ -138,6 +149,16 @@ def test_what_work_raises_is_raised_here(task, kind):
 def test_a_start_that_fails_is_no_endless_loop():
     with pytest.raises(KeyError, match="at the start"), Workers(1, broken, (0,)) as workers:
         list(workers.run([1]))
+
+
+def test_starting_processes_may_be_killed_now_and_then(monkeypatch, tmp_path):
+    monkeypatch.setattr("scenicq.processes._serve", killed_at_the_start)
+    monkeypatch.setattr("scenicq.processes._KILLED_STARTS", 6)
+    with Workers(1, squares, (tmp_path,)) as workers:
+        assert list(workers.run([7])) == [(7, 49)]
+    (tmp_path / "always").touch()
+    with pytest.raises(DataError, match="before they have started"), Workers(1, squares, (tmp_path,)) as workers:
+        list(workers.run([7]))
 
 
 def test_processes_that_never_start_are_no_endless_loop(monkeypatch):

@@ -7,13 +7,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import cast
 
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
-from scenicq.forest.build import constant, vector
+from scenicq.forest.build import compare, constant, vector
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Constant, Feature, Kind, Node, Select, Undefined
+from scenicq.forest.nodes import CompareOp, Constant, Feature, Kind, Node, Select, Undefined
 from scenicq.forest.turns import any_turn
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
@@ -103,22 +104,37 @@ def to_node(value: ModelValue, span: Span | None) -> Node:
 
 
 def to_scalar(value: ModelValue, span: Span | None) -> Node:
-    """A number.
+    """A number; of truth values 1 is true and 0 is false, as in Python.
 
     Raises:
         ScenarioError: wrong-type.
     """
-    if isinstance(value, int | float) and not isinstance(value, bool):
+    if isinstance(value, int | float):
         if isinstance(value, int) and abs(value) > 2**1000:
             raise fail("wrong-value", "this number is too large", span)
         if not math.isfinite(value):
             raise fail("wrong-value", "this number is not finite", span)
-        return constant(value, span)
+        return constant(float(value), span)
     if is_node(value) and kind_of(cast(Node, value)) in ("scalar", "boolean"):
-        return cast(Node, value)
+        return _number(cast(Node, value))
     if isinstance(value, Choice):
         return Select(value.index, tuple(to_scalar(option, span) for option in value.options), span=span)
     raise _need(value, "a number", span)
+
+
+def _number(node: Node) -> Node:
+    """A number or truth value as a number."""
+    if isinstance(node, Select):
+        options = tuple(map(_number, node.options))
+        same = all(one is other for one, other in zip(options, node.options, strict=True))
+        return node if same else replace(node, options=options)
+    if kind_of(node) != "boolean":
+        return node
+    if isinstance(node, Constant):
+        return constant(float(cast(bool, node.value)), node.span)
+    # a label may have anything in place of a truth value
+    truth = compare(CompareOp.EQ, node, constant(True), node.span) if isinstance(node, Feature) else node
+    return Select(truth, (constant(0.0, node.span), constant(1.0, node.span)), span=node.span)
 
 
 def to_heading(value: ModelValue, span: Span | None) -> Node:

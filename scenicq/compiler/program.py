@@ -15,7 +15,6 @@ from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.deviations import is_zero
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.free_places import choose_elements
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.models import (
     default_library,
@@ -33,7 +32,6 @@ from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import Constant, Encloses, Intersects, Node, Undefined
 from scenicq.forest.scenario import BuiltIn, Property, Requirement, Scenario, ScenarioObject
-from scenicq.forest.simplify import simplify
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
@@ -54,7 +52,6 @@ def compile_scenario(
     version: int | None = None,
     initial: bool = False,
     loader: Loader | None = None,
-    drawn: bool = False,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -64,7 +61,6 @@ def compile_scenario(
         version: 1, 2 or 3; inferred from the spelling if not given.
         initial: Ignore dynamic parts instead of refusing them.
         loader: Reads files that the program imports.
-        drawn: Whether scenes are to be drawn from it: it then keeps its probabilities, which matching does not need.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -78,8 +74,7 @@ def compile_scenario(
         names = {} if library is None else dict(world.load(library, 0, _start(source)).names)
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
-        scenario = _scenario(run, module, chosen, network, _borrowed(module, scope, names, library))
-        return scenario if drawn else simplify(choose_elements(scenario))
+        return _scenario(run, module, chosen, network, _borrowed(module, scope, names, library))
     except RecursionError:
         raise fail("budget-exceeded", "the program is nested too deeply", _start(source), "",
                    ("make expressions and calls flatter",)) from None  # fmt: skip

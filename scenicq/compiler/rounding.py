@@ -6,12 +6,14 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import (
     ArithmeticOp,
+    Constant,
     DiscreteRange,
     Feature,
     Index,
     Node,
     Normal,
     Range,
+    Select,
     TruncatedNormal,
 )
 from scenicq.forest.walk import children
@@ -21,6 +23,8 @@ __all__ = ["rounded", "truncated"]
 
 def truncated(value: Node, span: Span) -> Node:
     """A number without its fraction."""
+    if _is_whole(value):
+        return value
     zero = build.constant(0.0, span)
     below = build.arithmetic(ArithmeticOp.FLOOR, value, span=span)
     above = build.arithmetic(ArithmeticOp.CEIL, value, span=span)
@@ -33,6 +37,8 @@ def truncated(value: Node, span: Span) -> Node:
 
 def rounded(value: Node, digits: int, span: Span) -> Node:
     """A number to a number of decimals; the one in the middle between two goes to the even one, as in Python."""
+    if not digits and _is_whole(value):
+        return value
     if digits:
         factor = build.constant(10.0**digits, span)
         scaled = build.arithmetic(ArithmeticOp.MUL, value, factor, span=span)
@@ -50,6 +56,14 @@ def rounded(value: Node, digits: int, span: Span) -> Node:
     above = build.arithmetic(ArithmeticOp.CEIL, quarter, span=span)
     odd = build.minus(above, build.arithmetic(ArithmeticOp.FLOOR, quarter, span=span), span)
     return build.add(up, build.minus(odd, build.constant(1.0, span), span), span)
+
+
+def _is_whole(value: Node) -> bool:
+    """Whether a number is certainly whole, as that of a truth value is."""
+    options = value.options if isinstance(value, Select) else (value,)
+    return all(
+        isinstance(each, Constant) and isinstance(each.value, float) and each.value.is_integer() for each in options
+    )
 
 
 _SMALL = 16

@@ -66,7 +66,7 @@ class Improviser:
             enforce: The built-in requirements in force.
             prune: Whether random points are kept from where conditions exclude them; scenes are the same without.
         """
-        parts = assemble(scenario, enforce)
+        parts = assemble(scenario.as_written or scenario, enforce)
         self.checks = parts.checks
         self.rejected: Counter[int] = Counter()
         self.undecided = ""

@@ -194,7 +194,7 @@ class PointIn(_Leaf):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Select(_Node):
-    """The option that an index picks."""
+    """The option that an index picks: a whole number, or a truth value for the first (false) or the second (true)."""
 
     index: Node
     options: tuple[Node, ...]

@@ -92,6 +92,8 @@ class Scenario:
         soft: Requirements with a probability below 1, which exclude nothing.
         ignored: Dynamic parts that were left out.
         warnings: What the author should know.
+        as_written: Where expressions were rewritten to be matched, which keeps outcomes but not their probabilities:
+            the scenario as the program has it, from which scenes are drawn.
     """
 
     source: Source
@@ -105,3 +107,4 @@ class Scenario:
     soft: tuple[Requirement, ...] = ()
     ignored: tuple[Diagnostic, ...] = ()
     warnings: tuple[Diagnostic, ...] = field(default=())
+    as_written: Scenario | None = field(default=None, repr=False)

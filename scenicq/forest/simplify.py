@@ -2,7 +2,7 @@
 
 A point in a region picked from a list is a point in the union of the list, if nothing else depends on the pick: the
 support is the same, and the union has a spatial index. The probabilities are not: scenes are drawn from the program as
-it is.
+it is (`Scenario.as_written`).
 """
 
 from __future__ import annotations

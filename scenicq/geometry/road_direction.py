@@ -84,7 +84,21 @@ class RoadDirection:
 
     def values(self, x: float, y: float) -> tuple[float, ...]:
         """The headings allowed at a point, in (-pi, pi]; none where the field is undefined."""
-        return self.values_many(np.array([(x, y)]))[0]
+        point = shapes.point(x, y)
+        lanes: list[int] = shapes.tree_within(self._tree, point, _TIE).tolist()
+        if not lanes:
+            return self._values(np.array([(x, y)], dtype=float))[0]
+        # what `_values` does for many points, in half the time for one
+        segments, headings, starts = self._all
+        own = [slice(starts[lane], starts[lane + 1]) for lane in lanes]
+        away = [segment_distances(np.array((x, y)), segments[part]) for part in own]
+        least = [float(gaps.min()) for gaps in away]
+        if len(lanes) > 1 and not len(shapes.tree_within(self._crossroads, point, _TIE)):
+            least = [min(least)] * len(lanes)
+        found: set[float] = set()
+        for part, gaps, best in zip(own, away, least, strict=True):
+            found.update(headings[part][gaps <= best + _TIE].tolist())
+        return tuple(sorted(found))
 
     def values_many(self, xy: Coordinates) -> list[tuple[float, ...]]:
         """`values` for points of shape (n, 2)."""

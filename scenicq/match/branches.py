@@ -115,6 +115,7 @@ class Branches:
             {key: value[..., cases] for key, value in self.ranges.items()},
             {key: value[cases] for key, value in self.chosen.items()},
             {key: value[..., cases] for key, value in self._bounds.items()},
+            {key: (sine[:, cases], cosine[:, cases]) for key, (sine, cosine) in self._turns.items()},
         )
 
     def place(self, node: DirectionAt) -> Enclosure:
@@ -133,8 +134,13 @@ class Branches:
         """The cases of which something is left, over narrower ranges."""
         branches = self
         for _ in range(_PASSES):
+            # most cases that are none miss what the label observes from the start
+            branches._upward()
+            branches = branches.those(~branches._lost())
+            if not branches.size:
+                break
             before = dict(branches.ranges)
-            branches._pass()
+            branches._downward()
             left = ~branches._lost()
             small = all(
                 bool((_width(after)[..., left] > _WORTH * _width(before[key])[..., left] - SLACK).all())
@@ -145,13 +151,16 @@ class Branches:
                 break
         return branches
 
-    def _pass(self) -> None:
+    def _upward(self) -> None:
         # overlaps of ends and of nothing are settled where they are met
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             for node in self.tape.nodes:
                 self._forward(node)
             for item in self.tape.items:
                 self._compare(item)
+
+    def _downward(self) -> None:
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             self._forms = {}
             for node in self.tape.nodes:
                 self._forms[id(node)] = multiples_of(node, self._forms, self._bounds, self._turns)

@@ -2,6 +2,10 @@
 
 An interval is an array (2, n) of lower and upper ends, a box an array (2, 2, n): coordinate, end, case. The functions
 take either where that makes sense, and never return too little.
+
+For cases of one correspondence, in which everything is random: all arrays have one length and are inverted as well
+(`branches`, `multiples`). For candidates of roles, where most values are known numbers that must stay exact and arrays
+of different axes broadcast, see `interval_arrays`; for one interval with exact ends, `interval`.
 """
 
 from __future__ import annotations
@@ -54,9 +58,12 @@ def times(a: Enclosure, b: Enclosure) -> Enclosure:
     """The product; nothing times an infinite end is nothing."""
     with np.errstate(invalid="ignore"):
         ends = a[..., :, None, :] * b[..., None, :, :]
-    ends[np.isnan(ends)] = 0.0
-    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    found[..., 0, :], found[..., 1, :] = ends.min(axis=(-3, -2)), ends.max(axis=(-3, -2))
+    vague = np.isnan(ends)
+    if vague.any():
+        ends[vague] = 0.0
+    found = np.empty(ends.shape[:-3] + ends.shape[-2:])
+    np.minimum.reduce(ends, axis=(-3, -2), out=found[..., 0, :])
+    np.maximum.reduce(ends, axis=(-3, -2), out=found[..., 1, :])
     return found
 
 
@@ -71,8 +78,13 @@ def divide(a: Enclosure, b: Enclosure) -> Enclosure:
 def common(a: Enclosure, b: Enclosure) -> Enclosure:
     """What two have in common; ends that miss each other by rounding alone change places."""
     low, high = np.maximum(a[..., 0, :], b[..., 0, :]), np.minimum(a[..., 1, :], b[..., 1, :])
-    swap = (low > high) & (low <= high + _ROUNDING)
-    return np.stack([np.where(swap, high, low), np.where(swap, low, high)], axis=-2)
+    found = np.empty((*low.shape[:-1], 2, low.shape[-1]))
+    found[..., 0, :], found[..., 1, :] = low, high
+    crossed = low > high
+    if crossed.any():
+        swap = crossed & (low <= high + _ROUNDING)
+        found[..., 0, :][swap], found[..., 1, :][swap] = high[swap], low[swap]
+    return found
 
 
 def nothing_left(a: Enclosure) -> NDArray[np.bool_]:

@@ -20,6 +20,7 @@ from scenicq.forest.condition import condition
 from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Leaf, Node, Value
 from scenicq.forest.walk import leaves
 from scenicq.geometry.fields import VectorField
+from scenicq.match.agreeing import agreed, joined
 from scenicq.match.branches import Branches
 from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
 from scenicq.match.options import Tolerance
@@ -32,14 +33,14 @@ _MOST_AT_ONCE = 2000
 """Cases that are narrowed together."""
 _MOST_CASES = 100_000
 """Cases of one part that are looked at."""
-_MOST_TOGETHER = 256
-"""Combinations of the ways of several parts that are put to the linear program."""
+_MOST_WAYS = 256
+"""Ways of one part that are put to the linear program."""
 _FEW = 16
 """Cases of which all choices are looked at, to make those that are none."""
 _FAR = 8.0
 """Metres: where a point may be farther about than this, a number that it hangs on is divided before directions are."""
 _MOST_HALVES = 64
-"""Parts of the ranges of one combination that are looked at."""
+"""Ways of one part that are divided."""
 _CLOSE = 0.05
 """How far from the answer of a solver a solution is looked for."""
 _FINEST = 1e-5
@@ -74,41 +75,54 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
             chosen = [_within(found, shared, limits) for found in chosen]
     except _TooMany:
         return Maybe(first, "nonlinear")
-    vague: deque[list[Way]] = deque()
-    for number, ways in enumerate(_together([_ways(found, shared) for found in chosen], tolerance)):
-        found = solved(ways, tolerance)
+    ways = [_ways(found, shared) for found in chosen]
+    if not all(ways):
+        return No(first)
+    if shared is None or len(ways) == 1:
+        return _alone(ways[0], tolerance)
+    found = agreed(ways, shared, tolerance, lambda way: _divided(way, shared))
+    choices = [id(node) for tape in tapes for node in tape.choices]
+    if isinstance(found, Maybe) and len(set(choices)) < len(choices):
+        # fields that several parts ask for at one point have one direction there
+        return decide_directions([[item for part in parts for item in part]], None, tolerance)
+    return found
+
+
+def _alone(ways: Sequence[Way], tolerance: Tolerance) -> Outcome:
+    """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
+    first = ways[0].case.tape.items[0][0]
+    todo: deque[Way] = deque()
+    for way in ways[:_MOST_WAYS]:
+        found = solved(way, tolerance)
         if isinstance(found, Yes):
             return found
         if isinstance(found, Maybe):
-            vague.append(ways)
-        if number == _MOST_TOGETHER:
-            return Maybe(first, "nonlinear")
-    return _sharper(vague, shared, tolerance) if vague else No(first)
-
-
-def _sharper(todo: deque[list[Way]], shared: Identity | None, tolerance: Tolerance) -> Outcome:
-    """What comes of ways in cells that cover too much: ranges are halved until a solution holds or none is left."""
-    first = todo[0][0].items[0][0]
+            todo.append(way)
+    if len(ways) > _MOST_WAYS:
+        return Maybe(first, "nonlinear")
     for _ in range(_MOST_HALVES):
         if not todo:
             return No(first)
-        chosen = todo.popleft()
-        number = next((number for number, way in enumerate(chosen) if not way.sharp), None)
-        if number is None:
+        less = None if todo[0].sharp else _divided(todo.popleft(), None)
+        if less is None:
             break
-        case = chosen[number].case
-        try:
-            halves = [half.narrowed() for half in _halves(case, tuple(case.tape.leaves.values()))]
-        except _TooMany:
-            break
-        for way in _ways([_sharpened(half) for half in halves if half.size], shared):
-            less = [*chosen[:number], way, *chosen[number + 1 :]]
-            found = solved(less, tolerance)
+        for way in less:
+            found = solved(way, tolerance)
             if isinstance(found, Yes):
                 return found
             if isinstance(found, Maybe):
-                todo.append(less)
+                todo.append(way)
     return Maybe(first, "nonlinear")
+
+
+def _divided(way: Way, shared: Identity | None) -> list[Way] | None:
+    """What is left of a way in cells that cover too much over either half of its widest range."""
+    case = way.case
+    try:
+        halves = [half.narrowed() for half in _halves(case, tuple(case.tape.leaves.values()))]
+    except _TooMany:
+        return None
+    return _ways([_sharpened(half) for half in halves if half.size], shared)
 
 
 def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: Tolerance) -> Yes | None:
@@ -127,24 +141,14 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
         ways = _ways(list(_chosen(tape, Branches.around(tape, near, _CLOSE))), None)
     except _TooMany:
         return None
-    for way in ways[:_MOST_TOGETHER]:
-        found = solved([way], tolerance)
-        if isinstance(found, Yes):
-            return Yes({**given, **found.values})
-    found = _sharper(deque([way] for way in ways), None, tolerance) if ways else None
+    found = _alone(ways, tolerance) if ways else None
     return Yes({**given, **found.values}) if isinstance(found, Yes) else None
 
 
 def _joined(found: Sequence[Branches], shared: Identity) -> list[Interval]:
     """Where the shared number can be, intervals that meet as one."""
     ends = np.concatenate([cases.ranges[shared] for cases in found], axis=1).T.tolist()
-    joined: list[Interval] = []
-    for low, high in sorted(ends):
-        if joined and low <= joined[-1][1]:
-            joined[-1] = (joined[-1][0], max(joined[-1][1], high))
-        else:
-            joined.append((low, high))
-    return joined
+    return joined([(low, high) for low, high in ends])
 
 
 def _within(found: Sequence[Branches], shared: Identity, limits: Sequence[Interval]) -> list[Branches]:
@@ -169,26 +173,6 @@ def _ways(found: Sequence[Branches], shared: Identity | None) -> list[Way]:
     """The cases as constraints, those first in which a linear program tells all."""
     ways = [way_of(cases, number, shared) for cases in found for number in range(cases.size)]
     return sorted((way for way in ways if way is not None), key=lambda way: not way.sharp)
-
-
-def _together(parts: Sequence[Sequence[Way]], tolerance: Tolerance) -> Iterator[list[Way]]:
-    """One way of each part such that the shared number can be the same in all."""
-    excluded: set[int] = set()
-
-    def extended(chosen: list[Way], low: float, high: float) -> Iterator[list[Way]]:
-        if len(chosen) == len(parts):
-            yield chosen
-            return
-        for way in parts[len(chosen)]:
-            a, b = max(low, way.limits[0]), min(high, way.limits[1])
-            if a > b + MARGIN or id(way) in excluded:
-                continue
-            if len(parts) > 1 and len(parts[len(chosen)]) > 1 and isinstance(solved([way], tolerance), No):
-                excluded.add(id(way))
-                continue
-            yield from extended([*chosen, way], a, b)
-
-    return extended([], -math.inf, math.inf)
 
 
 def _start(tape: Tape, shared: Identity | None, limits: Sequence[Interval]) -> Branches:

@@ -13,11 +13,28 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import cast
 
+from scenicq.forest import build
 from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.condition import condition
 from scenicq.forest.evaluate import Observation
-from scenicq.forest.groups import Comparison, Constraint, Group
-from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Leaf, Node, Undefined, Value
+from scenicq.forest.groups import Comparison, Condition, Constraint, Group
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import (
+    Compare,
+    CompareOp,
+    Constant,
+    DirectionAt,
+    DiscreteRange,
+    Identity,
+    Index,
+    Leaf,
+    LogicOp,
+    Node,
+    Select,
+    Undefined,
+    Value,
+)
+from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import leaves, postorder
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.match.affine import AffineVector, affine_scalar, affine_vector
@@ -61,6 +78,8 @@ Outcome = Yes | No | Maybe
 _MOST_BRANCHES = 4096
 _MOST_PARTS = 200
 """Parts of one cell that are looked at."""
+_MOST_PROGRAMS = 20_000
+"""Linear programs for one decision: some seconds, after which a solver does no worse."""
 LINEAR_SLACK = 1e-6
 """Metres or radians that the witness of a linear program may be off."""
 
@@ -89,7 +108,14 @@ def ground_cause(item: Item) -> str:
 
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
     """Decide a group without a solver; `Maybe` with reason "nonlinear" where one is needed."""
-    return _Ladder(tolerance).decide(items, {}, [])
+    try:
+        return _Ladder(tolerance).decide(items, {}, [])
+    except _Exhausted:
+        return Maybe(items[0][0], "nonlinear")
+
+
+class _Exhausted(Exception):
+    """A decision has taken all the linear programs that it may take."""
 
 
 class _Ladder:
@@ -98,6 +124,7 @@ class _Ladder:
     def __init__(self, tolerance: Tolerance) -> None:
         self.tolerance = tolerance
         self.branches = 0
+        self.programs = 0
         self.places: list[Node] = []
         """The points for which a cell is chosen: they may occur nowhere else, and still need a value."""
 
@@ -127,6 +154,9 @@ class _Ladder:
                 return Yes(given | dict(reached.values))
             if reached.possible is False:
                 return No(open_items[0][0])
+        truth = _free_truth(open_items)
+        if truth is not None:
+            return self._try_both(items, truth, given, rows)
         field = _free_direction(open_items)
         if field is not None:
             return self._try_cells(items, field, given, rows)
@@ -158,6 +188,19 @@ class _Ladder:
                 memo: dict[int, Node] = {}
                 fixed = [(c, condition(node, {}, chosen, memo), value) for c, node, value in items]
                 yield self.decide(fixed, given | chosen, rows)
+
+        return self._branch(items[0][0], outcomes())
+
+    def _try_both(self, items: list[Item], truth: Node, given: dict[Identity, Value], rows: list[Row]) -> Outcome:
+        """A truth value that makes up another value: one branch in which it holds, one in which it does not."""
+
+        def outcomes() -> Iterator[Outcome]:
+            for value in (True, False):
+                memo: dict[int, Node] = {id(truth): Constant(value, span=truth.span)}
+                fixed = [(c, condition(node, {}, None, memo), known) for c, node, known in items]
+                holding = truth if value else _opposite(truth)
+                fact = Condition(Requirement(holding, truth.span), holding)
+                yield self.decide([*fixed, (fact, holding, None)], given, rows)
 
         return self._branch(items[0][0], outcomes())
 
@@ -270,6 +313,9 @@ class _Ladder:
 
     def _linear(self, items: list[Item], given: dict[Identity, Value], rows: list[Row]) -> Outcome:
         constraint = items[0][0]
+        self.programs += 1
+        if self.programs > _MOST_PROGRAMS:
+            raise _Exhausted
         try:
             found = solve_affine(items, rows, self.tolerance, self.places)
         except NotLinear:
@@ -290,6 +336,34 @@ def _options(leaf: Leaf) -> range | None:
             return range(math.ceil(low), math.floor(high) + 1)
         case _:
             return None
+
+
+def _free_truth(items: list[Item]) -> Node | None:
+    """An unknown truth value that other values are made of, the innermost first."""
+    for node in postorder([node for _, node, _ in items]):
+        match node:
+            case Select(index=Index()):
+                continue
+            case Select(index=truth) if kind_of(truth) == "boolean":
+                return truth
+            case Compare(CompareOp.EQ | CompareOp.NE, left, right):
+                for side in (left, right):
+                    if not isinstance(side, Constant) and kind_of(side) == "boolean":
+                        return side
+            case _:
+                pass
+    return None
+
+
+_OPPOSITE = {
+    CompareOp.LT: CompareOp.GE, CompareOp.LE: CompareOp.GT, CompareOp.GT: CompareOp.LE, CompareOp.GE: CompareOp.LT,
+}  # fmt: skip
+
+
+def _opposite(truth: Node) -> Node:
+    if isinstance(truth, Compare) and truth.op in _OPPOSITE:
+        return build.compare(_OPPOSITE[truth.op], truth.left, truth.right, truth.span)
+    return build.logic(LogicOp.NOT, truth, span=truth.span)
 
 
 def _free_direction(items: list[Item]) -> DirectionAt | None:

@@ -37,16 +37,18 @@ from scenicq.forest.windows import close_boxes
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
-from scenicq.match.affine import Affine, AffineVector, affine_scalar, affine_vector
+from scenicq.match.affine import Affine, AffineVector, Variable, affine_scalar, affine_vector
 from scenicq.match.interval import ends
 from scenicq.match.options import Tolerance
 from scenicq.match.program import LinearSystem, NotSolved, Row
 
-__all__ = ["Alternative", "NotLinear", "inside", "position_boxes", "solve_affine"]
+__all__ = ["Alternative", "NotLinear", "extent_affine", "inside", "position_boxes", "solve_affine"]
 
 _SIDES = 32
 """Corners of the polygons around and inside a disc."""
 _MOST_CELLS = 2000
+_MOST_EXTENTS = 16
+"""Combinations of alternatives of which the ends of a number are looked for."""
 _CULLING = 1e-6
 """Metres by which boxes are grown so that rounding loses nothing."""
 
@@ -128,12 +130,7 @@ def solve_affine(
     Raises:
         NotLinear: Something is not affine, or lies between the inner and the outer polygons.
     """
-    problem = _Problem(tolerance, position_boxes(items, tolerance, rows), LinearSystem(list(rows)), list(alternatives))
-    for item in items:
-        problem.add(item)
-    variables = {leaf.identity: leaf for leaf in leaves(*(node for _, node, _ in items), *places)}
-    for leaf in variables.values():
-        problem.add_leaf(leaf)
+    problem, variables = _problem(items, rows, tolerance, places, alternatives)
     found = problem.solve()
     if found is None:
         return None
@@ -143,6 +140,38 @@ def solve_affine(
         else found.get((identity, 0), 0.0)
         for identity, leaf in variables.items()
     }
+
+
+def extent_affine(
+    items: Sequence[_Item],
+    rows: Sequence[Row],
+    tolerance: Tolerance,
+    places: Sequence[Node],
+    alternatives: Sequence[Alternative],
+    number: Identity,
+) -> tuple[float, float] | None:
+    """Between which values a random number lies where affine constraints are satisfied; None if they never are.
+
+    A little too much, never too little. Arguments and errors as of `solve_affine`.
+    """
+    problem, _ = _problem(items, rows, tolerance, places, alternatives)
+    return problem.extent((number, 0))
+
+
+def _problem(
+    items: Sequence[_Item],
+    rows: Sequence[Row],
+    tolerance: Tolerance,
+    places: Sequence[Node],
+    alternatives: Sequence[Alternative],
+) -> tuple[_Problem, dict[Identity, Leaf]]:
+    problem = _Problem(tolerance, position_boxes(items, tolerance, rows), LinearSystem(list(rows)), list(alternatives))
+    for item in items:
+        problem.add(item)
+    variables = {leaf.identity: leaf for leaf in leaves(*(node for _, node, _ in items), *places)}
+    for leaf in variables.values():
+        problem.add_leaf(leaf)
+    return problem, variables
 
 
 @dataclass(slots=True)
@@ -260,6 +289,21 @@ class _Problem:
                 found = _search(self.system, ordered, [*_polygons(self.discs, outer=False)])
                 if found is None:
                     raise NotLinear
+        except NotSolved:
+            raise NotLinear from None
+        return found
+
+    def extent(self, variable: Variable) -> tuple[float, float] | None:
+        """The ends of a variable over all solutions, discs taken too large."""
+        around = [*_polygons(self.discs, outer=True)]
+        if math.prod(map(len, self.alternatives)) > _MOST_EXTENTS:
+            raise NotLinear
+        found: tuple[float, float] | None = None
+        try:
+            for chosen in itertools.product(*self.alternatives):
+                own = self.system.extent([*around, *itertools.chain.from_iterable(chosen)], variable)
+                if own is not None:
+                    found = own if found is None else (min(found[0], own[0]), max(found[1], own[1]))
         except NotSolved:
             raise NotLinear from None
         return found

@@ -27,6 +27,7 @@ from scenicq.match.ladder import Item, No, Outcome
 from scenicq.match.options import MatchOptions
 from scenicq.match.planning import MatchPlan, make_plan, relevant_properties
 from scenicq.match.quick import Places, Quick
+from scenicq.match.ready import ready
 from scenicq.match.search import Exhausted, Reporter
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.smt.answer import Solver
@@ -57,7 +58,7 @@ class Matcher:
     """A scenario made ready to be matched against labels of one map.
 
     Attributes:
-        scenario: The scenario.
+        scenario: The scenario, made ready to be matched.
         options: The options.
         solver: Decides what the ladder does not; None makes those groups unknown.
     """
@@ -72,7 +73,8 @@ class Matcher:
     _relevant: tuple[frozenset[str], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Find out what matters of a label."""
+        """Rewrite the scenario, and find out what matters of a label."""
+        self.scenario = ready(self.scenario)
         self._relevant = relevant_properties(self.scenario, self.options)
 
     def match(

@@ -6,8 +6,9 @@ For each hidden point there is one map cell to choose, out of the few that are l
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import cast
 
 import numpy as np
@@ -18,15 +19,15 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn, Value
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.geometry.shapes import Bounds
-from scenicq.match.affine import AffineVector, affine_scalar, affine_vector
+from scenicq.match.affine import Affine, AffineVector, affine_scalar, affine_vector
 from scenicq.match.branches import Branches
 from scenicq.match.ground import holds, replay
 from scenicq.match.ladder import LINEAR_SLACK, Item, Maybe, No, Outcome, Yes
-from scenicq.match.linear import Alternative, NotLinear, inside, solve_affine
+from scenicq.match.linear import Alternative, NotLinear, extent_affine, inside, solve_affine
 from scenicq.match.options import Tolerance
 from scenicq.match.program import Row
 
-__all__ = ["MARGIN", "SAME", "Way", "solved", "way_of"]
+__all__ = ["MARGIN", "SAME", "Way", "extent", "solved", "way_of"]
 
 MARGIN = 2e-6
 """Metres by which boxes are grown, so that rounding loses nothing."""
@@ -63,41 +64,59 @@ class Way:
     sharp: bool
 
 
-def solved(ways: Sequence[Way], tolerance: Tolerance) -> Outcome:
-    """Whether parts have a solution together in which the fields point as chosen."""
-    items = [item for way in ways for item in way.case.tape.items]
+def solved(way: Way, tolerance: Tolerance, known: Mapping[Identity, float] = MappingProxyType({})) -> Outcome:
+    """Whether a part has a solution in which the fields point as chosen.
+
+    Args:
+        way: The part.
+        tolerance: Per feature.
+        known: Values that some of its random numbers are to have.
+    """
+    fixed = [Row(Affine(0.0, {(key, 0): 1.0}), value, value) for key, value in known.items()]
+    items = list(way.case.tape.items)
     open_ended = Maybe(items[0][0], "nonlinear")
-    headings: dict[int, float] = {}
-    values: dict[Identity, Value] = {}
-    for way in ways:
-        headings |= way.headings
-        values.update(way.middles)
-        values.update(way.given)
+    values: dict[Identity, Value] = {**way.middles, **way.given}
     # a solution on the border of two cells may count to the other one: the second time it keeps away from borders
     for strict in (False, True):
         try:
-            found = _program(ways, tolerance, strict=strict)
+            found = solve_affine(
+                way.items, [*fixed, *_rows(way, strict=strict)], tolerance, way.places, _options(way, strict=strict)
+            )
         except NotLinear:
             return open_ended
         if found is None:
-            sure = not strict and all(way.exact for way in ways)
-            return No(items[0][0]) if sure else open_ended
-        if replay(items, values | found, tolerance, LINEAR_SLACK, headings):
-            return Yes(values | found)
+            return No(items[0][0]) if way.exact and not strict else open_ended
+        values.update(found)
+        values.update(known)
+        if replay(items, values, tolerance, LINEAR_SLACK, way.headings):
+            return Yes(values)
     return open_ended
 
 
-def _program(ways: Sequence[Way], tolerance: Tolerance, *, strict: bool) -> dict[Identity, Value] | None:
-    cells = [cells for way in ways for cells in way.cells]
-    if strict:
-        cells = [[[replace(row, strict=row.low < row.high) for row in rows] for rows in options] for options in cells]
-    return solve_affine(
-        [item for way in ways for item in way.items],
-        [row for options in cells if len(options) == 1 for row in options[0]],
-        tolerance,
-        [place for way in ways for place in way.places],
-        [options for options in cells if len(options) > 1],
-    )
+def extent(way: Way, tolerance: Tolerance, number: Identity, limits: Interval) -> Interval | None:
+    """Between which values a random number lies in the solutions of a part, if it lies in an interval.
+
+    A little too much, never too little, but for what `Way.exact` excepts; None if there are none.
+    """
+    rows = [Row(Affine(0.0, {(number, 0): 1.0}), *limits), *_rows(way, strict=False)]
+    try:
+        return extent_affine(way.items, rows, tolerance, way.places, _options(way, strict=False), number)
+    except NotLinear:
+        return limits
+
+
+def _rows(way: Way, *, strict: bool) -> list[Row]:
+    """What holds of the cells that there is no choice of."""
+    return [row for options in way.cells if len(options) == 1 for row in _kept(options[0], strict=strict)]
+
+
+def _options(way: Way, *, strict: bool) -> list[Alternative]:
+    """The choices between cells."""
+    return [[_kept(rows, strict=strict) for rows in options] for options in way.cells if len(options) > 1]
+
+
+def _kept(rows: list[Row], *, strict: bool) -> list[Row]:
+    return [replace(row, strict=row.low < row.high) for row in rows] if strict else rows
 
 
 def way_of(cases: Branches, number: int, shared: Identity | None) -> Way | None:

@@ -17,6 +17,7 @@ from scenicq.errors import Span
 from scenicq.forest.scenario import Scenario, ScenarioObject
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
+from scenicq.match.ready import ready
 from scenicq.query.conditions import EGO, Condition, conditions
 from scenicq.query.params import param_conditions
 from scenicq.query.spans import SLACK, number
@@ -174,7 +175,7 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Pl
         network: The map it was compiled against.
         options: Tolerances, classes, radius.
     """
-    own_ego = options.ego == "label"
+    scenario, own_ego = ready(scenario), options.ego == "label"
     found = list(conditions(scenario, network, options)) if own_ego else []
     columns: dict[tuple[str, ...], str] = {}
     roles: list[_Role] = []

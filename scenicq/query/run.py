@@ -18,6 +18,7 @@ from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
+from scenicq.match.ready import ready
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.deciding import Decided, Decider, World
 from scenicq.query.hands import Hands
@@ -131,7 +132,7 @@ class Query:
     _known: _Known = field(default_factory=_Known, repr=False)
 
     def compile(self, map_name: str) -> tuple[Scenario, Network]:
-        """The scenario over one of the dataset's maps.
+        """The scenario over one of the dataset's maps, ready to be matched.
 
         Raises:
             ScenarioError: The program is wrong, or does not fit the map.
@@ -148,7 +149,7 @@ class Query:
             )
         except ScenarioError as error:
             raise about_dataset(error, self.dataset, map_name) from None
-        return scenario, network
+        return ready(scenario), network
 
     def _check_ego(self) -> None:
         """Refuse to take a stand-in for an ego that the source does not have."""

@@ -109,7 +109,7 @@ def equal(left: Term, right: object) -> Formula:
     return FALSE if isinstance(right, Undefined) else compare("==", left, cast(Term, right))
 
 
-def cases(index: Term, options: Sequence[Formula]) -> Formula:
+def cases(index: Term | Formula, options: Sequence[Formula]) -> Formula:
     """That the option holds which an index picks."""
     return disjunction(conjunction([picked(index, number), option]) for number, option in enumerate(options))
 
@@ -125,11 +125,7 @@ def rotated(vector: Vector, angle: Term) -> Vector:
 
 
 def compare_codes(op: CompareOp, left: object, right: object) -> Formula:
-    """A comparison of two codes.
-
-    Raises:
-        UnsupportedError: Truth values are compared.
-    """
+    """A comparison of two codes."""
     for choice, other, swapped in ((left, right, False), (right, left, True)):
         if isinstance(choice, Choice):
             pairs = [(where, (other, value) if swapped else (value, other)) for where, value in choice.options]
@@ -138,11 +134,26 @@ def compare_codes(op: CompareOp, left: object, right: object) -> Formula:
         return FALSE
     if not (isinstance(left, Term) and isinstance(right, Term)):
         if isinstance(left, Formula) or isinstance(right, Formula):
-            raise UnsupportedError("a comparison of truth values")
+            alike = _alike(left, right)
+            return alike if op is CompareOp.EQ else negation(alike)
         return TRUE if (left == right) == (op is CompareOp.EQ) else FALSE
     if op is CompareOp.NE:
         return negation(compare("==", left, right))
     return compare(op.value, left, right)
+
+
+def _alike(left: object, right: object) -> Formula:
+    """That two values are equal, of which one at least is a truth value; as a number it is 1 or 0."""
+    if not isinstance(left, Formula):
+        left, right = right, left
+    assert isinstance(left, Formula)
+    if isinstance(right, Formula):
+        true, false = right, negation(right)
+    elif isinstance(right, Term):
+        true, false = compare("==", right, 1.0), compare("==", right, 0.0)
+    else:
+        return FALSE
+    return disjunction([conjunction([left, true]), conjunction([negation(left), false])])
 
 
 def connect(op: LogicOp, args: list[object]) -> object:

@@ -220,7 +220,7 @@ class Expressions:
 
     def _select(self, node: Select, args: list[object]) -> object:
         index, options = args[0], args[1:]
-        if not isinstance(index, Term):
+        if not isinstance(index, Term | Formula):
             return index
         defined = [option for option in options if not isinstance(option, Undefined)]
         if not defined:

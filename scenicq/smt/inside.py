@@ -50,8 +50,13 @@ class UnsupportedError(Exception):
     """A construct that has no formula; the message says which."""
 
 
-def picked(index: Term, number: int) -> Formula:
-    """That an index, known to be a whole number, is this one; wide of it, so that the opposite is robust, too."""
+def picked(index: Term | Formula, number: int) -> Formula:
+    """That an index, known to be a whole number, is this one; wide of it, so that the opposite is robust, too.
+
+    The index may also be a truth value: 0 is false and 1 is true.
+    """
+    if isinstance(index, Formula):
+        return index if number else negation(index)
     return conjunction([compare("<=", number - 0.25, index), compare("<=", index, number + 0.25)])
 
 
@@ -214,7 +219,7 @@ def inside_region(region: Node, point: Vector, around: Box, code: Callable[[Node
             removed = inside_region(region.removed, point, around, code)
             return conjunction([inside_region(region.base, point, around, code), negation(removed)])
         case Select():
-            index = cast(Term, code(region.index))
+            index = cast("Term | Formula", code(region.index))
             return disjunction(
                 conjunction([picked(index, number), inside_region(option, point, around, code)])
                 for number, option in enumerate(region.options)

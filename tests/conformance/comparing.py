@@ -99,13 +99,13 @@ def shown(verdict: Verdict) -> str:
             return f"unknown: {verdict.reason}"
 
 
-def compiled(name: str, text: str, network: Network, version: int | None = None, *, drawn: bool = False) -> Scenario:
-    """The program on a map, to be matched or to have scenes drawn from it.
+def compiled(name: str, text: str, network: Network, version: int | None = None) -> Scenario:
+    """The program on a map.
 
     Raises:
         ScenarioError: It is refused.
     """
-    return compile_scenario(Source(name, text), network, version=version, drawn=drawn)
+    return compile_scenario(Source(name, text), network, version=version)
 
 
 def compare(

@@ -186,7 +186,7 @@ def distributions(arguments: argparse.Namespace, drawn: Drawn, town: Network) ->
             print(f"{path.stem:<28} Scenic says: {answer.get('error') or answer.get('ended')}")
             good = False
             continue
-        found = distances(compiled(path.stem, text, on_map(text, town), drawn=True), answer["scenes"], seed)
+        found = distances(compiled(path.stem, text, on_map(text, town)), answer["scenes"], seed)
         far = [each for each in found if each.apart > each.allowed]
         worst = max(found, key=lambda each: each.apart)
         print(

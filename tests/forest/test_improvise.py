@@ -63,7 +63,7 @@ PROGRAMS: dict[str, str] = {
     "Car left of spot by 0.5\n",
     "a distance": DRIVING + "ego = new Car\nother = new Car\nrequire (distance to other) < 9\n",
     "chained distances": DRIVING + "ego = new Object on road\na = new Object on road\nb = new Object on road\n"
-    "require (distance to a) < 18\nrequire (distance from a to b) < 18 and b.position.x > a.position.x\n",
+    "require (distance to a) < 36\nrequire (distance from a to b) < 36 and b.position.x > a.position.x\n",
     "a container": DRIVING + "ego = new Car with width 5, with length 7\n",
     "independent parts": "ego = new Object at (Range(0, 1), Range(0, 1)), with requireVisible False\n"
     "b = new Object at (Range(4, 9), Range(0, 1)), with requireVisible False\n"

@@ -37,6 +37,7 @@ from scenicq.forest.nodes import (
     Undefined,
 )
 from scenicq.forest.show import show
+from scenicq.forest.simplify import simplify
 from scenicq.forest.walk import features, leaves, postorder, transform
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.affine import affine_vector
@@ -201,12 +202,12 @@ def test_groups_are_the_connected_components_over_shared_variables(uses):
 
 
 def test_a_pick_from_a_list_becomes_one_region_only_if_nothing_else_depends_on_it():
-    alone = compiled("ego = new Car on Uniform(*network.lanes)")
+    alone = simplify(compiled("ego = new Car on Uniform(*network.lanes)"))
     (point,) = [node for node in leaves(alone.objects[0].properties["position"].value) if isinstance(node, PointIn)]
     assert isinstance(point.region, Constant)
     assert isinstance(point.region.value, PolygonSet)
     assert len(point.region.value.polygons) == len(STREET.lanes)
-    shared = compiled("lane = Uniform(*network.lanes)\nego = new Car on lane\nother = new Car on lane")
+    shared = simplify(compiled("lane = Uniform(*network.lanes)\nego = new Car on lane\nother = new Car on lane"))
     picks = [leaves(each.properties["position"].value) for each in shared.objects]
     indices = [[node for node in pick if isinstance(node, Index)] for pick in picks]
     assert indices[0][0].identity is indices[1][0].identity

@@ -4,7 +4,6 @@
 
 import math
 import random
-import time
 from pathlib import Path
 
 import numpy as np
@@ -41,12 +40,6 @@ def test_everything_is_there(network: Network) -> None:
     assert sum(not road.is1Way for road in network.allRoads) == 372
 
 
-def test_building_is_quick(network: Network) -> None:
-    start = time.perf_counter()
-    Network("again", network.features)
-    assert time.perf_counter() - start < 0.5
-
-
 def test_directions_in_lanes(network: Network) -> None:
     rng = random.Random(3)
     xy = np.array([sample(network.laneRegion, rng) for _ in range(300)])
@@ -66,13 +59,11 @@ def test_directions_in_lanes(network: Network) -> None:
     assert apart <= 3, "a few centrelines of the map have hooks, at whose corners any direction is as good"
 
 
-def test_many_directions_are_quick(network: Network) -> None:
+def test_directions_exist_wherever_lanes_are(network: Network) -> None:
     west, south, east, north = bounds(network.laneRegion)
     rng = np.random.default_rng(5)
     xy = np.stack([rng.uniform(west, east, 100_000), rng.uniform(south, north, 100_000)], axis=1)
-    start = time.perf_counter()
     found = network.roadDirection.values_many(xy)
-    assert time.perf_counter() - start < 5
     inside = contains_many(network.laneRegion, xy)
     assert all(values for values, within in zip(found, inside, strict=True) if within)
 

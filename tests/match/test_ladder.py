@@ -246,6 +246,13 @@ def test_a_cell_that_covers_too_much_proves_nothing(x, heading):
     assert not isinstance(check(split_items(x, heading)), Yes)
 
 
+def test_a_decision_that_takes_too_many_linear_programs_is_left_to_a_solver(monkeypatch):
+    monkeypatch.setattr("scenicq.match.ladder._MOST_PROGRAMS", 2)
+    found = check(split_items(5.15, 0.0))
+    assert isinstance(found, Maybe)
+    assert found.reason == "nonlinear"
+
+
 def test_distance_to_a_region_and_boxes_in_the_solver(solver):
     from scenicq.forest.groups import Condition
     from scenicq.forest.nodes import Compare, CompareOp, Distance, Encloses, Intersects, RectangleAt

@@ -1,7 +1,6 @@
 """The referee itself, on maps and labels small enough to check with a pencil."""
 
 import ast
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -11,50 +10,9 @@ import pytest
 import road_map
 import scene_conditions
 import shapely
-from five_scenarios import frames
+from made_scenes import EPS, Item, body, feature, run, street
 from road_map import RoadMap
 from scene_conditions import Body, Scene, Tolerances
-
-EPS = 1e-6
-Item = dict[str, Any]
-
-
-def feature(kind: str, name: str, box: tuple[float, float, float, float], **properties: Any) -> Item:
-    """A rectangular map feature."""
-    geometry = shapely.geometry.mapping(shapely.box(*box))
-    return {"type": "Feature", "geometry": geometry, "properties": {"id": name, "kind": kind, **properties}}
-
-
-def street() -> list[Item]:
-    """A southbound lane, two northbound ones (`west` has `east` to its right), a crossing at y = 100, a wide road."""
-    return [
-        feature("lane", "south", (-4, -100, 0, 100), centerline=[[[-2, 100], [-2, -100]]]),
-        feature("lane", "west", (0, -100, 4, 100), centerline=[[[2, -100], [2, 0], [2, 0], [2, 100]]], right="east"),
-        feature("lane", "east", (4, -100, 8, 100), centerline=[[[6, -100], [6, 100]]], left="west"),
-        feature("intersection", "crossing", (-4, 100, 8, 112)),
-        feature("lane", "through", (0, 100, 4, 112), centerline=[[[2, 100], [2, 112]]]),
-        feature("lane", "across", (-4, 104, 8, 108), centerline=[[[-4, 106], [8, 106]]]),
-        feature("road", "wide", (-10, -100, 12, 100)),
-    ]
-
-
-def body(name: str, x: float, y: float, degrees: float = 0.0, kind: str = "vehicle.car", **more: Any) -> Item:
-    """A label object; the heading is given in degrees."""
-    return {"id": name, "class": kind, "position": [x, y], "heading": math.radians(degrees), **more}
-
-
-def run(
-    folder: Path, number: int, ego: Item, *objects: Item, features: list[Item] | None = None, **options: Any
-) -> Any:
-    """All correspondences of one hand-made label."""
-    (folder / "maps").mkdir(exist_ok=True)
-    (folder / "maps" / "m.geojson").write_text(json.dumps({"features": street() if features is None else features}))
-    dataset = {"angle": options.pop("angle", "heading"), "classes": options.pop("classes", "nuscenes")}
-    (folder / "dataset.json").write_text(json.dumps(dataset))
-    label = {"id": "f", "recording": "r", "map": "m", "ego": ego, "objects": list(objects)}
-    (folder / "labels.jsonl").write_text(json.dumps(label) + "\n")
-    defaults = {"tolerance_x": 0.25, "tolerance_y": 0.25, "heading_tolerance": math.radians(5), "radius": 50.0}
-    return frames(folder, number, **{**defaults, **options})["f"]
 
 
 def edge(inside: float, outward: int) -> list[Any]:
@@ -287,40 +245,6 @@ class TestCutIn:
         ]
         found = run(tmp_path, 5, body("e", 2, ahead), body("c", 4, ahead + 2, 20), features=features)
         assert bool(found) == matches
-
-
-class TestRoadDirection:
-    @staticmethod
-    def degrees(x: float, y: float, features: list[Item] | None = None) -> list[int]:
-        road_map = RoadMap(street() if features is None else features)
-        return sorted(round(math.degrees(h)) % 360 for h in road_map.directions(x, y))
-
-    def test_containing_lane(self) -> None:
-        assert self.degrees(2, 5) == [0]
-        assert self.degrees(-1, 5) == [180]
-
-    def test_choice_inside_an_intersection(self) -> None:
-        assert self.degrees(2.5, 106.25) == [0, 270]
-        assert self.degrees(6, 106) == [270]
-
-    def test_nearest_of_overlapping_lanes_elsewhere(self) -> None:
-        lanes = [item for item in street() if item["properties"]["kind"] == "lane"]
-        assert self.degrees(2.5, 106.25, lanes) == [270]
-        assert self.degrees(2.25, 106.5, lanes) == [0]
-        assert self.degrees(2.5, 106.5, lanes) == [0, 270]
-
-    def test_nearest_lane_within_reach(self) -> None:
-        assert self.degrees(28 - EPS, 0) == [0]
-        assert self.degrees(-24 + EPS, 0) == [180]
-        assert self.degrees(28 + EPS, 0) == []
-
-    def test_corner_of_a_centerline_is_a_tie(self) -> None:
-        bend = feature("lane", "bend", (0, 0, 10, 10), centerline=[[[5, 0], [5, 5], [10, 5]]])
-        assert self.degrees(4, 6, [bend]) == [0, 270]
-        assert self.degrees(4, 4, [bend]) == [0]
-
-    def test_lane_without_centerline_has_no_direction(self) -> None:
-        assert self.degrees(5, 5, [feature("lane", "bare", (0, 0, 10, 10))]) == []
 
 
 def moved(item: Item, degrees: float) -> Item:

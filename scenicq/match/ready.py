@@ -1,0 +1,22 @@
+"""A scenario as the matcher reads it: the same outcomes in expressions that are cheaper to match."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from scenicq.compiler.free_places import choose_elements
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.simplify import simplify
+
+__all__ = ["ready"]
+
+
+def ready(scenario: Scenario) -> Scenario:
+    """The scenario rewritten to be matched; scenes are still drawn from it as it was written.
+
+    Args:
+        scenario: As compiled, or made ready before.
+    """
+    if scenario.as_written is not None:
+        return scenario
+    return replace(simplify(choose_elements(scenario)), as_written=scenario)
