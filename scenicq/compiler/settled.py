@@ -26,7 +26,7 @@ def settled(run: Runner, value: ModelValue) -> ModelValue:
         return value
     reached = list(postorder((value,)))
     todo = list({(node.object, node.property): None for node in reached if isinstance(node, Feature)})
-    run.budget.step(value.span, len(reached) if todo else len(reached) // 4)
+    run.budget.step(value.span, len(reached) if todo else len(reached) // 2)
     if not todo:
         return value
     known = run.lookups.known

@@ -310,11 +310,13 @@ class Expressions:
         raise UnsupportedError(f"`{op.value}` of random values")
 
     def _floored(self, node: Arithmetic, args: list[Term]) -> Term | None:
-        """Rounding down, division and remainder by it: one case for each whole number within the bounds."""
+        """Rounding down or up, division and remainder by it: one case for each whole number within the bounds."""
         limits = [scalar_bounds(arg, self._boxes) for arg in node.args]
         match node.op:
             case ArithmeticOp.FLOOR:
                 value, (low, high) = args[0], limits[0]
+            case ArithmeticOp.CEIL:
+                value, (low, high) = apply(Operator.NEG, args[0]), (-limits[0][1], -limits[0][0])
             case ArithmeticOp.FLOORDIV | ArithmeticOp.MOD if limits[1][0] > 0 or limits[1][1] < 0:
                 value = apply(Operator.DIV, args[0], args[1])
                 ends = [a / b for a in limits[0] for b in limits[1]]
@@ -333,6 +335,8 @@ class Expressions:
                 for n in numbers
             )
         )
+        if node.op is ArithmeticOp.CEIL:
+            return apply(Operator.NEG, whole)
         if node.op is not ArithmeticOp.MOD:
             return whole
         return apply(Operator.SUB, args[0], apply(Operator.MUL, args[1], whole))

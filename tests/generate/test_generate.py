@@ -21,6 +21,7 @@ HANDFUL = [
     "paper:noise", "paper:query paper, figure 6", "conformance:driving_following", "conformance:not_visible",
     "conformance:uniform_objects", "match:shared", "match:hidden requirement",
     "paper:mars", next(name for name, example in examples().items() if "abs(x - 1) // 1" in example.text),
+    next(name for name, example in examples().items() if "int(Range(-3, 3))" in example.text),
 ]  # fmt: skip
 NO_SCENE = {
     # about an element that the street does not have
