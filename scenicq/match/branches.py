@@ -100,9 +100,11 @@ class Branches:
 
     @classmethod
     def around(cls, tape: Tape, near: Mapping[Identity, Value], reach: float) -> Branches:
-        """One case, in which no random number or coordinate is farther than a reach from a value."""
+        """One case, in which no random number or coordinate is farther than a reach from a value, if it has one."""
         found = cls.start(tape, {})
         for identity, own in found.ranges.items():
+            if identity not in near:
+                continue
             value = np.array(near[identity], dtype=float).reshape(own.shape[:-2])[..., None, None]
             found.ranges[identity] = common(own, value + np.array([[-reach], [reach]]))
         return found

@@ -130,11 +130,14 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
 
     Args:
         items: The constraints, conditioned.
-        near: The values; those of discrete variables are kept.
+        near: The values; those of discrete variables are kept. What did not matter to a solver may be missing.
         tolerance: Per feature.
     """
     known = leaves(*(node for _, node, _ in items))
-    given = {leaf.identity: near[leaf.identity] for leaf in known if isinstance(leaf, Index | DiscreteRange)}
+    discrete = [leaf.identity for leaf in known if isinstance(leaf, Index | DiscreteRange)]
+    given = {identity: near[identity] for identity in discrete if identity in near}
+    if len(given) < len(set(discrete)):
+        return None
     memo: dict[int, Node] = {}
     tape = Tape([(c, condition(node, {}, given, memo), seen) for c, node, seen in items], tolerance)
     try:
