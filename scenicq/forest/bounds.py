@@ -43,6 +43,7 @@ __all__ = [
     "Box",
     "Interval",
     "add",
+    "divide",
     "leaf_boxes",
     "multiply",
     "point_boxes",
@@ -73,6 +74,16 @@ def multiply(a: Interval, b: Interval) -> Interval:
     return (min(ends), max(ends))
 
 
+def _quotient(a: float, b: float) -> float:
+    return 0.0 if a == 0 or math.isinf(b) else a / b
+
+
+def divide(a: Interval, b: Interval) -> Interval:
+    """The quotient by an interval without 0; not by way of 1 / b, which is infinite for the tiniest numbers."""
+    ends = [_quotient(x, y) for x in a for y in b]
+    return (min(ends), max(ends))
+
+
 def _hull(parts: list[Interval]) -> Interval:
     return (min(low for low, _ in parts), max(high for _, high in parts))
 
@@ -100,8 +111,7 @@ def _arithmetic(op: ArithmeticOp, args: list[Interval]) -> Interval:
         case ArithmeticOp.MUL:
             return multiply(first, args[1])
         case ArithmeticOp.DIV if args[1][0] > 0 or args[1][1] < 0:
-            inverse = (1 / args[1][1], 1 / args[1][0])
-            return multiply(first, inverse)
+            return divide(first, args[1])
         case ArithmeticOp.NEG:
             return (-first[1], -first[0])
         case ArithmeticOp.ABS:
@@ -260,10 +270,8 @@ def point_boxes(root: Node, target: Box) -> dict[Identity, Box]:
                 low, high = cast(Interval, known[id(node.angle)] or EVERYTHING)
                 stack.append((node.vector, _rotated(box, (-high, -low))))
             case Scale() if isinstance(node.factor, Constant) and node.factor.value:
-                inverse = 1 / cast(float, node.factor.value)
-                stack.append(
-                    (node.vector, (multiply(box[0], (inverse, inverse)), multiply(box[1], (inverse, inverse))))
-                )
+                factor = cast(float, node.factor.value)
+                stack.append((node.vector, (divide(box[0], (factor, factor)), divide(box[1], (factor, factor)))))
             case _:
                 pass
     return boxes

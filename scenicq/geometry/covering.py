@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TypeAlias
 
 from shapely.geometry import Polygon
@@ -32,7 +33,6 @@ _SLIVER = 1e-9
 """Share of a box's area that polygons side by side may leave open between them."""
 _EDGE_M = 1e-6
 """How far the edge of a box may stick out of other regions."""
-
 _FAR_M = 1e6
 """Where regions without bounds are looked at for a common point."""
 
@@ -48,22 +48,25 @@ def covers(outer: Region, box: Polygon) -> Answer:
         case Everywhere():
             return True
         case PolygonSet():
-            near = [polygon for polygon in outer.polygons if polygon.intersects(box)]
-            return shapes.difference(box, shapes.union_all(near)).area <= _SLIVER * box.area
+            return _together(outer.near(shapes.bounds_of(box)), box)
         case Disc():
             return all(math.dist(outer.center, corner) <= outer.radius for corner in box.exterior.coords)
         case Rectangle():
-            return shapes.difference(box, rectangle_shape(outer)).area <= _SLIVER * box.area
+            return _together([rectangle_shape(outer)], box)
         case IntersectionOf():
             answers = [covers(part, box) for part in outer.parts]
             return False if False in answers else None if None in answers else True
         case UnionOf() if all(isinstance(part, PolygonSet) for part in outer.parts):
-            polygons = (polygon for part in outer.parts if isinstance(part, PolygonSet) for polygon in part.polygons)
-            return covers(PolygonSet(tuple(polygons), "union"), box)
+            sets = (part for part in outer.parts if isinstance(part, PolygonSet))
+            return _together([piece for part in sets for piece in part.near(shapes.bounds_of(box))], box)
         case _:
             inner = box.buffer(-_EDGE_M)
             outside = meets(difference(Everywhere(), outer), box if inner.is_empty else inner)
             return None if outside is None else not outside
+
+
+def _together(pieces: Sequence[shapes.Shape], box: Polygon) -> bool:
+    return shapes.difference(box, shapes.union_all(pieces)).area <= _SLIVER * box.area
 
 
 def overlaps(left: Region, right: Region) -> Answer:

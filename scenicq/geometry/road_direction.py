@@ -84,21 +84,7 @@ class RoadDirection:
 
     def values(self, x: float, y: float) -> tuple[float, ...]:
         """The headings allowed at a point, in (-pi, pi]; none where the field is undefined."""
-        point = shapes.point(x, y)
-        lanes: list[int] = shapes.tree_within(self._tree, point, _TIE).tolist()
-        if not lanes:
-            return self._values(np.array([(x, y)], dtype=float))[0]
-        # what `_values` does for many points, in half the time for one
-        segments, headings, starts = self._all
-        own = [slice(starts[lane], starts[lane + 1]) for lane in lanes]
-        away = [segment_distances(np.array((x, y)), segments[part]) for part in own]
-        least = [float(gaps.min()) for gaps in away]
-        if len(lanes) > 1 and not len(shapes.tree_within(self._crossroads, point, _TIE)):
-            least = [min(least)] * len(lanes)
-        found: set[float] = set()
-        for part, gaps, best in zip(own, away, least, strict=True):
-            found.update(headings[part][gaps <= best + _TIE].tolist())
-        return tuple(sorted(found))
+        return self._values(np.array([(x, y)], dtype=float))[0]
 
     def values_many(self, xy: Coordinates) -> list[tuple[float, ...]]:
         """`values` for points of shape (n, 2)."""
@@ -172,7 +158,7 @@ class RoadDirection:
         crossing[shapes.tree_pairs_within(self._crossroads, points, _TIE)[0]] = True
         own = np.arange(len(point)) + len(xy)
         group[crossing[point]] = own[crossing[point]]
-        off = np.setdiff1d(np.arange(len(xy)), point)
+        off = np.nonzero(np.bincount(point, minlength=len(xy)) == 0)[0]
         if len(off):
             off_point, off_lane = self._nearest_lanes(xy[off])
             point = np.concatenate([point, off[off_point]])

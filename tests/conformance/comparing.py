@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import random
 import re
-import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from patience import OutOfPatienceError, patience
 from random_programs import freedoms
 
 from scenicq.compiler.program import compile_scenario
@@ -215,25 +214,6 @@ def compare_random(name: str, text: str, answer: dict[str, Any], network: Networ
         outcome.kind, outcome.drawn, outcome.moved = "undecided", outcome.matched, outcome.told
         outcome.faults.clear()
     return outcome
-
-
-class OutOfPatienceError(BaseException):
-    """A program takes too long; not an `Exception`, so that nothing takes it for its own."""
-
-
-@contextmanager
-def patience(seconds: float) -> Iterator[None]:
-    """Raise OutOfPatienceError after so many seconds of processor time."""
-
-    def expired(*_: object) -> None:
-        raise OutOfPatienceError
-
-    signal.signal(signal.SIGPROF, expired)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
 
 
 def _outside(text: str, scene: dict[str, Any], seed: int) -> Iterator[tuple[str, dict[str, Any]]]:

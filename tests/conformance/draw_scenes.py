@@ -15,41 +15,20 @@ import functools
 import importlib.metadata
 import json
 import random
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scenic
 from network_features import features_of
+from patience import OutOfPatienceError, patience
 from scenic.core.distributions import RejectionException
 from scenic.core.errors import InvalidScenarioError
 from scenic.domains.driving.roads import Network
 
 MOST_ATTEMPTS = 20_000
 MODE = {} if importlib.metadata.version("scenic").startswith("2.") else {"mode2D": True}
-
-
-class OutOfTimeError(BaseException):
-    """Drawing took too long; not an `Exception`, so that nothing of Scenic takes it for its own."""
-
-
-@contextmanager
-def at_most(seconds: float) -> Iterator[None]:
-    """Raise OutOfTimeError after so many seconds of processor time."""
-
-    def expired(*_: object) -> None:
-        raise OutOfTimeError
-
-    signal.signal(signal.SIGPROF, expired)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
 
 
 def thing(thing: Any) -> dict[str, Any]:
@@ -79,11 +58,11 @@ def draw(text: str, chart: Path, count: int, seed: int, seconds: float) -> dict[
     np.random.seed(seed)
     scenes: list[dict[str, Any]] = []
     try:
-        with at_most(seconds):
+        with patience(seconds):
             scenario = scenic.scenarioFromString(text, params={"map": str(chart)}, **MODE)
             while len(scenes) < count:
                 scenes.append(plain(scenario.generate(maxIterations=MOST_ATTEMPTS)[0]))
-    except (OutOfTimeError, RejectionException, InvalidScenarioError) as end:
+    except (OutOfPatienceError, RejectionException, InvalidScenarioError) as end:
         return {"scenes": scenes, "ended": f"{type(end).__name__}: {end}"}
     except Exception as error:  # whatever Scenic says of the program is its answer
         return {"error": f"{type(error).__name__}: {error}"}

@@ -7,6 +7,7 @@ import random
 import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,7 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.standin import street
 from scenicq.errors import Source
 from scenicq.forest import build
-from scenicq.forest.bounds import point_boxes, vector_bounds
+from scenicq.forest.bounds import divide, point_boxes, vector_bounds
 from scenicq.forest.condition import condition, expand
 from scenicq.forest.evaluate import admits, evaluate
 from scenicq.forest.groups import Comparison, group_constraints
@@ -33,6 +34,7 @@ from scenicq.forest.nodes import (
     LogicOp,
     PointIn,
     Range,
+    Scale,
     Select,
     Undefined,
 )
@@ -231,3 +233,17 @@ def test_a_support_s_ends_belong_to_it_and_nothing_beyond():
     assert not admits(leaf, ends, 2.0001, 0.0)
     assert admits(leaf, ends, 2.0001, 0.001)
     assert not admits(Index((1.0, 1.0)), (), 2.0, 0.5)
+
+
+@pytest.mark.parametrize("tiny", [2.2e-309, -5e-324])
+def test_quotients_of_the_tiniest_numbers_are_bounded(tiny):
+    assert divide((tiny, tiny), (tiny, tiny)) == (1.0, 1.0)
+    assert divide((0.0, 1.0), (abs(tiny), 2.0)) == (0.0, math.inf)
+
+
+def test_a_point_times_the_tiniest_number_may_lie_anywhere_its_product_allows():
+    point = PointIn(region=build.constant(PolygonSet((), "none")))
+    boxes = point_boxes(Scale(point, build.constant(2.2e-309)), ((2.2e-309, 4.4e-309), (0.0, 0.0)))
+    (((west, east), (south, north)),) = boxes.values()
+    assert (west, east) == pytest.approx((1.0, 2.0))
+    assert (south, north) == (0.0, 0.0)
