@@ -154,11 +154,13 @@ class RoadDirection:
         point, lane = shapes.tree_pairs_within(self._tree, points, _TIE)
         # one nearest segment over all lanes, but in intersections and off the lanes one of each lane
         group = point.copy()
-        crossing = np.zeros(len(xy), dtype=bool)
-        crossing[shapes.tree_pairs_within(self._crossroads, points, _TIE)[0]] = True
+        lanes = np.bincount(point, minlength=len(xy))
         own = np.arange(len(point)) + len(xy)
-        group[crossing[point]] = own[crossing[point]]
-        off = np.nonzero(np.bincount(point, minlength=len(xy)) == 0)[0]
+        if len(shared := np.nonzero(lanes > 1)[0]):
+            crossing = np.zeros(len(xy), dtype=bool)
+            crossing[shared[shapes.tree_pairs_within(self._crossroads, points[shared], _TIE)[0]]] = True
+            group[crossing[point]] = own[crossing[point]]
+        off = np.nonzero(lanes == 0)[0]
         if len(off):
             off_point, off_lane = self._nearest_lanes(xy[off])
             point = np.concatenate([point, off[off_point]])

@@ -16,7 +16,7 @@ from scenicq.match.verdict import Cause
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label
 
-__all__ = ["Among", "Cast", "cast_roles", "egos"]
+__all__ = ["Among", "Cast", "candidates_of", "cast_roles", "egos"]
 
 Among = Mapping[int, tuple[int, ...]]
 """For objects of the scenario, the numbers of the things that may play them: all others are known to be excluded."""
@@ -104,39 +104,58 @@ def cast_roles(
         given: Ids of label objects that are known to play objects, by the objects' names.
         among: What is known of who may play whom, for the label's own ego.
     """
-    things = (label.ego, *label.objects)
-    center = (things[ego].x, things[ego].y)
-    reach = options.radius
-    near = [
-        reach is None or (thing.x - center[0]) ** 2 + (thing.y - center[1]) ** 2 <= reach * reach for thing in things
-    ]
-    first = 1 if options.ego == "label" or not label.has_ego else 0
-    free = [number for number in range(first, len(things)) if number != ego and near[number]]
-    of_class: dict[str, tuple[int, ...]] = {}
-    candidates: dict[int, tuple[int, ...]] = {}
-    for thing in scenario.objects:
-        if thing.index == scenario.ego:
-            continue
-        if thing.category not in of_class:
-            of_class[thing.category] = tuple(
-                number for number in free if class_matches(thing.category, things[number].category, options.classes)
-            )
-        found = of_class[thing.category]
-        if thing.name in given:
-            found = tuple(number for number in found if things[number].id == given[thing.name])
-        if among is not None and thing.index in among:
-            found = tuple(number for number in among[thing.index] if number in found)
-        candidates[thing.index] = found
+    candidates = candidates_of(scenario, label, ego, options, given, among)
     short = _short(candidates)
     if short is not None:
         thing, count = scenario.objects[short], len(candidates[short])
         detail = f"only {count} {thing.category}" if count else f"no {thing.category}"
         return Cause(f"{thing.name}.class", detail, thing.span, (short,))
-    spare = len(free) - len(candidates)
-    if options.exact and spare:
-        return Cause("--exact", f"{spare} label objects are left over")
-    seen = tuple(observe(thing) for thing in things)
-    return Cast(label, ego, seen, observe_params(label), candidates, None if reach is None else (center, reach))
+    if options.exact:
+        spare = len(_free(label, ego, options)) - len(candidates)
+        if spare:
+            return Cause("--exact", f"{spare} label objects are left over")
+    things = (label.ego, *label.objects)
+    disc = None if options.radius is None else ((things[ego].x, things[ego].y), options.radius)
+    return Cast(label, ego, tuple(map(observe, things)), observe_params(label), candidates, disc)
+
+
+def candidates_of(
+    scenario: Scenario,
+    label: Label,
+    ego: int,
+    options: MatchOptions,
+    given: Mapping[str, str],
+    among: Among | None = None,
+) -> dict[int, tuple[int, ...]]:
+    """For each object but the scenario's ego, the numbers of the things of its class; arguments of `cast_roles`."""
+    free = _free(label, ego, options)
+    of_class: dict[str, tuple[int, ...]] = {}
+    candidates: dict[int, tuple[int, ...]] = {}
+    for thing in scenario.objects:
+        if thing.index == scenario.ego:
+            continue
+        found = of_class.get(thing.category)
+        if found is None:
+            found = tuple([number for number, kind in free if class_matches(thing.category, kind, options.classes)])
+            of_class[thing.category] = found
+        if thing.name in given:
+            wanted = given[thing.name]
+            found = tuple([number for number in found if number and label.objects[number - 1].id == wanted])
+        if among is not None and thing.index in among:
+            found = tuple([number for number in among[thing.index] if number in found])
+        candidates[thing.index] = found
+    return candidates
+
+
+def _free(label: Label, ego: int, options: MatchOptions) -> list[tuple[int, str]]:
+    """The numbers and classes of the things within the radius that may play others than the ego."""
+    things = (label.ego, *label.objects)
+    first = 1 if options.ego == "label" or not label.has_ego else 0
+    numbers = [number for number in range(first, len(things)) if number != ego]
+    if options.radius is not None:
+        x, y, reach = things[ego].x, things[ego].y, options.radius
+        numbers = [n for n in numbers if (things[n].x - x) ** 2 + (things[n].y - y) ** 2 <= reach * reach]
+    return [(number, things[number].category) for number in numbers]
 
 
 def _short(candidates: Mapping[int, tuple[int, ...]]) -> int | None:

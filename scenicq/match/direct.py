@@ -166,13 +166,17 @@ def signature_of(label: Label, ego: int, among: Among, relevant: tuple[frozenset
     """What is observed of all candidates, if it is the same for all of a role."""
     kinds: list[frozenset[str]] = []
     objects = label.objects
+    asked: dict[tuple[frozenset[str], tuple[int, ...]], frozenset[str]] = {}
     for index, names in enumerate(relevant):
         if index == ego:
-            seen = names & observed_names(label.ego)
-        else:
-            first, *others = [names & observed_names(objects[number - 1]) for number in among[index]] or [None]
-            if first is None or any(other != first for other in others):
+            kinds.append(names & observed_names(label.ego))
+            continue
+        key = names, among[index]
+        seen = asked.get(key)
+        if seen is None:
+            first, *others = {names & observed_names(objects[number - 1]) for number in among[index]} or {None}
+            if first is None or others:
                 return None
-            seen = first
+            seen = asked[key] = first
         kinds.append(seen)
     return (*kinds, frozenset(observe_params(label)) if label.params else frozenset())

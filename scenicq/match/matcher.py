@@ -20,7 +20,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.asking import ask
 from scenicq.match.attempt import Attempt, Failure, Solution
-from scenicq.match.casting import Among, cast_roles, egos
+from scenicq.match.casting import Among, candidates_of, cast_roles, egos
 from scenicq.match.constraints import Signature, describe_constraint
 from scenicq.match.direct import Casting, Direct, direct_of, signature_of
 from scenicq.match.ladder import Item, No, Outcome
@@ -95,19 +95,23 @@ class Matcher:
             among: What is known of who may play whom.
             places: What is known of places of the map; see `look_up`.
         """
-        if among is not None and places is not None and not given and reporter is None:
-            found = self._direct(label, among, places)
+        if reporter is None:
+            found = self._direct(label, given or {}, among, places or Places())
             if found is not None:
                 return found
         return next(self._findings(label, reporter, given or {}, among, places)).verdict
 
-    def _direct(self, label: Label, among: Among, places: Places) -> Match | NoMatch | None:
+    def _direct(
+        self, label: Label, given: Mapping[str, str], among: Among | None, places: Places
+    ) -> Match | NoMatch | None:
         """What is found without a search, if it is clear."""
         options = self.options
         if options.method != "auto" or options.exact or options.ego != "label" or not label.has_ego:
             return None
         ego = self.scenario.ego
-        signature = signature_of(label, ego, among, self._relevant)
+        alone = among is not None and not given
+        roles = among if among is not None and alone else candidates_of(self.scenario, label, 0, options, given, among)
+        signature = signature_of(label, ego, roles, self._relevant)
         if signature is None:
             return None
         plan = self.plan(signature)
@@ -117,10 +121,11 @@ class Matcher:
         if direct is None:
             return None
         disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
-        casting = Casting(direct, options, label, ego, among, disc, places)
+        casting = Casting(direct, options, label, ego, roles, disc, places)
         found = casting.solve()
         if isinstance(found, Failure):
-            if not (direct.words and casting.words):
+            # of roles that nothing is known of there may be too few candidates, which comes first
+            if not (alone and direct.words and casting.words):
                 return None
             return NoMatch(self._cause(found), self._names(label, 0, found.assignment))
         return None if found is None else self._match(label, 0, found)

@@ -13,7 +13,7 @@ from scenes import compiled, drawn, label_of
 
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
-from scenicq.match import decisions, program
+from scenicq.match import decisions, planning, program
 from scenicq.match.casting import cast_roles
 from scenicq.match.ladder import Maybe
 from scenicq.match.matcher import Matcher
@@ -222,7 +222,7 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
 
     real = decisions.decide_apart
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(decisions.Decisions, "_in_closed_form", lambda *_: None)
+        patch.setattr(planning, "quick_of", lambda _: None)
         patch.setattr(decisions, "decide_apart", decide)
         assert (
             Matcher(scenario, MatchOptions(), Fixed(Undecided("timeout"))).match(label).correspondence["other"] == "b"
