@@ -127,6 +127,11 @@ def _speed_limit(_: Network, element: NetworkElement) -> ModelValue:
     return float(limit) if isinstance(limit, int | float) and not isinstance(limit, bool) else None
 
 
+def _signalized(_: Network, element: NetworkElement) -> ModelValue:
+    says = element.properties.get("signalized")
+    return says if isinstance(says, bool) else None
+
+
 _WORKED_OUT: dict[str, tuple[_Work, ...]] = {
     "network": ((NetworkElement, lambda network, _: network),),
     "speedLimit": ((NetworkElement, _speed_limit),),
@@ -141,6 +146,7 @@ _WORKED_OUT: dict[str, tuple[_Work, ...]] = {
     "sidewalks": ((Road, _sidewalks),),
     "sidewalkRegion": ((Road, _sidewalk_region),),
     "road": ((Shoulder, _road_of), (Sidewalk, _road_of)),
+    "isSignalized": ((Intersection, _signalized),),
     "elements": ((Network, lambda network, _: dict(network.elements)),),
     "driveOnLeft": ((Network, lambda *_: False),),
     "tolerance": ((Network, lambda *_: 0.05),),
@@ -189,7 +195,8 @@ def worked_out(run: Runner, value: NetworkElement | Network, name: str, span: Sp
         if found is None and plain is name and name in _REQUIRED:
             assert isinstance(value, NetworkElement)
             raise fail("map-lacks", f"the map has no {name} of {value.name}", span, "not in this map")
-        return (build.constant(found, span) if isinstance(found, Region) else cast(ModelValue, found),)
+        if found is not None or name not in _UNKNOWN:
+            return (build.constant(found, span) if isinstance(found, Region) else cast(ModelValue, found),)
     if name in _UNKNOWN and isinstance(value, _UNKNOWN[name][0]):
         raise fail("map-lacks", f"the map does not say {_UNKNOWN[name][1]}", span, "not in this map",
                    ("leave out what the program asks of it",))  # fmt: skip

@@ -79,7 +79,8 @@ def _ways(
     """
     turns = [*(("straight", 2, lane) for lane in range(lanes)), ("right", 1, lanes - 1), ("left", 3, 0)]
     roads = [road for road, _, _ in arms.values()]
-    yield MapFeature(name, "intersection", _placed(box(-_NEAR, -_NEAR, _NEAR, _NEAR), 0, center), {"roads": roads})
+    area = _placed(box(-_NEAR, -_NEAR, _NEAR, _NEAR), 0, center)
+    yield MapFeature(name, "intersection", area, {"roads": roads, "signalized": len(arms) > 3})
     for number, (_, arriving, _) in arms.items():
         for turn, by, lane in turns:
             leaving = arms.get((number + by) % 4)

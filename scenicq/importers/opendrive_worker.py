@@ -82,7 +82,7 @@ def _features(network: Any, left_hand: bool) -> list[dict[str, Any]]:
         links["intersection"] = crossing_of.get(road.uid)
         found.append(_feature(road.uid, "road", road.polygon, links))
     for crossing in network.intersections:
-        links = {"roads": [road.uid for road in crossing.roads]}
+        links = {"roads": [road.uid for road in crossing.roads], "signalized": bool(crossing.isSignalized)}
         found.append(_feature(crossing.uid, "intersection", crossing.polygon, links))
     for kind, elements in (
         ("crossing", network.crossings),

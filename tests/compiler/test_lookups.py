@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,10 +13,13 @@ import shapely
 
 from scenicq.compiler.occupancy import Ranked
 from scenicq.compiler.places import LOOKUPS, Lookups
+from scenicq.compiler.program import compile_scenario
+from scenicq.errors import ScenarioError, Source
 from scenicq.forest.improvise import draw_scene
-from scenicq.forest.nodes import Constant, DirectionAt
+from scenicq.forest.nodes import Constant, DirectionAt, PointIn
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
+from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, NoMatch
@@ -200,7 +204,6 @@ def test_what_is_found_is_what_the_map_says() -> None:
         ("ego = new Object\nx = ego.lane\n", ("unknown-attribute", "lane")),
         ("ego = new Car\nif ego.lane.isForward:\n    pass\n", ("random-branch", "ego.lane.isForward")),
         ("ego = new Car at (500, 500)\nx = ego.lane\n", ("impossible-requirement", "lane")),
-        ("ego = new Car\nx = network.intersections[0].isSignalized\n", ("map-lacks", "isSignalized")),
         ("ego = new Car\nx = network.roads[0].sections\n", ("unsupported-construct", "sections")),
         (
             "ego = new Car\nx = network.nominalDirectionsAt(ego)\n",
@@ -226,3 +229,15 @@ def test_the_course_may_depend_on_the_lane_of_a_known_place() -> None:
     program = compiled(text)
     assert [each.category for each in program.objects].count("Car") == 1 + len(network().laneAt(1.75, 50).maneuvers)
     assert [each.category for each in program.objects].count("Pedestrian") == 2
+
+
+def test_signals_at_intersections_are_what_the_map_says_of_them():
+    text = HEADER + "ego = new Car on Uniform(*filter(lambda i: i.isSignalized, network.intersections))\n"
+    place = compiled(text).objects[0].properties["position"].value
+    assert isinstance(place, PointIn)
+    assert [node.value.name for node in postorder((place,)) if isinstance(node, Constant)] == ["Intersection middle"]
+    silent = Network("silent", [replace(each, properties={}) for each in network().features])
+    with pytest.raises(ScenarioError) as caught:
+        compile_scenario(Source("test.scenic", text), silent)
+    (diagnostic,) = caught.value.diagnostics
+    assert (diagnostic.code, diagnostic.span.text) == ("map-lacks", "isSignalized")

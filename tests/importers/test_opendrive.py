@@ -91,13 +91,14 @@ def test_crossings_that_are_lost_are_told(xodr: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("scenic") is None, reason="Scenic is not installed")
 @pytest.mark.skipif(not REAL.exists(), reason="the maps are not on this machine")
-@pytest.mark.parametrize(("name", "counts"), [("Town01", (26, 124, 12)), ("Town05", (53, 486, 21))])
-def test_real_maps(tmp_path: Path, name: str, counts: tuple[int, int, int]) -> None:
+@pytest.mark.parametrize(("name", "counts"), [("Town01", (26, 124, 12, 12)), ("Town05", (53, 486, 21, 18))])
+def test_real_maps(tmp_path: Path, name: str, counts: tuple[int, int, int, int]) -> None:
     made = convert_xodr(REAL / f"{name}.xodr", tmp_path)
     problems: list[str] = []
     network = Network(name, read_geojson(made, lambda identifier, problem: problems.append(problem)))
     assert not problems
-    assert (len(network.roads), len(network.lanes), len(network.intersections)) == counts
+    signals = sum(crossing.properties["signalized"] for crossing in network.intersections)
+    assert (len(network.roads), len(network.lanes), len(network.intersections), signals) == counts
     assert all(lane.successors for lane in network.lanes if lane.maneuvers)
 
 
