@@ -6,6 +6,7 @@ import runpy
 from pathlib import Path
 
 import pyarrow.parquet as pq
+import pytest
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 
@@ -15,7 +16,8 @@ def content(path: Path) -> object:
     return pq.read_table(path).to_pylist() if path.suffix == ".parquet" else path.read_bytes()
 
 
-def test_generators_write_what_is_there(tmp_path: Path) -> None:
+def test_generators_write_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(SAMPLES)
     for script in ("generate.py", "generate_nuscenes.py", "generate_formats.py"):
         runpy.run_path(str(SAMPLES / script))["main"](tmp_path)
     names = sorted(path.name for path in tmp_path.iterdir())
