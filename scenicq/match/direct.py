@@ -25,6 +25,8 @@ from scenicq.store.labels import Label
 __all__ = ["Casting", "Direct", "direct_of", "signature_of"]
 
 _MOST_DECISIONS = 64
+_MORE_DECISIONS = 16
+"""For each role: what is given up costs as much as half a search at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +72,6 @@ class Casting:
         among: The candidates.
         disc: The area that is looked at.
         places: What is known of places.
-        left: Decisions that may still be taken.
         words: Whether it also tells what keeps the label from matching: for a narrow miss `Attempt` looks at all
             candidates.
         failure: What excluded the correspondence that came furthest.
@@ -83,10 +84,10 @@ class Casting:
     among: Among
     disc: Disc | None
     places: Places
-    left: int = _MOST_DECISIONS
     words: bool = True
     failure: Failure | None = None
     assignment: dict[int, int] = field(default_factory=dict["int", "int"])
+    _left: int = 0
     _seen: dict[int, Mapping[str, Value]] = field(default_factory=dict["int", "Mapping[str, Value]"])
 
     def get(self, index: int, name: str) -> Value:
@@ -99,9 +100,9 @@ class Casting:
 
     def _passes(self, group: GroupPlan) -> Yes | None:
         """How a group is satisfied; None, with what failed furthest kept, if it is not."""
-        self.left -= 1
+        self._left -= 1
         outcome = None
-        if self.left >= 0 and group.quick is not None:
+        if self._left >= 0 and group.quick is not None:
             outcome = group.quick.decide(self.get, self.disc, self.options.tolerance, self.places)
         if outcome is None or group.quick is None:
             raise UnclearError
@@ -118,6 +119,7 @@ class Casting:
         """The first correspondence in the order of the program, or what kept all from matching; None if unclear."""
         found: dict[int, Yes] = {}
         self.assignment[self.ego] = 0
+        self._left = _MOST_DECISIONS + _MORE_DECISIONS * len(self.direct.due)
         try:
             for group in self.direct.ego_only:
                 outcome = self._passes(group)

@@ -95,22 +95,19 @@ class Matcher:
             among: What is known of who may play whom.
             places: What is known of places of the map; see `look_up`.
         """
-        if reporter is None:
-            found = self._direct(label, given or {}, among, places or Places())
+        if reporter is None and not given:
+            found = self._direct(label, among, places or Places())
             if found is not None:
                 return found
         return next(self._findings(label, reporter, given or {}, among, places)).verdict
 
-    def _direct(
-        self, label: Label, given: Mapping[str, str], among: Among | None, places: Places
-    ) -> Match | NoMatch | None:
+    def _direct(self, label: Label, among: Among | None, places: Places) -> Match | NoMatch | None:
         """What is found without a search, if it is clear."""
         options = self.options
         if options.method != "auto" or options.exact or options.ego != "label" or not label.has_ego:
             return None
         ego = self.scenario.ego
-        alone = among is not None and not given
-        roles = among if among is not None and alone else candidates_of(self.scenario, label, 0, options, given, among)
+        roles = candidates_of(self.scenario, label, 0, options, {}) if among is None else among
         signature = signature_of(label, ego, roles, self._relevant)
         if signature is None:
             return None
@@ -125,7 +122,7 @@ class Matcher:
         found = casting.solve()
         if isinstance(found, Failure):
             # of roles that nothing is known of there may be too few candidates, which comes first
-            if not (alone and direct.words and casting.words):
+            if among is None or not (direct.words and casting.words):
                 return None
             return NoMatch(self._cause(found), self._names(label, 0, found.assignment))
         return None if found is None else self._match(label, 0, found)
