@@ -101,6 +101,7 @@ class _Reader:
     scenario: Scenario
     options: MatchOptions
     names: RegionNames
+    road: RoadDirection
     bounds: dict[tuple[int, ...], Bounds] = field(default_factory=dict["tuple[int, ...]", "Bounds"])
 
     def of(self, objects: tuple[int, ...]) -> Bounds:
@@ -269,7 +270,7 @@ class _Reader:
             isinstance(point, Feature)
             and (point.object, point.property) == (index, "position")
             and isinstance(field_, Constant)
-            and isinstance(field_.value, RoadDirection)
+            and field_.value is self.road
         )
 
     # --- requirements
@@ -325,7 +326,7 @@ def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> I
     """
     if any(thing.mutated for thing in scenario.objects):
         return  # noise of any size hides where things are
-    reader = _Reader(scenario, options, RegionNames.of(network))
+    reader = _Reader(scenario, options, RegionNames.of(network), network.roadDirection)
     for thing in scenario.objects:
         named: Mapping[str, Node] = {name: given.value for name, given in thing.properties.items()}
         compared = [name for name in ("position", "heading") if name in named]

@@ -11,11 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from shapely.geometry import LineString
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.standin import street
 from scenicq.errors import Source
 from scenicq.forest.improvise import draw_scene
+from scenicq.geometry.features import MapFeature
+from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions, Tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.plan import Plan, make_plan
@@ -249,3 +252,21 @@ def test_processes_are_started_once_it_is_clear_that_it_takes_long(dataset, pays
     assert processes[0] == 0
     assert max(processes) == (2 if pays else 0)
     assert len(processes) == dataset.manifest.total.frames
+
+
+def test_a_field_that_is_not_the_direction_of_roads_is_not_taken_for_it(tmp_path):
+    """The store keeps the direction of roads for each object; a curb may run otherwise."""
+    slanted = MapFeature("slanted", "curb", LineString([(0.5, 30.0), (3.2, 40.0)]), {})
+    features = [each for each in STREET.features if each.kind != "curb"] + [slanted]
+    text = "ego = new Car on curb"
+    scenario = compile_scenario(Source("test.scenic", HEADER + text), Network("street", features))
+    rng = random.Random(4)
+    scenes = [draw_scene(scenario, rng) for _ in range(5)]
+    labels = [replace(label_of(scenario, scene, rng), frame=f"{n}", timestamp_us=n) for n, scene in enumerate(scenes)]
+    assert all(abs(abs(label.ego.heading) - math.atan2(2.7, 10.0)) < 1e-9 for label in labels)
+    recording = Recording("recording", "street", tuple(labels))
+    write_dataset(tmp_path / "dataset", iter([recording]), {"street": features}, name="t")
+    dataset = open_dataset(tmp_path / "dataset")
+    with_it, without = (found(dataset, text, MatchOptions(), prefilter=each)[0] for each in (True, False))
+    assert with_it == without
+    assert len(with_it) == 5
