@@ -6,6 +6,7 @@ Subcommands are imported when they are called, so that `--help` and `--version` 
 from __future__ import annotations
 
 import difflib
+import gc
 import os
 import sys
 import tempfile
@@ -62,6 +63,7 @@ class Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
+        gc.enable()
         command: click.Command = getattr(module, cmd_name)
         return command
 
@@ -156,4 +158,6 @@ def main() -> None:
     INTERRUPTS.heed()
     # work is shared out among processes: threads for linear algebra would only take their time to start
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # until the subcommand is loaded there is no garbage to be looked for
+    gc.disable()
     cli(prog_name="scenicq")

@@ -11,6 +11,7 @@ as in these, as in Scenic; here the border is a polygon, so that the plane falls
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -131,15 +132,32 @@ class Occupancy:
         pairs = np.unique(both, axis=0)
         return pairs[:, 0].astype(np.intp), pairs[:, 1]
 
-    def pieces_near(self, bounds: Bounds) -> list[Piece]:
-        """Convex pieces of all areas and their borders within a box, each once for each area that it belongs to."""
+    def pieces_near(self, bounds: Bounds, number: int | None = None) -> list[Piece]:
+        """Convex pieces of all areas and their borders within a box, each once for each area that it belongs to.
+
+        Args:
+            bounds: The box.
+            number: Of the option whose areas are wanted; all if None.
+        """
         box = _box(bounds)
         return [
             piece
             for level, tree in enumerate(self._trees)
             for hit in np.sort(shapes.tree_within(tree, box, 2 * TOLERANCE)).tolist()
+            if number is None or self.layers[level][hit][1] == number
             for piece in self._pieces_of(level, hit)
         ]
+
+    @cached_property
+    def extents(self) -> NDArray[np.float64]:
+        """Of each number the box around all points that have the option, (n, 4); the plane for no option at all."""
+        found = np.full((self.nothing + 1, 4), (np.inf, np.inf, -np.inf, -np.inf))
+        for area, number, _ in itertools.chain.from_iterable(self.layers):
+            box = np.array(shapes.bounds_of(area))
+            found[number, :2] = np.minimum(found[number, :2], box[:2] - TOLERANCE)
+            found[number, 2:] = np.maximum(found[number, 2:], box[2:] + TOLERANCE)
+        found[self.nothing] = (-np.inf, -np.inf, np.inf, np.inf)
+        return found
 
     def outside(self, bounds: Bounds) -> list[Corners]:
         """Convex pieces of what lies in no area within a box."""
@@ -273,6 +291,14 @@ class Ranked:
         owner, number = self.options.near(boxes)
         return owner, number / self.options.scale
 
+    def cells_of(self, heading: float, bounds: Bounds) -> list[FieldCell]:
+        """Convex cells that hold every point within the bounds that has the option of an angle."""
+        number = round(heading * self.options.scale)
+        if number == self.options.nothing:
+            return self.cells(bounds)
+        pieces = self.options.pieces_near(bounds, number)
+        return [FieldCell(piece.corners, heading, exact=True) for piece in pieces if self._is_meant(piece)]
+
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every point with its option within the bounds."""
         if bounds not in self._cells:
@@ -286,10 +312,13 @@ class Ranked:
         cells = [
             FieldCell(piece.corners, piece.number / scale, exact=True)
             for piece in options.pieces_near(bounds)
-            if piece.found[self.rank % len(piece.found)] == piece.number
+            if self._is_meant(piece)
         ]
         beside = options.outside(bounds)
         return cells + [FieldCell(corners, options.nothing / scale, exact=True) for corners in beside]
+
+    def _is_meant(self, piece: Piece) -> bool:
+        return piece.found[self.rank % len(piece.found)] == piece.number
 
     @cached_property
     def _cells(self) -> dict[Bounds, list[FieldCell]]:

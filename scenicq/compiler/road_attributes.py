@@ -162,7 +162,7 @@ _UNKNOWN: dict[str, tuple[type | tuple[type, ...], str]] = {
     "startSidewalk": (PedestrianCrossing, "which sidewalks a crossing joins"),
     "endSidewalk": (PedestrianCrossing, "which sidewalks a crossing joins"),
     "parent": (PedestrianCrossing, "what a crossing belongs to"),
-    "centerline": ((PedestrianCrossing, Sidewalk, Shoulder), "the centrelines of sidewalks, shoulders and crossings"),
+    "centerline": (PedestrianCrossing, "the centrelines of crossings"),
     "vehicleTypes": (NetworkElement, "which vehicles may use a lane"),
 }
 _REFUSED: dict[str, tuple[type | tuple[type, ...], str]] = {

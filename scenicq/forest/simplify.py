@@ -8,7 +8,7 @@ it is (`Scenario.as_written`).
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import cast
 
@@ -48,14 +48,13 @@ def simplify(scenario: Scenario) -> Scenario:
     uses = Counter(id(child) for node in postorder(roots) for child in set(children(node)))
     uses.update(id(root) for root in roots)
 
+    def by_chance(pick: Select) -> bool:
+        return isinstance(pick.index, Index) and uses[id(pick.index)] == 1 and uses[id(pick)] == 1
+
     def step(node: Node) -> Node:
-        if not (isinstance(node, PointIn) and isinstance(node.region, Select)):
+        if not (isinstance(node, PointIn) and isinstance(node.region, Select) and by_chance(node.region)):
             return node
-        pick = node.region
-        if not isinstance(pick.index, Index) or uses[id(pick.index)] > 1 or uses[id(pick)] > 1:
-            return node
-        # an option without a value, such as the lane where there is none, has no points
-        options = tuple(option for option in pick.options if not _is_undefined(option))
+        pick, options = node.region, tuple(_alternatives(node.region, by_chance))
         if not options:
             return node
         if all(isinstance(option, Constant) for option in options):
@@ -65,6 +64,18 @@ def simplify(scenario: Scenario) -> Scenario:
 
     memo: dict[int, Node] = {}
     return rebuilt(scenario, lambda node: transform(node, step, memo))
+
+
+def _alternatives(pick: Select, by_chance: Callable[[Select], bool]) -> Iterator[Node]:
+    """The options of a pick in order, those of picks among them too."""
+    todo: list[Node] = [pick]
+    while todo:
+        node = todo.pop()
+        if isinstance(node, Select) and by_chance(node):
+            todo += reversed(node.options)
+        elif not _is_undefined(node):
+            # an option without a value, such as the lane where there is none, has no points
+            yield node
 
 
 def rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import assert_never
+from typing import assert_never, cast
 
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -41,7 +42,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 
-__all__ = ["children", "features", "is_leaf", "leaves", "postorder", "rebuild", "transform"]
+__all__ = ["children", "deciding_first", "features", "is_leaf", "leaves", "postorder", "rebuild", "transform"]
 
 
 def is_leaf(node: Node) -> bool:
@@ -218,6 +219,25 @@ def _known_numbers(index: Node) -> list[int] | None:
 def leaves(*roots: Node) -> tuple[Leaf, ...]:
     """The random variables under the roots, each once, in order of first use."""
     return tuple(node for node in postorder(roots) if is_leaf(node))  # type: ignore[misc]
+
+
+def deciding_first(roots: Sequence[Node]) -> Iterator[Leaf]:
+    """The random variables under the roots; those that decide which others matter before these."""
+    seen: set[int] = set()
+    todo: deque[Node] = deque(roots)
+    while todo:
+        node = todo.popleft()
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        if is_leaf(node):
+            yield cast(Leaf, node)
+        below = list(children(node))
+        if isinstance(node, Select):
+            todo.appendleft(below[0])
+            todo.extend(below[1:])
+        else:
+            todo.extendleft(reversed(below))
 
 
 def features(*roots: Node) -> frozenset[tuple[int, str]]:

@@ -274,12 +274,24 @@ class PedestrianCrossing(NetworkElement):
 
 @dataclass(eq=False)
 class Sidewalk(NetworkElement):
-    """A sidewalk."""
+    """A sidewalk.
+
+    Attributes:
+        centerline: Polylines in the direction of the road, or None where the map gives none.
+    """
+
+    centerline: PolylineSet | None = field(default=None, repr=False, kw_only=True)
 
 
 @dataclass(eq=False)
 class Shoulder(NetworkElement):
-    """A shoulder of a road."""
+    """A shoulder of a road.
+
+    Attributes:
+        centerline: Polylines in the direction of traffic, or None where the map gives none.
+    """
+
+    centerline: PolylineSet | None = field(default=None, repr=False, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

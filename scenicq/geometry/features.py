@@ -70,7 +70,7 @@ def dangling(features: Iterable[MapFeature]) -> list[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     for feature in features:
         for key, kind in REFERENCES.get(feature.kind, {}).items():
-            for name in names(feature, key):
+            for name in names(feature, key) if key in feature.properties else ():
                 if kinds.get(name) != kind and not (kind == "lane_section" and kinds.get(name) == "lane"):
                     what = f"is a {kinds[name]}, not a {kind}" if name in kinds else "is not in the map"
                     found.append((feature.id, f"`{key}` of {feature.kind} `{feature.id}`: `{name}` {what}"))
@@ -92,9 +92,11 @@ def read_geojson(source: str | Path | Mapping[str, Any], on_problem: ProblemSink
     if not isinstance(collection, list):
         raise DataError(Diagnostic("file-invalid", f"{where}: not a GeoJSON feature collection"))
     found: dict[str, MapFeature] = {}
-    for number, entry in enumerate(cast("list[Any]", collection)):
+    entries = cast("list[Any]", collection)
+    known = shapes.plain_polygons([_object(entry).get("geometry") for entry in entries])
+    for number, entry in enumerate(entries):
         try:
-            feature = _feature(entry)
+            feature = _feature(entry, known[number])
         except _UnsoundError as unsound:
             on_problem(unsound.id, f"feature {number + 1}: {unsound}")
             continue
@@ -123,7 +125,7 @@ def _load(path: Path) -> Any:
         raise DataError(Diagnostic("file-invalid", f"{path}: not readable as JSON ({error})")) from error
 
 
-def _feature(entry: Any) -> MapFeature:
+def _feature(entry: Any, known: Shape | None) -> MapFeature:
     properties = _object(_object(entry).get("properties"))
     if not properties:
         raise _UnsoundError("", "it has no properties")
@@ -133,7 +135,9 @@ def _feature(entry: Any) -> MapFeature:
     identifier = str(identifier)
     if not isinstance(kind, str) or not kind:
         raise _UnsoundError(identifier, "it has no kind")
-    shape = _shape(identifier, kind, _object(entry).get("geometry"))
+    shape = known
+    if shape is None or kind == "curb":
+        shape = _shape(identifier, kind, _object(entry).get("geometry"))
     rest = {key: value for key, value in properties.items() if key not in ("id", "kind")}
     if "centerline" in rest:
         rest["centerline"] = _centerline(identifier, rest["centerline"])
@@ -145,7 +149,7 @@ def _feature(entry: Any) -> MapFeature:
 
 def _object(value: Any) -> Mapping[str, Any]:
     """A JSON object, or an empty one in place of anything else."""
-    return cast("Mapping[str, Any]", value) if isinstance(value, Mapping) else {}
+    return cast("Mapping[str, Any]", value) if isinstance(value, dict | Mapping) else {}
 
 
 def _is_reference(value: Any) -> bool:

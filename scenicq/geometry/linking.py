@@ -9,6 +9,7 @@ from typing import Any, TypeVar, cast
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
+from scenicq.geometry.centerlines import centerlines, direction_along
 from scenicq.geometry.elements import (
     Curb,
     Intersection,
@@ -27,7 +28,7 @@ from scenicq.geometry.features import MapFeature, names
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import PolylineSet
 
-__all__ = ["Elements", "centerlines", "link"]
+__all__ = ["Elements", "link"]
 
 _Element = TypeVar("_Element", bound=NetworkElement)
 
@@ -45,12 +46,6 @@ class Elements:
     sidewalks: dict[str, Sidewalk] = field(default_factory=dict[str, Sidewalk])
     shoulders: dict[str, Shoulder] = field(default_factory=dict[str, Shoulder])
     curbs: dict[str, Curb] = field(default_factory=dict[str, Curb])
-
-
-def centerlines(feature: MapFeature) -> tuple[LineString, ...]:
-    """The polylines of a feature's centreline, in the direction of travel."""
-    lines = cast("list[list[list[float]]]", feature.properties.get("centerline") or [])
-    return tuple(LineString(line) for line in lines if len(line) > 1)
 
 
 def link(features: Sequence[MapFeature], direction: VectorField) -> Elements:
@@ -102,15 +97,17 @@ def _make(feature: MapFeature, direction: VectorField, elements: Elements) -> No
         case "crossing":
             elements.crossings[feature.id] = PedestrianCrossing(*plain)
         case "sidewalk":
-            elements.sidewalks[feature.id] = Sidewalk(*plain)
+            own = direction_along([feature], "sidewalk")
+            elements.sidewalks[feature.id] = Sidewalk(*plain, own, centerline=_centerline(feature, own))
         case "shoulder":
-            elements.shoulders[feature.id] = Shoulder(*directed)
+            own = direction_along([feature], "shoulder") or direction
+            elements.shoulders[feature.id] = Shoulder(*plain, own, centerline=_centerline(feature, own))
         case _:
             pass
 
 
 def _centerline(feature: MapFeature, direction: VectorField | None) -> PolylineSet | None:
-    lines = centerlines(feature)
+    lines = tuple(LineString(line) for line in centerlines(feature))
     return PolylineSet(lines, f"centerline of {feature.id}", direction) if lines else None
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from shapely.geometry import MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
+from scenicq.geometry.centerlines import direction_along, road_direction
 from scenicq.geometry.curbs import right_edges
 from scenicq.geometry.elements import (
     Curb,
@@ -32,9 +33,9 @@ from scenicq.geometry.elements import (
 )
 from scenicq.geometry.features import MapFeature, dangling, read_geojson
 from scenicq.geometry.fields import VectorField
-from scenicq.geometry.linking import centerlines, link
+from scenicq.geometry.linking import link
 from scenicq.geometry.regions import SLACK, PolygonSet, PolylineSet, Region
-from scenicq.geometry.road_direction import DirectedLane, RoadDirection, along_lines
+from scenicq.geometry.road_direction import along_lines
 
 __all__ = ["MapFeature", "Network", "read_geojson"]
 
@@ -66,14 +67,7 @@ class Network:
         self.name = name
         self.features = tuple(kept.values())
         self.problems = (*problems, *(message for _, message in dangling(self.features)))
-        self.roadDirection = RoadDirection(
-            tuple(
-                DirectedLane(feature.shape, tuple(shapes.coordinates(line) for line in centerlines(feature)))
-                for feature in self.features
-                if feature.kind == "lane"
-            ),
-            tuple(feature.shape for feature in self.features if feature.kind == "intersection"),
-        )
+        self.roadDirection = road_direction(self.features)
         found = link(self.features, self.roadDirection)
         self.lanes: tuple[Lane, ...] = tuple(found.lanes.values())
         self.laneSections: tuple[LaneSection, ...] = tuple(found.sections.values())
@@ -131,12 +125,13 @@ class Network:
     @cached_property
     def sidewalkRegion(self) -> PolygonSet:
         """All sidewalks."""
-        return self._region("sidewalk", ("sidewalk",), None)
+        return self._region("sidewalk", ("sidewalk",), direction_along(self.features, "sidewalk"))
 
     @cached_property
     def shoulderRegion(self) -> PolygonSet:
         """All shoulders."""
-        return self._region("shoulder", ("shoulder",), self.roadDirection)
+        along = direction_along(self.features, "shoulder")
+        return self._region("shoulder", ("shoulder",), along or self.roadDirection)
 
     @cached_property
     def curbRegion(self) -> PolylineSet:
@@ -157,7 +152,8 @@ class Network:
     @cached_property
     def walkableRegion(self) -> PolygonSet:
         """Sidewalks and crossings."""
-        return self._region("walkable", ("sidewalk", "crossing"), None)
+        along = None if self.crossings else direction_along(self.features, "sidewalk")
+        return self._region("walkable", ("sidewalk", "crossing"), along)
 
     def region(self, kind: str) -> Region | None:
         """The region of all features of a kind, or None if the map has none."""

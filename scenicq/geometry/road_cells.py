@@ -20,7 +20,7 @@ from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.guards import Guard, Nearer, segment_distances
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["Contest", "lane_cells"]
+__all__ = ["Contest", "Outline", "convex_outlines", "segment_cells"]
 
 _SMALLEST = 1e-10
 """Square metres below which a cell is a rounding error."""
@@ -30,7 +30,8 @@ _OVERLAP = 1e-6
 _LOST = 1e-5
 """Square metres that joining cells may lose or gain by rounding coordinates."""
 
-_Outline = list[tuple[float, float]]
+Outline = list[tuple[float, float]]
+"""Corners of a convex piece, counter-clockwise."""
 _HalfPlane = tuple[float, float, float]  # a x + b y >= c
 
 
@@ -49,31 +50,38 @@ class Contest:
     headings: NDArray[np.float64]
 
 
-def lane_cells(
-    area: Shape, segments: NDArray[np.float64], headings: NDArray[np.float64], contests: Sequence[Contest] = ()
+def convex_outlines(area: Shape) -> list[Outline]:
+    """The polygon of a lane in convex pieces."""
+    return [_outline(part) for piece in shapes.polygonal_part(area) for part in convex_parts(piece)]
+
+
+def segment_cells(
+    whole: Sequence[Outline],
+    segments: NDArray[np.float64],
+    headings: NDArray[np.float64],
+    index: int,
+    contests: Sequence[Contest] = (),
 ) -> list[FieldCell]:
-    """Cells of a lane.
+    """The cells of a lane in which one segment is the nearest.
 
     Args:
-        area: The lane's polygon.
+        whole: The lane in convex pieces.
         segments: Its centreline, (n, 4) rows x0, y0, x1, y1 of positive length.
         headings: Of the segments, (n,).
+        index: Which segment.
         contests: The lanes that overlap it, outside of intersections.
     """
+    # near segments cut most
+    order = np.argsort(np.abs(np.arange(len(segments)) - index), kind="stable")
+    others = order[headings[order] != headings[index]]
+    pieces = [part for outline in whole for part in _nearest(_Piece(outline), segments, index, others)]
+    rivals = sorted({rival for piece in pieces for rival in piece.rivals})
     cells: list[FieldCell] = []
-    whole = [_outline(part) for piece in shapes.polygonal_part(area) for part in convex_parts(piece)]
-    for index, segment in enumerate(segments):
-        # near segments cut most
-        order = sorted(range(len(segments)), key=lambda other: abs(other - index))
-        pieces = [_Piece(outline) for outline in whole]
-        for other in order:
-            if headings[other] != headings[index]:
-                pieces = [part for piece in pieces for part in _nearer(piece, segment, segments[other], other)]
-        rivals = sorted({rival for piece in pieces for rival in piece.rivals})
-        for exact in (True, False):
-            outlines = [piece.outline for piece in pieces if (not piece.rivals) == exact]
-            guards = () if exact else (Nearer(segment[None], segments[rivals]),)
-            cells += [_contested(part, float(headings[index]), guards, segment, contests) for part in _joined(outlines)]
+    for exact in (True, False):
+        outlines = [piece.outline for piece in pieces if (not piece.rivals) == exact]
+        guards = () if exact else (Nearer(segments[index][None], segments[rivals]),)
+        for part in _joined(outlines):
+            cells.append(_contested(part, float(headings[index]), guards, segments[index], contests))
     return cells
 
 
@@ -96,11 +104,11 @@ def _contested(
 class _Piece:
     """A convex outline, and the segments against which it covers too much."""
 
-    outline: _Outline
+    outline: Outline
     rivals: frozenset[int] = frozenset()
 
 
-def _joined(outlines: list[_Outline]) -> list[NDArray[np.float64]]:
+def _joined(outlines: list[Outline]) -> list[NDArray[np.float64]]:
     """The same area in fewer pieces."""
     plain = [np.array(outline) for outline in outlines]
     if len(outlines) <= 1:
@@ -112,17 +120,28 @@ def _joined(outlines: list[_Outline]) -> list[NDArray[np.float64]]:
     return joined if abs(lost) < _LOST and len(joined) < len(plain) else plain
 
 
+def _nearest(whole: _Piece, segments: NDArray[np.float64], index: int, others: NDArray[np.intp]) -> Iterator[_Piece]:
+    """The parts of a piece that are at least as near to one segment as to some others."""
+    todo = [(whole, others)]
+    while todo:
+        piece, rivals = todo.pop()
+        corners = np.array(piece.outline)
+        own = segment_distances(corners, segments[index])
+        away = segment_distances(corners[:, None], segments[rivals])
+        # the distance to a convex set is convex, with slope 1: greatest at a corner, not much less than at a corner
+        span = float(np.hypot(*(corners.max(axis=0) - corners.min(axis=0))))
+        if (own.min() - span > away.max(axis=0)).any():
+            continue
+        left = rivals[own.max() > away.min(axis=0) - span]
+        if len(left):
+            parts = list(_nearer(piece, segments[index], segments[left[0]], int(left[0])))
+            todo += [(part, left[1:]) for part in reversed(parts)]
+        else:
+            yield piece
+
+
 def _nearer(piece: _Piece, segment: NDArray[np.float64], rival: NDArray[np.float64], number: int) -> Iterator[_Piece]:
     """The parts of a piece that are at least as near to the segment as to the rival of a number."""
-    corners = np.array(piece.outline)
-    own, other = segment_distances(corners, segment), segment_distances(corners, rival)
-    # the distance to a convex set is convex, with slope 1: greatest at a corner, and not much less than at a corner
-    span = float(np.hypot(*(corners.max(axis=0) - corners.min(axis=0))))
-    if own.max() <= other.min() - span:
-        yield piece
-        return
-    if own.min() - span > other.max():
-        return
     for zone, near in _zones(piece.outline, segment):
         for part, far in _zones(zone, rival):
             found, sharp = _compared(part, near, far)
@@ -130,7 +149,7 @@ def _nearer(piece: _Piece, segment: NDArray[np.float64], rival: NDArray[np.float
             yield from (_Piece(cut, rivals) for cut in found if _area(cut) > _SMALLEST)
 
 
-def _zones(piece: _Outline, segment: NDArray[np.float64]) -> Iterator[tuple[_Outline, tuple[float, ...]]]:
+def _zones(piece: Outline, segment: NDArray[np.float64]) -> Iterator[tuple[Outline, tuple[float, ...]]]:
     """A piece cut into what lies before, beside and behind a segment, each with the end point or line to measure to.
 
     A point is (x, y); a line is (a, b, c) with distance |a x + b y - c|.
@@ -149,7 +168,7 @@ def _zones(piece: _Outline, segment: NDArray[np.float64]) -> Iterator[tuple[_Out
             yield part, target
 
 
-def _compared(piece: _Outline, near: tuple[float, ...], far: tuple[float, ...]) -> tuple[list[_Outline], bool]:
+def _compared(piece: Outline, near: tuple[float, ...], far: tuple[float, ...]) -> tuple[list[Outline], bool]:
     """The parts of a piece at least as near to one point or line as to another, and whether exactly these."""
     if len(near) == 2 and len(far) == 2:
         dx, dy = near[0] - far[0], near[1] - far[1]
@@ -158,7 +177,7 @@ def _compared(piece: _Outline, near: tuple[float, ...], far: tuple[float, ...]) 
         middle = (near[0] + far[0]) / 2 * dx + (near[1] + far[1]) / 2 * dy
         return [_clip(piece, [(dx, dy, middle)])], True
     if len(near) == 3 and len(far) == 3:
-        found: list[_Outline] = []
+        found: list[Outline] = []
         (a, b, c), (d, e, f) = near, far
         for sign in (1.0, -1.0):
             side = (sign * d, sign * e, sign * f)
@@ -175,7 +194,7 @@ def _compared(piece: _Outline, near: tuple[float, ...], far: tuple[float, ...]) 
     return [piece], own[1] <= other[0]
 
 
-def _range(piece: _Outline, target: tuple[float, ...]) -> tuple[float, float]:
+def _range(piece: Outline, target: tuple[float, ...]) -> tuple[float, float]:
     """Least and greatest distance from a piece to a point or a line."""
     if len(target) == 2:
         away = [math.dist(corner, target) for corner in piece]
@@ -185,14 +204,14 @@ def _range(piece: _Outline, target: tuple[float, ...]) -> tuple[float, float]:
     return max(min(signed), -max(signed), 0.0), max(map(abs, signed))
 
 
-def _clip(piece: _Outline, planes: list[_HalfPlane]) -> _Outline:
+def _clip(piece: Outline, planes: list[_HalfPlane]) -> Outline:
     """A convex outline cut by half planes."""
     for a, b, c in planes:
         # what misses by rounding alone counts as on the border: segments that coincide tie everywhere
         depths = [0.0 if abs(depth := a * x + b * y - c) <= _ON_LINE else depth for x, y in piece]
         if min(depths, default=0.0) >= 0.0:
             continue
-        kept: _Outline = []
+        kept: Outline = []
         for index, (x, y) in enumerate(piece):
             before = depths[index - 1]
             if before * depths[index] < 0.0:
@@ -205,9 +224,9 @@ def _clip(piece: _Outline, planes: list[_HalfPlane]) -> _Outline:
     return piece
 
 
-def _outline(corners: NDArray[np.float64]) -> _Outline:
+def _outline(corners: NDArray[np.float64]) -> Outline:
     return [(float(x), float(y)) for x, y in corners]
 
 
-def _area(piece: _Outline) -> float:
+def _area(piece: Outline) -> float:
     return 0.5 * sum(piece[i - 1][0] * y - piece[i - 1][1] * x for i, (x, y) in enumerate(piece))

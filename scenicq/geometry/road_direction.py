@@ -21,7 +21,7 @@ from scenicq.geometry.angles import heading_of_array
 from scenicq.geometry.cells import joined_boxes
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.guards import Guard, Nearer, Off, Within, segment_distances
-from scenicq.geometry.road_cells import Contest, lane_cells
+from scenicq.geometry.road_cells import Contest, Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
 __all__ = ["DirectedLane", "RoadDirection", "along_lines"]
@@ -114,7 +114,7 @@ class RoadDirection:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes stay whole."""
         box = shapes.box(*bounds)
         near = np.sort(shapes.tree_query(self._tree, box)).tolist()
-        return [cell for lane in near for cell in self._lane_cells(lane)] + self._surroundings(bounds)
+        return [cell for lane in near for cell in self._lane_cells(lane, bounds)] + self._surroundings(bounds)
 
     @cached_property
     def _directed(self) -> tuple[tuple[Shape, NDArray[np.float64]], ...]:
@@ -143,7 +143,13 @@ class RoadDirection:
         return segments, heading_of_array(along[:, 0], along[:, 1]), starts
 
     @cached_property
-    def _cells_of(self) -> dict[int, list[FieldCell]]:
+    def _cells_of(self) -> dict[tuple[int, int], list[FieldCell]]:
+        """Of each lane and segment that were asked for."""
+        return {}
+
+    @cached_property
+    def _lanes_known(self) -> dict[int, tuple[list[Outline], list[Contest]]]:
+        """Of each lane that was asked for the convex pieces, and what overlaps it."""
         return {}
 
     def _values(self, xy: Coordinates) -> list[tuple[float, ...]]:
@@ -218,14 +224,22 @@ class RoadDirection:
         nearest = (least[point] <= REACH) & (away <= least[point] + _TIE)
         return point[nearest], lane[nearest]
 
-    def _lane_cells(self, lane: int) -> list[FieldCell]:
-        found = self._cells_of.get(lane)
-        if found is None:
-            _, headings, starts = self._all
-            area, segments = self._directed[lane]
-            own = headings[starts[lane] : starts[lane + 1]]
-            self._cells_of[lane] = found = lane_cells(area, segments, own, list(self._contests(lane)))
-        return found
+    def _lane_cells(self, lane: int, bounds: Bounds) -> Iterator[FieldCell]:
+        """The cells of the segments of a lane that can be the nearest of it somewhere within the bounds."""
+        _, headings, starts = self._all
+        area, segments = self._directed[lane]
+        west, south, east, north = bounds
+        gap = segment_distances(np.array([(west + east) / 2, (south + north) / 2]), segments)
+        near = np.nonzero(gap <= gap.min() + math.hypot(east - west, north - south) + _TIE)[0].tolist()
+        for index in near:
+            found = self._cells_of.get((lane, index))
+            if found is None:
+                if lane not in self._lanes_known:
+                    self._lanes_known[lane] = convex_outlines(area), list(self._contests(lane))
+                outlines, contests = self._lanes_known[lane]
+                own = headings[starts[lane] : starts[lane + 1]]
+                found = self._cells_of[lane, index] = segment_cells(outlines, segments, own, index, contests)
+            yield from found
 
     def _contests(self, lane: int) -> Iterator[Contest]:
         """The lanes that overlap a lane outside of intersections: there, another lane's segment may be nearer."""

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -278,6 +279,41 @@ def from_geojson(geometry: dict[str, Any]) -> Shape:
         return shapely.force_2d(shape_of(geometry))
     except shapely.errors.ShapelyError as error:
         raise ValueError(str(error)) from error
+
+
+def plain_polygons(geometries: Sequence[Any]) -> list[Shape | None]:
+    """What `from_geojson` makes of the plain ones among JSON values, all at once; None for every other.
+
+    Plain is a valid polygon of one closed ring of finite coordinates in pairs.
+    """
+    found: list[Shape | None] = [None] * len(geometries)
+    rings = {place: ring for place, given in enumerate(geometries) if (ring := _plain_ring(given)) is not None}
+    numbers = list(chain.from_iterable(chain.from_iterable(rings.values())))
+    if not rings or not {*map(type, numbers)} <= {int, float}:
+        return found
+    try:
+        corners = np.array(numbers, dtype=float).reshape(-1, 2)
+    except OverflowError:
+        return found
+    if np.isfinite(corners).all():
+        owner = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings.values()])
+        made = np.asarray(shapely.polygons(shapely.linearrings(corners, indices=owner)))
+        sound = np.asarray(shapely.is_valid(made))
+        for place, shape, valid in zip(rings, made.tolist(), sound.tolist(), strict=True):
+            found[place] = shape if valid else None
+    return found
+
+
+def _plain_ring(geometry: Any) -> list[list[Any]] | None:
+    """The only ring of a polygon if it is closed and all its positions are pairs."""
+    if type(geometry) is not dict or geometry.get("type") != "Polygon":
+        return None
+    rings = geometry.get("coordinates")
+    if type(rings) is not list or len(rings) != 1 or type(rings[0]) is not list or len(rings[0]) < 4:
+        return None
+    ring = rings[0]
+    pairs = {*map(type, ring)} == {list} and {*map(len, ring)} == {2}
+    return ring if pairs and ring[0] == ring[-1] else None
 
 
 def is_finite(shape: Shape) -> bool:

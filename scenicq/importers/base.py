@@ -258,12 +258,14 @@ def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapF
     for name in sorted(files):
         problems: list[tuple[str, str]] = []
         features = read_geojson(files[name], _collector(problems))
-        references = set(dangling(features))
+        references = set(dangling(features)) if problems else set[tuple[str, str]]()
         for problem in problems:
             message = f"{files[name].name}: element `{problem[0]}`: {problem[1]}"
             tell = report.kept if problem in references else report.left_out
             tell("map element", "map-invalid", message)
-        maps[name] = tuple(feature for feature in features if _storable(feature, files[name].name, report))
+        if not _storable(features):
+            features = tuple(_storable_of(features, files[name].name, report))
+        maps[name] = features
     return maps
 
 
@@ -271,13 +273,29 @@ def _collector(problems: list[tuple[str, str]]) -> ProblemSink:
     return lambda id, problem: problems.append((id, problem))
 
 
-def _storable(feature: MapFeature, file: str, report: Report) -> bool:
+def _storable(features: Sequence[MapFeature]) -> bool:
     try:
-        check_characters([feature.id, feature.kind, dict(feature.properties)])
-    except InvalidError as error:
-        report.left_out("map element", "map-invalid", f"{file}: element {feature.id!a}: {error}")
+        check_characters([_texts(feature) for feature in features])
+    except InvalidError:
         return False
     return True
+
+
+def _storable_of(features: Sequence[MapFeature], file: str, report: Report) -> Iterator[MapFeature]:
+    """Those whose texts can be stored; the others are reported."""
+    for feature in features:
+        try:
+            check_characters(_texts(feature))
+        except InvalidError as error:
+            report.left_out("map element", "map-invalid", f"{file}: element {feature.id!a}: {error}")
+        else:
+            yield feature
+
+
+def _texts(feature: MapFeature) -> list[object]:
+    # the centreline is numbers by now, and most of what there is
+    properties = {key: value for key, value in feature.properties.items() if key != "centerline"}
+    return [feature.id, feature.kind, properties]
 
 
 def read_class_map(path: Path) -> dict[str, str]:

@@ -84,12 +84,11 @@ def _features(network: Any, left_hand: bool) -> list[dict[str, Any]]:
     for crossing in network.intersections:
         links = {"roads": [road.uid for road in crossing.roads], "signalized": bool(crossing.isSignalized)}
         found.append(_feature(crossing.uid, "intersection", crossing.polygon, links))
-    for kind, elements in (
-        ("crossing", network.crossings),
-        ("sidewalk", network.sidewalks),
-        ("shoulder", network.shoulders),
-    ):
-        found += [_feature(element.uid, kind, element.polygon, {}) for element in elements]
+    found += [_feature(element.uid, "crossing", element.polygon, {}) for element in network.crossings]
+    for kind, elements in (("sidewalk", network.sidewalks), ("shoulder", network.shoulders)):
+        for element in elements:
+            links = {"centerline": _points(element.centerline, left_hand)}
+            found.append(_feature(element.uid, kind, element.polygon, links))
     return found
 
 

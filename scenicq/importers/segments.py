@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import shapely
 
 from scenicq.errors import DataError, Diagnostic
@@ -84,9 +85,10 @@ def maps_digest(maps: Mapping[str, Sequence[MapFeature]]) -> str:
     digest = hashlib.blake2b(digest_size=16)
     for name in sorted(maps):
         digest.update(json.dumps(name).encode())
-        for feature in maps[name]:
+        shapes = shapely.to_wkb(np.array([feature.shape for feature in maps[name]], dtype=object))
+        for feature, shape in zip(maps[name], shapes, strict=True):
             digest.update(json.dumps([feature.id, feature.kind, dict(feature.properties)]).encode())
-            digest.update(shapely.to_wkb(feature.shape))
+            digest.update(shape)
     return digest.hexdigest()
 
 
@@ -139,7 +141,7 @@ def _write(world: World, job: Job, indexes: dict[str, MapIndex], on_recording: O
             for found in job.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
                 columns = columns_of(found) if isinstance(found, Recording) else found
                 if columns.map not in indexes:
-                    indexes[columns.map] = MapIndex(columns.map, world.maps.get(columns.map, ()))
+                    indexes[columns.map] = MapIndex(world.maps.get(columns.map, ()))
                 writer.add(columns, indexes[columns.map])
                 on_recording(columns.name, len(columns.frames))
             return writer.finish(job.fingerprint, report.tally, report.told)

@@ -19,6 +19,7 @@ from scenicq.match.ground import holds, replay
 from scenicq.match.interval import ends
 from scenicq.match.ladder import LINEAR_SLACK, Item, Maybe, No, Outcome, Yes, decide, ground_cause
 from scenicq.match.options import Tolerance
+from scenicq.match.picked import Picked, picked
 
 __all__ = ["decide_apart"]
 
@@ -46,6 +47,9 @@ def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
     alone = _components(left, used, None)
     if len(alone) > 1:
         return _all(alone, items, tolerance)
+    cases = picked(left, tolerance)
+    if cases is not None:
+        return _any(cases, items, tolerance)
     fields = _fields([node for _, node, _ in left])
     shared = _shared(left, used)
     if fields:
@@ -82,6 +86,21 @@ def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance) -
     if doubt is not None:
         return doubt
     return Yes(values) if replay(items, values, tolerance, LINEAR_SLACK) else Maybe(items[0][0], "nonlinear")
+
+
+def _any(cases: Sequence[Picked], items: list[Item], tolerance: Tolerance) -> Outcome:
+    """Whether a solution is left in one of some cases."""
+    first = items[0][0]
+    blamed: Outcome = No(first)
+    for case in cases:
+        outcome = decide_apart(case.items, tolerance)
+        if isinstance(outcome, Yes):
+            values = {**case.given, **outcome.values}
+            if replay(items, values, tolerance, LINEAR_SLACK):
+                return Yes(values)
+        if not isinstance(outcome, No):
+            blamed = Maybe(first, "nonlinear")
+    return blamed
 
 
 def _components(

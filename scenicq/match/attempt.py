@@ -15,9 +15,10 @@ from typing import cast
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.scenario import Scenario
+from scenicq.match.apart import decide_apart
 from scenicq.match.casting import Cast
 from scenicq.match.decisions import Asker, Decisions, translated
-from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes, decide
+from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
 from scenicq.match.options import MatchOptions
 from scenicq.match.planning import GroupPlan, MatchPlan
 from scenicq.match.quick import Places
@@ -234,7 +235,7 @@ class Attempt:
             return
         assignment = {**ego, index: candidates[index][0]}
         try:
-            found = decide(self.items(blamed.group, assignment), self.options.tolerance)
+            found = decide_apart(self.items(blamed.group, assignment), self.options.tolerance)
         except CannotEvaluate:
             found = None
         outcome = found if isinstance(found, No) else No(blamed.group.constraints[0])

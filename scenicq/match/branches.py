@@ -31,6 +31,7 @@ from scenicq.forest.nodes import (
     Logic,
     LogicOp,
     Node,
+    Norm,
     PointIn,
     Rotate,
     Scale,
@@ -46,6 +47,7 @@ from scenicq.match.enclosures import (
     common,
     divide,
     everything,
+    lengths,
     negative,
     nothing_left,
     rotate,
@@ -73,13 +75,16 @@ class Branches:
         tape: What they are cases of.
         size: How many there are.
         ranges: Where each random number or point can be.
-        chosen: For each choice that was made, by the node's id, the heading or the number of the option.
+        chosen: For each choice that was made, by the node's id, the number of the option (n,), or of a field the range
+            of headings (2, n).
+        asked: By the id of a field's use, how large the box of its point was when its headings were last looked up.
     """
 
     tape: Tape
     size: int
     ranges: dict[Identity, Enclosure]
     chosen: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
+    asked: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
     _bounds: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
     _turns: dict[int, tuple[Enclosure, Enclosure]] = field(default_factory=dict[int, "tuple[Enclosure, Enclosure]"])
     _forms: dict[int, Multiples] = field(default_factory=dict[int, Multiples])
@@ -115,7 +120,8 @@ class Branches:
             self.tape,
             len(cases),
             {key: value[..., cases] for key, value in self.ranges.items()},
-            {key: value[cases] for key, value in self.chosen.items()},
+            {key: value[..., cases] for key, value in self.chosen.items()},
+            {key: value[cases] for key, value in self.asked.items()},
             {key: value[..., cases] for key, value in self._bounds.items()},
             {key: (sine[:, cases], cosine[:, cases]) for key, (sine, cosine) in self._turns.items()},
         )
@@ -127,6 +133,10 @@ class Branches:
     def value(self, node: Node) -> Enclosure:
         """The bounds of a number, (2, n), after narrowing."""
         return self._scalar(node)
+
+    def keep(self, node: Node, limits: Enclosure) -> None:
+        """Leave of the bounds of a node what some others have in common with them."""
+        self._meet(node, limits)
 
     def those(self, wanted: NDArray[np.bool_]) -> Branches:
         """The cases that a mask (n,) names."""
@@ -225,10 +235,10 @@ class Branches:
                 return self._vector(node.vector)[node.axis]
             case Bearing():
                 return angle_of(self._vector(node.vector))
+            case Norm():
+                return lengths(self._vector(node.vector))
             case DirectionAt():
-                chosen = self.chosen.get(id(node))
-                around = np.array([[-math.pi], [math.pi]])
-                return around if chosen is None else np.stack([chosen, chosen])
+                return self.chosen.get(id(node), np.array([[-math.pi], [math.pi]]))
             case Arithmetic():
                 return self._arithmetic(node)
             case Select():
@@ -337,6 +347,8 @@ class Branches:
                 both = everything(np.empty((2, 2, self.size)))
                 both[node.axis] = own
                 self._meet(node.vector, both)
+            case Norm():
+                self._meet(node.vector, np.stack([[-own[1], own[1]]] * 2))
             case Arithmetic():
                 self._arithmetic_back(node, own)
             case _ if is_leaf(node):

@@ -22,6 +22,7 @@ __all__ = [
     "common",
     "divide",
     "everything",
+    "lengths",
     "negative",
     "nothing_left",
     "projected",
@@ -117,6 +118,13 @@ def rotate(box: Enclosure, turn: tuple[Enclosure, Enclosure]) -> Enclosure:
     along = times(x, s) + times(y, c)
     reach = np.hypot(np.abs(x).max(axis=0), np.abs(y).max(axis=0))
     return common(np.stack([across, along]), np.stack([-reach, reach]))
+
+
+def lengths(box: Enclosure) -> Enclosure:
+    """The lengths of the vectors of boxes, as intervals."""
+    low, high = box[:, 0], box[:, 1]
+    near = np.maximum(np.maximum(low, -high), 0.0)
+    return np.stack([np.hypot(*near), np.hypot(*np.maximum(-low, high))])
 
 
 def angle_of(box: Enclosure) -> Enclosure:

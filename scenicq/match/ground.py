@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping
 from typing import cast
 
 from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.condition import condition
 from scenicq.forest.evaluate import admits, evaluate_all
 from scenicq.forest.groups import Comparison, Constraint
-from scenicq.forest.nodes import DirectionAt, Identity, Leaf, Node, Undefined, Value
-from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.forest.nodes import DirectionAt, Identity, Index, Leaf, Node, Undefined, Value
+from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.geometry.angles import distance
 from scenicq.match.options import Tolerance
 
@@ -91,6 +92,13 @@ def replay(
         slack: The solver's precision.
         headings: The direction of some uses of fields, by the node's id; if given, the nearest allowed one is taken.
     """
+    asked = leaves(*(node for _, node, _ in items))
+    if any(leaf.identity not in assignment for leaf in asked):
+        # what is not picked needs no value
+        picked = [leaf.identity for leaf in asked if isinstance(leaf, Index) and leaf.identity in assignment]
+        choices = {identity: assignment[identity] for identity in picked}
+        memo: dict[int, Node] = {}
+        items = [(c, condition(node, {}, choices, memo), seen) for c, node, seen in items]
     if headings is not None:
 
         def nearest(node: DirectionAt, allowed: tuple[float, ...]) -> float:

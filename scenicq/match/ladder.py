@@ -35,7 +35,7 @@ from scenicq.forest.nodes import (
     Value,
 )
 from scenicq.forest.scenario import Requirement
-from scenicq.forest.walk import leaves, postorder
+from scenicq.forest.walk import deciding_first, leaves, postorder
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.match.affine import AffineVector, affine_scalar, affine_vector
 from scenicq.match.ground import holds, replay, unlike
@@ -76,6 +76,8 @@ class Maybe:
 Outcome = Yes | No | Maybe
 
 _MOST_BRANCHES = 4096
+_MOST_CHOSEN = 100
+"""Discrete variables and cells that are chosen one below the other."""
 _MOST_PARTS = 200
 """Parts of one cell that are looked at."""
 _MOST_PROGRAMS = 20_000
@@ -115,7 +117,7 @@ def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
 
 
 class _Exhausted(Exception):
-    """A decision has taken all the linear programs that it may take."""
+    """A decision has taken all the linear programs, or made all the choices, that it may."""
 
 
 class _Ladder:
@@ -144,7 +146,9 @@ class _Ladder:
                 return No(item[0], ground_cause(item))
         if not open_items:
             return self._linear(items, given, rows) if self.places else Yes(given)
-        for leaf in leaves(*(node for _, node, _ in open_items)):
+        if len(given) + len(self.places) > _MOST_CHOSEN:
+            raise _Exhausted
+        for leaf in deciding_first([node for _, node, _ in open_items]):
             options = _options(leaf)
             if options is not None:
                 return self._try_each(items, leaf, options, given, rows)

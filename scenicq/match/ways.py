@@ -13,6 +13,7 @@ from typing import cast
 
 import numpy as np
 
+from scenicq.compiler.occupancy import Ranked
 from scenicq.forest.bounds import Interval
 from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison
@@ -132,7 +133,7 @@ def way_of(cases: Branches, number: int, shared: Identity | None) -> Way | None:
     headings: dict[int, float] = {}
     memo: dict[int, Node] = {}
     for node in tape.choices:
-        chosen = float(cases.chosen[id(node)][number])
+        chosen = float(cases.chosen[id(node)][..., number].mean())
         if isinstance(node, Index):
             given[node.identity] = chosen
         else:
@@ -199,11 +200,11 @@ def _cells(
     """
     (x0, x1), (y0, y1) = cases.place(node)[:, :, number].tolist()
     box = (x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN)
-    heading = float(cases.chosen[id(node)][number])
+    heading = float(cases.chosen[id(node)][:, number].mean())
     field = cast(VectorField, cast(Constant, node.field).value)
     found: Alternative = []
     sharp = True
-    for whole in field.cells(box):
+    for whole in field.cells_of(heading, box) if isinstance(field, Ranked) else field.cells(box):
         cell = whole.part(box) if abs(whole.heading - heading) <= SAME and _meets(whole, box) else None
         if cell is None:
             continue

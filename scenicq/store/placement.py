@@ -15,8 +15,8 @@ import pyarrow as pa
 import shapely
 from numpy.typing import NDArray
 
+from scenicq.geometry.centerlines import centerlines, road_direction
 from scenicq.geometry.features import MapFeature
-from scenicq.geometry.network import Network
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M, ArrowArray
 
 __all__ = ["MapIndex", "Memberships"]
@@ -40,16 +40,16 @@ class Memberships:
 class MapIndex:
     """A map prepared for many positions."""
 
-    def __init__(self, name: str, features: Sequence[MapFeature]) -> None:
+    def __init__(self, features: Sequence[MapFeature]) -> None:
         """Index a map; without elements every answer is empty."""
         self.ids: list[str] = [feature.id for feature in features]
         self.kinds: list[str] = [feature.kind for feature in features]
-        self._network = Network(name, features)
+        self._direction = road_direction(features)
         self._shapes = np.array([feature.shape for feature in features], dtype=object)
         self._tree = shapely.STRtree(self._shapes)
         shapely.prepare(self._shapes)
         self._is_lane = np.array([kind == "lane" for kind in self.kinds], dtype=bool)
-        self._centerlines = np.array([_centerline(feature) for feature in features], dtype=object)
+        self._features = features
 
     def memberships(self, xy: NDArray[np.float64]) -> Memberships:
         """Regions within `MEMBERSHIP_RADIUS_M` of positions of shape (n, 2)."""
@@ -77,7 +77,8 @@ class MapIndex:
             lane[point[first[alone]]] = feature[first[alone]]
             several = np.repeat(~alone, np.diff(first, append=len(point)))
             point, feature = point[several], feature[several]
-            lines = self._centerlines[feature]
+            some, at = np.unique(feature, return_inverse=True)
+            lines = np.array([_centerline(self._features[number]) for number in some.tolist()], dtype=object)[at]
             offset = np.nan_to_num(_distance(np.asarray(shapely.points(xy[point])), lines), nan=np.inf)
             # Written from the farthest to the nearest, so that the nearest stays; of equals the first in the map.
             order = np.lexsort((-feature, -offset))
@@ -86,7 +87,7 @@ class MapIndex:
 
     def road_directions(self, xy: NDArray[np.float64]) -> ArrowArray:
         """The headings that the road has at positions of shape (n, 2), as lists; none where it has none."""
-        return pa.array(self._network.roadDirection.values_many(xy), pa.list_(pa.float64()))
+        return pa.array(self._direction.values_many(xy), pa.list_(pa.float64()))
 
 
 def _distance(points: NDArray[Any], shapes: NDArray[Any]) -> NDArray[np.float64]:
@@ -95,5 +96,5 @@ def _distance(points: NDArray[Any], shapes: NDArray[Any]) -> NDArray[np.float64]
 
 
 def _centerline(feature: MapFeature) -> shapely.MultiLineString | None:
-    lines = [line for line in feature.properties.get("centerline") or () if len(line) >= 2]
-    return shapely.MultiLineString([np.asarray(line)[:, :2] for line in lines]) if lines else None
+    lines = centerlines(feature)
+    return shapely.MultiLineString(lines) if lines else None

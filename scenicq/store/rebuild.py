@@ -60,7 +60,7 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
                     part.open()
                     for columns in _recordings(*files):
                         if columns.map not in indexes:
-                            indexes[columns.map] = MapIndex(columns.map, maps.get(columns.map, ()))
+                            indexes[columns.map] = MapIndex(maps.get(columns.map, ()))
                         part.add(columns, indexes[columns.map])
                         if progress is not None:
                             progress(len(columns.frames))

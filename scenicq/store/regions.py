@@ -10,15 +10,20 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import shapely
+from numpy.typing import NDArray
 
+from scenicq.geometry.centerlines import centerlines
 from scenicq.geometry.features import MapFeature, names
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowTable
 
 __all__ = ["GEO_METADATA", "lane_rows", "read_features", "region_rows"]
+
+_encode = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
 
 GEO_METADATA = json.dumps(
     {
@@ -40,8 +45,8 @@ def region_rows(maps: Mapping[str, Sequence[MapFeature]]) -> ArrowTable:
             "map": [name for name, _ in features],
             "id": [feature.id for _, feature in features],
             "kind": [feature.kind for _, feature in features],
-            "geometry": [shapely.to_wkb(feature.shape) for _, feature in features],
-            "properties": [_to_json(feature.properties) for _, feature in features],
+            "geometry": _wkb(np.array([feature.shape for _, feature in features], dtype=object)),
+            "properties": [_encode(dict(feature.properties)) for _, feature in features],
         },
         schema=SCHEMAS["regions"],
     )
@@ -54,7 +59,7 @@ def lane_rows(maps: Mapping[str, Sequence[MapFeature]]) -> ArrowTable:
         {
             "map": [name for name, _ in lanes],
             "id": [lane.id for _, lane in lanes],
-            "centerline": [_centerline(lane.properties.get("centerline")) for _, lane in lanes],
+            "centerline": _wkb(_centerlines([lane for _, lane in lanes])),
             "left": [next(iter(names(lane, "left")), None) for _, lane in lanes],
             "right": [next(iter(names(lane, "right")), None) for _, lane in lanes],
             "predecessors": [names(lane, "predecessors") for _, lane in lanes],
@@ -79,10 +84,18 @@ def read_features(files: Iterable[StoreFile], map_name: str) -> tuple[MapFeature
     return tuple(features)
 
 
-def _to_json(properties: Mapping[str, Any]) -> str:
-    return json.dumps(dict(properties), ensure_ascii=False, separators=(",", ":"))
+def _wkb(shapes: NDArray[Any]) -> list[bytes | None]:
+    return shapely.to_wkb(shapes).tolist()
 
 
-def _centerline(polylines: Any) -> bytes | None:
-    lines = [line for line in polylines or () if len(line) >= 2]
-    return shapely.to_wkb(shapely.multilinestrings([shapely.linestrings(line) for line in lines])) if lines else None
+def _centerlines(lanes: Sequence[MapFeature]) -> NDArray[Any]:
+    """The centreline of each lane as a MultiLineString; None where there is none."""
+    found = np.full(len(lanes), None, dtype=object)
+    lines = [(place, line) for place, lane in enumerate(lanes) for line in centerlines(lane)]
+    if lines:
+        corners = np.concatenate([line for _, line in lines])
+        line_of = np.repeat(np.arange(len(lines)), [len(line) for _, line in lines])
+        parts = np.asarray(shapely.linestrings(corners, indices=line_of))
+        owners, numbers = np.unique([place for place, _ in lines], return_inverse=True)
+        found[owners] = shapely.multilinestrings(parts, indices=numbers)
+    return found

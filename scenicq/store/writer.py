@@ -234,7 +234,7 @@ class DatasetWriter:
 
     def _index(self, map_name: str) -> MapIndex:
         if map_name not in self._indexes:
-            self._indexes[map_name] = MapIndex(map_name, self.maps.get(map_name, ()))
+            self._indexes[map_name] = MapIndex(self.maps.get(map_name, ()))
         return self._indexes[map_name]
 
     def _close_segment(self) -> None:

@@ -1,4 +1,4 @@
-"""Wall times of the whole command: the five sample scenarios, the start of `--help`, and an ingest; and of compiling.
+"""Wall times of the whole command: the five sample scenarios, the start of `--help`, an ingest. CPU times of compiling.
 
 Runs on the recordings beside this checkout where there are any, else on the sample data. Prints a table and writes
 the numbers to bench-results/.
@@ -16,11 +16,15 @@ import time
 from datetime import UTC, datetime
 from pathlib import Path
 
-from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
-from scenicq.errors import Source
-
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "compiler"))
+
+from hostile import END, HOSTILE, TOO_LONG  # noqa: E402
+
+from scenicq.compiler.program import compile_scenario  # noqa: E402
+from scenicq.compiler.standin import street  # noqa: E402
+from scenicq.errors import ScenarioError, Source  # noqa: E402
+
 RECORDINGS = ROOT.parent / "shared" / "data" / "boston"
 RESULTS = ROOT / "bench-results"
 COMMAND = str(Path(sys.executable).with_name("scenicq"))
@@ -59,10 +63,25 @@ def compiling() -> dict[str, float]:
     return {"seconds": min(times), "lines": len(lines), "bar in ms": 300, "share of the bar in %": min(times) / 0.003}
 
 
+def hostile() -> dict[str, float]:
+    """CPU seconds in which the worst of the hostile programs is refused, and the bar."""
+    network, worst = street(), 0.0
+    for text in (*HOSTILE.values(), *TOO_LONG.values()):
+        started = time.process_time()
+        try:
+            compile_scenario(Source("hostile.scenic", text + END), network)
+        except ScenarioError:
+            worst = max(worst, time.process_time() - started)
+        else:
+            sys.exit("a hostile program compiles")
+    return {"seconds": worst, "programs": len(HOSTILE) + len(TOO_LONG), "share of the bar in %": worst / 0.02}
+
+
 def measure(source: Path, folder: Path) -> dict[str, dict[str, float]]:
     """All measurements: name, then what is measured."""
     dataset = folder / "dataset"
     found: dict[str, dict[str, float]] = {"--help": {"seconds": median("--help")[0]}, "compile": compiling()}
+    found["hostile, the worst"] = hostile()
     seconds, _ = timed("ingest", source, dataset, "-q")
     objects = json.loads((dataset / "dataset.json").read_text())["total"]["objects"]
     found["ingest"] = {"seconds": seconds, "objects": objects, "objects per second": objects / seconds}

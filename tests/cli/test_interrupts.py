@@ -1,9 +1,11 @@
 """An interrupt that gets lost on its way ends the command all the same."""
 
 import os
+import random
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -169,3 +171,32 @@ def test_an_ignored_interrupt_stays_ignored():
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=True)
     assert done.stdout == "alive\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_in_one_process_goes_on_where_it_was_interrupted(command, crossroads, scenarios, tmp_path, number):
+    given = [command, "match", str(scenarios / "04_two_lane_traffic.scenic"), str(crossroads), "--all", "--exit-zero"]
+    given += ["--jobs", "1", "--no-prefilter", "--method", "smt", "--solver", "portable", "-o"]
+    started = time.monotonic()
+    subprocess.run([*given, str(tmp_path / "whole.jsonl")], check=True)
+    takes_s = time.monotonic() - started
+    (tmp_path / "new").mkdir()
+    file, done = tmp_path / "new" / "found.jsonl", []
+    for _ in range(8):
+        words = [*given, str(file), "--resume"]
+        heed = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+        with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, **heed) as process:
+            # later than the interpreter needs to start: before, nobody is there to heed
+            time.sleep(random.uniform(0.2, 1.0) * takes_s)
+            process.send_signal(number)
+            _, told = process.communicate(timeout=20)
+        assert (process.returncode, told) in ((130, "interrupted\n"), (0, ""))
+        assert file.exists() == (process.returncode == 0)
+        done.append(process.returncode)
+        if file.exists():
+            break
+    assert 130 in done
+    subprocess.run([*given, str(file), "--resume"], check=True)
+    assert file.read_bytes() == (tmp_path / "whole.jsonl").read_bytes()
+    assert os.listdir(file.parent) == [file.name]

@@ -107,6 +107,17 @@ def compiled(name: str, text: str, network: Network, version: int | None = None)
     return compile_scenario(Source(name, text), network, version=version)
 
 
+def tolerance_of(text: str) -> Tolerance:
+    """The tolerance that a program of the list is matched with."""
+    given = _TOLERANCE.search(text)
+    return Tolerance(position=float(given[1])) if given else Tolerance()
+
+
+def all_match(text: str) -> bool:
+    """Whether each scene of a program of the list must match: neither is it refused nor does Scenic depart from it."""
+    return not (_REFUSED.search(text) or _DIFFERS.search(text))
+
+
 def compare(
     name: str, text: str, answer: dict[str, Any], network: Network, solver: Solver, version: int | None = None
 ) -> Outcome:
@@ -123,8 +134,7 @@ def compare(
         why = answer.get("error") or answer.get("ended", "nothing, where it should refuse")
         outcome.faults.append(f"Scenic says: {why}")
         return outcome
-    given = _TOLERANCE.search(text)
-    tolerance = Tolerance(position=float(given[1])) if given else Tolerance()
+    tolerance = tolerance_of(text)
     sharp, differs = _SHARP.search(text), _DIFFERS.search(text)
     match_scenes(outcome, scenario, answer["scenes"], tolerance, solver, deviating=bool(differs))
     matcher = Matcher(scenario, MatchOptions(tolerance=tolerance), solver)

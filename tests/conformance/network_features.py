@@ -70,13 +70,9 @@ def features_of(network: Any) -> list[dict[str, Any]]:
             left, right = _name(part._laneToLeft), _name(part._laneToRight)
             line = _polylines(part.centerline)
             found.append(_feature(part, "lane_section", lane=lane.uid, centerline=line, left=left, right=right))
-    for kind, elements in (
-        ("sidewalk", network.sidewalks),
-        ("shoulder", network.shoulders),
-        ("crossing", network.crossings),
-    ):
-        found += [_feature(each, kind) for each in elements]
-    return found
+    for kind, elements in (("sidewalk", network.sidewalks), ("shoulder", network.shoulders)):
+        found += [_feature(each, kind, centerline=_polylines(each.centerline)) for each in elements]
+    return found + [_feature(each, "crossing") for each in network.crossings]
 
 
 def _successors(lane: Any) -> list[str]:

@@ -18,16 +18,18 @@ import argparse
 import json
 import re
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from comparing import Outcome, compare, compare_random, compiled
+from comparing import Outcome, all_match, compare, compare_random, compiled, tolerance_of
 from distribution_tests import distances
 from original import HERE, Original, environment
 from random_programs import compose
 from shrinking import shrink
+from sifting import Drawing, sifted
 from wrong_lines import WRONG, WRONG_ON_ROADS
 
 from scenicq.compiler.standin import street
@@ -91,15 +93,17 @@ class Drawn:
         if not arguments.reuse or arguments.random:
             self._original = Original(environment(folder, package), arguments.map, self._work)
         self._reuse: bool = arguments.reuse
+        self._fresh: set[str] = set()
 
     def answer(self, name: str, text: str, count: int, seed: int, seconds: float = 60.0) -> dict[str, Any]:
         """What Scenic makes of a program."""
         kept = self._work / f"{name}.json"
-        if self._reuse and kept.exists():
+        if name in self._fresh or (self._reuse and kept.exists()):
             return json.loads(kept.read_text(encoding="utf-8"))
         assert self._original is not None, f"no scenes of {name} have been drawn"
         answer = self._original.draw(text, count, seed, seconds)
         kept.write_text(json.dumps(answer), encoding="utf-8")
+        self._fresh.add(name)
         return answer
 
     def again(self, text: str, count: int, seed: int) -> dict[str, Any]:
@@ -127,6 +131,24 @@ def fixed(arguments: argparse.Namespace, drawn: Drawn, town: Network) -> Iterato
             text = path.read_text(encoding="utf-8")
             answer = drawn.answer(path.stem, text, arguments.scenes, seed)
             yield compare(path.stem, text, answer, on_map(text, town), solver)
+
+
+def prefilter(arguments: argparse.Namespace, drawn: Drawn, town: Network) -> bool:
+    """Print what the prefilters of the list lose of the scenes drawn from it; whether it is nothing."""
+    drawings: dict[str, Drawing] = {}
+    for seed, path in enumerate(sorted((HERE / "programs").glob("*.scenic"))):
+        text = path.read_text(encoding="utf-8")
+        scenes = drawn.answer(path.stem, text, arguments.scenes, seed).get("scenes") if all_match(text) else None
+        if scenes:
+            drawings[path.stem] = Drawing(text, scenes, on_map(text, town), tolerance_of(text))
+    kept = frames = lost = 0
+    with tempfile.TemporaryDirectory(dir=arguments.work) as folder:
+        for name, found in sifted(drawings, Path(folder) / "dataset"):
+            kept, frames, lost = kept + found.kept, frames + found.frames, lost + len(found.lost)
+            if found.lost:
+                print(f"{name} loses {', '.join(found.lost)}")
+    print(f"prefilters of {len(drawings)} programs lose {lost} scenes and keep {kept:,} of {frames:,} frames")
+    return not lost
 
 
 def mistakes(drawn: Drawn, town: Network) -> Iterator[Outcome]:
@@ -240,6 +262,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of the random programs")
     parser.add_argument("--first", type=int, default=0, help="number of the first random program")
     parser.add_argument("--only-scenic-2", action="store_true", help="leave out all but Scenic 2")
+    parser.add_argument("--only-prefilter", action="store_true", help="leave out all but the prefilters of the list")
     parser.add_argument("--only-mistakes", action="store_true", help="leave out all but the wrong programs")
     parser.add_argument("--only-random", action="store_true", help="leave out all but the random programs")
     parser.add_argument("--only-distributions", action="store_true", help="leave out all but the distributions")
@@ -250,8 +273,9 @@ def parse_arguments() -> argparse.Namespace:
 def main() -> int:
     """Compare; 0 if everything is as it should be."""
     arguments = parse_arguments()
-    only = {name for name in ("random", "distributions", "scenic_2", "mistakes") if getattr(arguments, f"only_{name}")}
-    only = only or ({"list"} if arguments.programs else {"list", "mistakes", "distributions", "scenic_2", "random"})
+    parts = ("prefilter", "mistakes", "distributions", "scenic_2", "random")
+    only = {name for name in parts if getattr(arguments, f"only_{name}")}
+    only = only or ({"list"} if arguments.programs else {"list", *parts})
     good = True
     if only != {"scenic_2"}:
         drawn = Drawn(arguments)
@@ -259,6 +283,8 @@ def main() -> int:
             town = drawn.town("ego = new Object")
             if "list" in only:
                 good = tell(fixed(arguments, drawn, town), quiet=False)
+            if "prefilter" in only:
+                good = prefilter(arguments, drawn, town) and good
             if "mistakes" in only:
                 good = tell(mistakes(drawn, town), quiet=True) and good
             if "distributions" in only:

@@ -209,6 +209,10 @@ def test_a_pick_from_a_list_becomes_one_region_only_if_nothing_else_depends_on_i
     assert isinstance(point.region, Constant)
     assert isinstance(point.region.value, PolygonSet)
     assert len(point.region.value.polygons) == len(STREET.lanes)
+    nested = "road = Uniform(*network.roads)\nlane = Uniform(*road.lanes)\nego = new Car on lane"
+    (point,) = leaves(simplify(compiled(nested)).objects[0].properties["position"].value)
+    assert isinstance(point, PointIn)
+    assert sorted(point.region.value.ids) == sorted(lane.id for road in STREET.roads for lane in road.lanes)
     shared = simplify(compiled("lane = Uniform(*network.lanes)\nego = new Car on lane\nother = new Car on lane"))
     picks = [leaves(each.properties["position"].value) for each in shared.objects]
     indices = [[node for node in pick if isinstance(node, Index)] for pick in picks]

@@ -10,6 +10,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.geometry.features import MapFeature, names, read_geojson
+from scenicq.geometry.shapes import from_geojson, plain_polygons
 
 SQUARE = {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]]}
 BOWTIE = {"type": "Polygon", "coordinates": [[[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]]}
@@ -75,6 +76,28 @@ def test_unsound_features_are_reported_and_left_out(entry: Any, identifier: str,
     assert blamed == identifier
     assert message in text
     assert text.startswith("feature 1: ")
+
+
+RINGS: dict[str, tuple[Any, bool]] = {
+    "plain": ([[[0.5, 0], [4, 0], [4, -0.0], [0, 4e300], [0.5, 0]]], True),
+    "whole numbers": ([[[0, 0], [10**30, 0], [10**30, 4], [0, 0]]], True),
+    "open": ([[[0, 0], [4, 0], [4, 4]]], False),
+    "a hole": ([[[0, 0], [9, 0], [9, 9], [0, 0]], [[5, 2], [7, 2], [7, 4], [5, 2]]], False),
+    "heights": ([[[0, 0, 1], [4, 0, 1], [4, 4, 1], [0, 0, 1]]], False),
+    "bow tie": (BOWTIE["coordinates"], False),
+}
+
+
+@pytest.mark.parametrize(
+    "spoilt", [None, [[["0", 0], [1, 0], [1, 1], ["0", 0]]], [[[10**400, 0], [1, 0], [1, 1], [10**400, 0]]]]
+)
+def test_plain_polygons_are_those_that_are_read_one_by_one(spoilt: Any) -> None:
+    given = [{"type": "Polygon", "coordinates": rings} for rings, _ in RINGS.values()]
+    found = plain_polygons([*given, None, LINE, {"type": "Polygon", "coordinates": spoilt}])
+    assert [shape is not None for shape in found[:-3]] == [plain and spoilt is None for _, plain in RINGS.values()]
+    assert found[-3:] == [None, None, None]
+    for shape, geometry in zip(found, given, strict=False):
+        assert shape is None or shape.wkb == from_geojson(geometry).wkb
 
 
 def test_duplicate_ids_keep_the_first() -> None:

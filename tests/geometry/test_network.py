@@ -220,3 +220,33 @@ def test_pickling_rebuilds() -> None:
     assert network.name == "town"
     assert list(network.elements) == list(town().elements)
     assert contains(network.laneRegion, 1, 5)
+
+
+def test_sidewalks_and_shoulders_run_along_their_centrelines_where_the_map_gives_them() -> None:
+    slanted = [[[8.5, 0], [9.5, 40]]]
+    walk = area("walk", "sidewalk", (8, 0, 10, 40), centerline=slanted)
+    edge = area("edge", "shoulder", (-6, 0, -4, 40), centerline=[[[-5, 40], [-5, 0]]])
+    plain = [each for each in town().features if each.id not in ("walk", "edge")]
+    network = Network("town", [*plain, walk, edge])
+    along = -math.atan2(1, 40)
+    for field in (network.sidewalkRegion.orientation, network.sidewalks[0].orientation):
+        assert field is not None
+        assert field.values(9, 20) == pytest.approx((along,))
+    for field in (network.shoulderRegion.orientation, network.shoulders[0].orientation):
+        assert field is not None
+        assert field.values(-5, 20) == pytest.approx((math.pi,))
+    assert network.sidewalks[0].centerline is not None
+    assert network.sidewalks[0].centerline.lines[0].length == pytest.approx(math.hypot(1, 40))
+    # crossings have no direction here, so what holds them as well has none
+    assert network.walkableRegion.orientation is None
+    # overlapping ones have a say each
+    other = area("other", "sidewalk", (8, 0, 10, 40), centerline=[[[9, 40], [9, 0]]])
+    both = Network("town", [*plain, walk, other]).sidewalkRegion.orientation
+    assert both is not None
+    assert both.values(9, 20) == pytest.approx((along, math.pi))
+    # one without a centreline leaves them all without
+    silent = area("other", "sidewalk", (20, 0, 22, 40))
+    network = Network("town", [*plain, walk, silent, area("edge", "shoulder", (-6, 0, -4, 40))])
+    assert network.sidewalkRegion.orientation is None
+    assert network.sidewalks[1].centerline is None
+    assert network.shoulderRegion.orientation is network.roadDirection

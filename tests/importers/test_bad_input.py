@@ -410,3 +410,19 @@ def test_signal_in_the_middle(source: Path, tmp_path: Path, number: signal.Signa
         assert process.wait(timeout=20) != 0
         assert time.monotonic() - started < 15
     assert [path.name for path in tmp_path.iterdir()] == ["source"]
+
+
+def test_elements_of_maps_that_no_file_can_hold_are_left_out(source: Path, tmp_path: Path) -> None:
+    file = next((source / "maps").glob("*.geojson"))
+    collection = json.loads(file.read_text())
+    whole = len(collection["features"])
+    collection["features"][0]["properties"]["id"] = "half \ud800"
+    collection["features"][1]["properties"]["more"] = {"deep": ["\udc00"]}
+    collection["features"][2]["properties"]["\ud811"] = 1
+    file.write_text(json.dumps(collection))
+    summary = ingest(source, tmp_path / "dataset")
+    told = [each.message for each in summary.diagnostics if "half of a character" in each.message]
+    assert len(told) == 3
+    assert "element 'half \\ud800'" in told[0]
+    dataset = open_dataset(tmp_path / "dataset")
+    assert len(dataset.features(dataset.maps[0])) == whole - 3

@@ -213,6 +213,30 @@ def test_discrete_choices_are_tried_one_by_one():
         assert isinstance(check([compared("speed", node, observed)]), expected)
 
 
+def test_the_choice_that_decides_which_others_matter_is_made_first():
+    inner = [Select(Index((1.0, 1.0)), (c(float(number)), c(number + 0.5))) for number in range(900)]
+    outer = Index((1.0,) * len(inner))
+    node = Select(outer, tuple(inner))
+    # the outer choice is asked elsewhere too, so that the inner ones do not become one list
+    also = compared("speed", Select(outer, tuple(c(float(number % 2)) for number in range(len(inner)))), 1.0)
+    for observed, expected in ((701.5, Yes), (700.5, No), (2000.0, No)):
+        assert isinstance(check([compared("width", node, observed), also]), expected)
+
+
+def test_a_witness_needs_no_value_of_what_is_not_picked():
+    node = Select(Index((1.0, 1.0)), (between(0, 1), between(5, 6)))
+    assert isinstance(check([compared("width", node, 5.5)]), Yes)
+    assert isinstance(check([compared("width", node, 3.0)]), No)
+
+
+def test_very_many_choices_are_left_to_a_solver():
+    picks = [Select(Index((1.0, 1.0)), (c(1.0), c(1.5))) for _ in range(400)]
+    total = picks[0]
+    for each in picks[1:]:
+        total = build.arithmetic(ArithmeticOp.ADD, total, each)
+    assert isinstance(decide([compared("width", total, 450.25)], DEFAULT), Maybe)
+
+
 class Split:
     """A field whose cell says too much: north in the left half, west in the right, in one cell for each."""
 

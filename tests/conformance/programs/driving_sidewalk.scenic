@@ -1,3 +1,4 @@
+# sharp: heading
 model scenic.domains.driving.model
 ego = new Car
 new Pedestrian on sidewalk

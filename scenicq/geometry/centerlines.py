@@ -1,0 +1,49 @@
+"""Centrelines of lanes, and the direction of traffic along them: all that positions are looked up in at ingest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import cast
+
+import numpy as np
+
+from scenicq.geometry.features import MapFeature
+from scenicq.geometry.road_direction import DirectedLane, RoadDirection
+from scenicq.geometry.shapes import Coordinates
+
+__all__ = ["centerlines", "direction_along", "road_direction"]
+
+
+def centerlines(feature: MapFeature) -> tuple[Coordinates, ...]:
+    """The polylines of a feature's centreline, in the direction of travel, shape (n, 2) each."""
+    lines = cast("list[list[list[float]]]", feature.properties.get("centerline") or [])
+    return tuple(np.array(line, dtype=float)[:, :2] for line in lines if len(line) > 1)
+
+
+def road_direction(features: Iterable[MapFeature]) -> RoadDirection:
+    """The direction of traffic on the lanes of a map; who wants nothing else of its network need not build that.
+
+    Args:
+        features: Of those with the same id the first counts.
+    """
+    kept: dict[str, MapFeature] = {}
+    for feature in features:
+        kept.setdefault(feature.id, feature)
+    return RoadDirection(
+        tuple(DirectedLane(lane.shape, centerlines(lane)) for lane in kept.values() if lane.kind == "lane"),
+        tuple(feature.shape for feature in kept.values() if feature.kind == "intersection"),
+    )
+
+
+def direction_along(features: Iterable[MapFeature], kind: str) -> RoadDirection | None:
+    """The direction of the centrelines of all elements of a kind; None unless the map gives them for all.
+
+    Scenic's sidewalks and shoulders have such a direction.
+    """
+    own = [feature for feature in features if feature.kind == kind]
+    lines = [centerlines(feature) for feature in own]
+    if not own or not all(lines):
+        return None
+    directed = tuple(DirectedLane(each.shape, along) for each, along in zip(own, lines, strict=True))
+    # where elements overlap, each has its say
+    return RoadDirection(directed, tuple(each.shape for each in own), kind)
