@@ -21,6 +21,8 @@ __all__ = ["FORMATS", "Writer", "make_writer"]
 FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 """Names of the formats."""
 
+_json = json.JSONEncoder(ensure_ascii=False).encode
+
 _COLUMNS: tuple[str, ...] = (
     "frame",
     "recording",
@@ -65,10 +67,6 @@ def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
     """A row of plain cells; nested values become JSON text."""
     cells = {name: record.get(name, {}) for name in _COLUMNS}
     return {name: _json(cell) if isinstance(cell, Mapping) else cell for name, cell in cells.items()}
-
-
-def _json(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _name(record: Mapping[str, Any]) -> str | None:

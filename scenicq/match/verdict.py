@@ -47,6 +47,10 @@ class Match:
     correspondence: Mapping[str, str]
     witness: Mapping[str, WitnessValue]
 
+    def __reduce__(self) -> tuple[type[Match], tuple[Mapping[str, str], Mapping[str, WitnessValue]]]:
+        """Pickled as a call: matches come from other processes by the ten thousand."""
+        return Match, (self.correspondence, self.witness)
+
 
 @dataclass(frozen=True, slots=True)
 class NoMatch:

@@ -29,6 +29,10 @@ class Result:
     verdict: Verdict
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
 
+    def __reduce__(self) -> tuple[type[Result], tuple[str, str, int, Verdict, Mapping[str, str]]]:
+        """Pickled as a call, which takes half the time."""
+        return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors)
+
 
 def _cause(cause: Cause) -> dict[str, Any]:
     found = {"what": cause.what, "detail": cause.detail, "place": cause.place}
