@@ -152,7 +152,7 @@ class Network:
     @cached_property
     def walkableRegion(self) -> PolygonSet:
         """Sidewalks and crossings."""
-        along = None if self.crossings else direction_along(self.features, "sidewalk")
+        along = None if self.crossings else self.sidewalkRegion.orientation
         return self._region("walkable", ("sidewalk", "crossing"), along)
 
     def region(self, kind: str) -> Region | None:

@@ -49,10 +49,10 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
         shared: The random number that they share, if there are several parts.
         tolerance: Per feature.
     """
-    first = parts[0][0][0]
-    tapes = [Tape(part, tolerance) for part in parts]
     if shared is None or len(parts) == 1:
         return _whole(parts[0], tolerance)
+    first = parts[0][0][0]
+    tapes = [Tape(part, tolerance) for part in parts]
     chosen: list[list[Branches]] = []
     limits: list[Interval] = []
     try:

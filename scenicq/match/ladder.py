@@ -44,7 +44,7 @@ from scenicq.match.linear import NotLinear, inside, position_boxes, solve_affine
 from scenicq.match.options import Tolerance
 from scenicq.match.program import Row
 
-__all__ = ["LINEAR_SLACK", "Item", "Maybe", "No", "Outcome", "Yes", "condition_group", "decide", "ground_cause"]
+__all__ = ["LINEAR_SLACK", "Item", "Maybe", "No", "Outcome", "Yes", "condition_group", "decide", "fact", "ground_cause"]
 
 Item = tuple[Constraint, Node, Value]
 """A constraint, what conditioning left of its expression, and the label's value if it is a comparison."""
@@ -106,6 +106,11 @@ def ground_cause(item: Item) -> str:
     if isinstance(constraint, Comparison):
         return unlike(constraint.property, value, observed)
     return value.reason if isinstance(value, Undefined) else "does not hold"
+
+
+def fact(holding: Node) -> Item:
+    """A condition that holds in one branch of a decision, as a constraint."""
+    return (Condition(Requirement(holding, holding.span), holding), holding, None)
 
 
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
@@ -202,9 +207,7 @@ class _Ladder:
             for value in (True, False):
                 memo: dict[int, Node] = {id(truth): Constant(value, span=truth.span)}
                 fixed = [(c, condition(node, {}, None, memo), known) for c, node, known in items]
-                holding = truth if value else _opposite(truth)
-                fact = Condition(Requirement(holding, truth.span), holding)
-                yield self.decide([*fixed, (fact, holding, None)], given, rows)
+                yield self.decide([*fixed, fact(truth if value else _opposite(truth))], given, rows)
 
         return self._branch(items[0][0], outcomes())
 

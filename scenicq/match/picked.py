@@ -18,16 +18,14 @@ from numpy.typing import NDArray
 from scenicq.forest import build
 from scenicq.forest.bounds import Box
 from scenicq.forest.condition import condition
-from scenicq.forest.groups import Condition
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import CompareOp, Constant, Identity, Index, Node, PointIn, Select, Undefined, Value
-from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import leaves
 from scenicq.geometry import shapes
 from scenicq.geometry.meeting import meets
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
-from scenicq.match.ladder import Item
+from scenicq.match.ladder import Item, fact
 from scenicq.match.linear import position_boxes
 from scenicq.match.options import Tolerance
 
@@ -111,5 +109,4 @@ def _with(items: Sequence[Item], index: Node, number: int) -> Picked:
     memo = {id(index): Constant(value, span=index.span)}
     fixed = [(c, condition(node, {}, None, memo), seen) for c, node, seen in items]
     holds = build.compare(CompareOp.EQ, index, Constant(value, span=index.span), index.span)
-    fact = Condition(Requirement(holds, index.span), holds)
-    return Picked([*fixed, (fact, holds, None)], {})
+    return Picked([*fixed, fact(holds)], {})
