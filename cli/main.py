@@ -9,15 +9,13 @@ import difflib
 import gc
 import os
 import sys
-import tempfile
-import traceback
 from importlib import import_module
-from importlib.metadata import version
 from typing import Any, NoReturn
 
 import click
 
 from scenicq.errors import ScenicqError
+from scenicq.garbage import seldom_collected
 
 from .interrupts import Interrupts
 from .manual import write_examples, write_exit_codes
@@ -63,7 +61,7 @@ class Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
-        gc.enable()
+        seldom_collected()
         command: click.Command = getattr(module, cmd_name)
         return command
 
@@ -124,6 +122,10 @@ def _interrupted(ctx: click.Context) -> NoReturn:
 
 def _written() -> str:
     """Write what is needed to find a mistake into a file, and give its name."""
+    import tempfile  # noqa: PLC0415 - these take long to load, and no run should need them
+    import traceback  # noqa: PLC0415
+    from importlib.metadata import version  # noqa: PLC0415
+
     with tempfile.NamedTemporaryFile(
         "w", prefix="scenicq-error-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:

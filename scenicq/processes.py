@@ -23,6 +23,7 @@ from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.garbage import seldom_collected
 
 __all__ = ["Lost", "Work", "Workers", "as_many_as_pay", "processors"]
 
@@ -264,6 +265,7 @@ def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+    seldom_collected()
     work: Work[Any, Any] | None = None
     with contextlib.suppress(EOFError, OSError):
         connection.send(("ready", None))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.collector import without_collector
+from scenicq.garbage import without_collector
 
 __all__ = ["Block", "read_list"]
 

@@ -15,9 +15,9 @@ import numpy as np
 import shapely
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.garbage import without_collector
 from scenicq.geometry.features import MapFeature
 from scenicq.importers.base import Entry, Labels, Reader
-from scenicq.importers.collector import without_collector
 from scenicq.importers.report import Report
 from scenicq.processes import Lost, Workers
 from scenicq.store.columns import columns_of

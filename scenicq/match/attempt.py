@@ -20,8 +20,8 @@ from scenicq.match.casting import Cast
 from scenicq.match.decisions import Asker, Decisions, translated
 from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
 from scenicq.match.options import MatchOptions
+from scenicq.match.places import Places
 from scenicq.match.planning import GroupPlan, MatchPlan
-from scenicq.match.quick import Places
 from scenicq.match.search import Answer, Exhausted, Reporter, Slot, find_assignments
 from scenicq.match.thinning import thinned
 

@@ -17,8 +17,8 @@ from scenicq.match.apart import decide_apart
 from scenicq.match.casting import Cast
 from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes, condition_group
 from scenicq.match.options import MatchOptions
+from scenicq.match.places import Places
 from scenicq.match.planning import GroupPlan
-from scenicq.match.quick import Places
 from scenicq.match.surroundings import within_radius
 
 __all__ = ["Asker", "Decisions", "translated"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
@@ -18,8 +19,8 @@ from scenicq.match.formulas import UnclearError
 from scenicq.match.ladder import No, Yes
 from scenicq.match.observe import observe, observe_params, observed_names
 from scenicq.match.options import MatchOptions
+from scenicq.match.places import Disc, Places
 from scenicq.match.planning import GroupPlan, MatchPlan
-from scenicq.match.quick import Disc, Places
 from scenicq.store.labels import Label
 
 __all__ = ["Casting", "Direct", "direct_of", "signature_of"]
@@ -39,12 +40,16 @@ class Direct:
         due: For each object but the ego, in program order, the groups that can be decided once it has a candidate.
         words: Whether it also tells what keeps a label from matching. Conditions on known values alone are left to
             `Attempt`, which tells what no candidate satisfies.
+        order: The ego, then the objects of `due`.
+        most_decisions: After how many decisions it is given up.
     """
 
     plan: MatchPlan
     ego_only: tuple[GroupPlan, ...]
     due: tuple[tuple[int, tuple[GroupPlan, ...]], ...]
     words: bool
+    order: tuple[int, ...]
+    most_decisions: int
 
 
 def direct_of(plan: MatchPlan, scenario: Scenario) -> Direct | None:
@@ -57,7 +62,9 @@ def direct_of(plan: MatchPlan, scenario: Scenario) -> Direct | None:
         if group.roles:
             due[max(group.roles, key=order.index)].append(group)
     words = all(group.group.variables for group in plan.groups)
-    return Direct(plan, plan.ego_only, tuple((index, tuple(due[index])) for index in order), words)
+    most = _MOST_DECISIONS + _MORE_DECISIONS * len(due)
+    steps = tuple((index, tuple(due[index])) for index in order)
+    return Direct(plan, plan.ego_only, steps, words, (scenario.ego, *order), most)
 
 
 @dataclass(slots=True)
@@ -119,7 +126,7 @@ class Casting:
         """The first correspondence in the order of the program, or what kept all from matching; None if unclear."""
         found: dict[int, Yes] = {}
         self.assignment[self.ego] = 0
-        self._left = _MOST_DECISIONS + _MORE_DECISIONS * len(self.direct.due)
+        self._left = self.direct.most_decisions
         try:
             for group in self.direct.ego_only:
                 outcome = self._passes(group)
@@ -166,19 +173,32 @@ class Casting:
 
 def signature_of(label: Label, ego: int, among: Among, relevant: tuple[frozenset[str], ...]) -> Signature | None:
     """What is observed of all candidates, if it is the same for all of a role."""
-    kinds: list[frozenset[str]] = []
     objects = label.objects
-    asked: dict[tuple[frozenset[str], tuple[int, ...]], frozenset[str]] = {}
+    numbers = {number for index, numbers in among.items() if index != ego for number in numbers}
+    seen = {number: observed_names(objects[number - 1]) for number in numbers}
+    params = frozenset(observe_params(label)) if label.params else frozenset[str]()
+    own = observed_names(label.ego)
+    if len(set(seen.values())) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
+        return _signature(relevant, ego, own, next(iter(seen.values())), params)
+    kinds: list[frozenset[str]] = []
     for index, names in enumerate(relevant):
         if index == ego:
-            kinds.append(names & observed_names(label.ego))
+            kinds.append(names & own)
             continue
-        key = names, among[index]
-        seen = asked.get(key)
-        if seen is None:
-            first, *others = {names & observed_names(objects[number - 1]) for number in among[index]} or {None}
-            if first is None or others:
-                return None
-            seen = asked[key] = first
-        kinds.append(seen)
-    return (*kinds, frozenset(observe_params(label)) if label.params else frozenset())
+        first, *others = {names & seen[number] for number in among[index]} or {None}
+        if first is None or others:
+            return None
+        kinds.append(first)
+    return (*kinds, params)
+
+
+@lru_cache
+def _signature(
+    relevant: tuple[frozenset[str], ...],
+    ego: int,
+    own: frozenset[str],
+    others: frozenset[str],
+    params: frozenset[str],
+) -> Signature:
+    """Where the ego has some properties, and all others have the same."""
+    return (*(names & (own if index == ego else others) for index, names in enumerate(relevant)), params)

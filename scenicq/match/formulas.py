@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.forest.compute import compute
 from scenicq.forest.groups import PARAMS
@@ -35,10 +40,24 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.match.interval import ends
 
-__all__ = ["Exact", "Form", "Formulas", "Get", "UnclearError", "spread", "truth"]
+__all__ = [
+    "Column",
+    "Columns",
+    "Exact",
+    "Form",
+    "Formulas",
+    "Get",
+    "UnclearError",
+    "clipped",
+    "spread",
+    "truth",
+    "turned",
+]
 
 Get: TypeAlias = Callable[[int, str], Value]
 """The observed value of an object's property."""
+Column: TypeAlias = NDArray[np.float64]
+"""A number of each of many labels; a vector is a pair of columns."""
 Exact: TypeAlias = Callable[[Get], "float | tuple[float, float]"]
 Scalar: TypeAlias = Callable[[Get], float]
 Vector: TypeAlias = Callable[[Get], "tuple[float, float]"]
@@ -53,6 +72,44 @@ _VECTORS = frozenset({"position", "velocity"})
 
 class UnclearError(Exception):
     """A closed form does not say."""
+
+
+class Columns:
+    """The observed values of many labels at once, in place of a `Get`: formulas of it give columns.
+
+    Every step is what it is for one label, bit by bit: NumPy adds, subtracts, multiplies and divides; the functions
+    that it computes in a way of its own are applied one by one.
+    """
+
+    def __init__(self, size: int, column: Callable[[int, str], Column | tuple[Column, Column]]) -> None:
+        """Take what makes the columns.
+
+        Args:
+            size: Labels.
+            column: The values of an object's property; `UnclearError` where they are neither numbers nor vectors.
+        """
+        self.size = size
+        self._column = functools.cache(column)
+
+    def __call__(self, index: int, name: str) -> Value:
+        """The column, passed off as a value."""
+        return cast(Value, self._column(index, name))
+
+
+def turned(angle: float) -> tuple[float, float]:
+    """Cosine and sine; of a column, columns."""
+    if isinstance(angle, np.ndarray):
+        angles: list[float] = angle.tolist()
+        return cast("tuple[float, float]", (np.array([*map(math.cos, angles)]), np.array([*map(math.sin, angles)])))
+    return math.cos(angle), math.sin(angle)
+
+
+def clipped(value: float, low: float, high: float) -> float:
+    """The value, or the end that it is beyond; of columns, a column."""
+    if isinstance(value, np.ndarray):
+        raised = np.where(np.greater(low, value), low, value)
+        return cast(float, np.where(np.less(high, raised), high, raised))
+    return min(max(value, low), high)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,14 +179,14 @@ class Form:
 
 
 def spread(form: Form, value: float) -> dict[Identity, Value]:
-    """Values of a form's variables for which its random part has a value between its ends."""
+    """Values of a form's variables for which its random part has a value between its ends; of a column, columns."""
     if len(form.terms) == 1:
         ((identity, (factor, low, high)),) = form.terms.items()
-        return {identity: min(max(value / factor, low), high)}
+        return {identity: clipped(value / factor, low, high)}
     if form.unbounded:
         # the unbounded one takes what the middles of the others leave
         return _with_rest(form, value)
-    share = 0.5 if form.high == form.low else min(1.0, max(0.0, (value - form.low) / (form.high - form.low)))
+    share = 0.5 if form.high == form.low else clipped((value - form.low) / (form.high - form.low), 0.0, 1.0)
     return {
         identity: low + share * (high - low) if factor > 0 else high - share * (high - low)
         for identity, (factor, low, high) in form.terms.items()
@@ -178,6 +235,8 @@ def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[G
         case _:
 
             def computed(get: Get) -> Value:
+                if isinstance(get, Columns):
+                    raise UnclearError
                 found = compute(node, tuple([arg(get) for arg in args]))
                 if isinstance(found, Undefined):
                     raise UnclearError
@@ -304,17 +363,16 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
 
             return scaled
         case Rotate():
-            turned, angle = cast(Vector, args[0]), cast(Scalar, args[1])
+            whole, angle = cast(Vector, args[0]), cast(Scalar, args[1])
 
             def rotated(get: Get) -> tuple[float, float]:
-                (a, b), turn = turned(get), angle(get)
-                c, s = math.cos(turn), math.sin(turn)
+                (a, b), (c, s) = whole(get), turned(angle(get))
                 return (a * c - b * s, a * s + b * c)
 
             return rotated
         case Coordinate():
-            whole, axis = cast(Vector, args[0]), node.axis
-            return lambda get: whole(get)[axis]
+            vector, axis = cast(Vector, args[0]), node.axis
+            return lambda get: vector(get)[axis]
         case Norm() | Bearing():
             return cast(Exact, _computed(node, cast("list[Callable[[Get], Value]]", args)))
         case _:
@@ -324,7 +382,8 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
 def _scalar(op: ArithmeticOp, args: list[Scalar]) -> Scalar | None:
     match op:
         case ArithmeticOp.ADD:
-            return lambda get: sum([arg(get) for arg in args])
+            # `sum` of floats is not plain addition in every Python
+            return lambda get: functools.reduce(operator.add, [arg(get) for arg in args])
         case ArithmeticOp.SUB:
             one, other = args
             return lambda get: one(get) - other(get)

@@ -25,10 +25,12 @@ from scenicq.match.constraints import Signature, describe_constraint
 from scenicq.match.direct import Casting, Direct, direct_of, signature_of
 from scenicq.match.ladder import Item, No, Outcome
 from scenicq.match.options import MatchOptions
+from scenicq.match.places import Disc, Places
 from scenicq.match.planning import MatchPlan, make_plan, relevant_properties
-from scenicq.match.quick import Places, Quick
+from scenicq.match.quick import Quick
 from scenicq.match.ready import ready
 from scenicq.match.search import Exhausted, Reporter
+from scenicq.match.together import Cast, firsts, together
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -71,11 +73,14 @@ class Matcher:
     _directs: dict[MatchPlan, Direct | None] = field(default_factory=dict["MatchPlan", "Direct | None"], repr=False)
     _places: dict[Leaf, str] = field(default_factory=dict["Leaf", "str"], repr=False)
     _relevant: tuple[frozenset[str], ...] = field(init=False, repr=False)
+    _plain: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Rewrite the scenario, and find out what matters of a label."""
         self.scenario = ready(self.scenario)
         self._relevant = relevant_properties(self.scenario, self.options)
+        options = self.options
+        self._plain = options.method == "auto" and not options.exact and options.ego == "label"
 
     def match(
         self,
@@ -101,24 +106,57 @@ class Matcher:
                 return found
         return next(self._findings(label, reporter, given or {}, among, places)).verdict
 
-    def _direct(self, label: Label, among: Among | None, places: Places) -> Match | NoMatch | None:
-        """What is found without a search, if it is clear."""
-        options = self.options
-        if options.method != "auto" or options.exact or options.ego != "label" or not label.has_ego:
-            return None
-        ego = self.scenario.ego
-        roles = candidates_of(self.scenario, label, 0, options, {}) if among is None else among
-        signature = signature_of(label, ego, roles, self._relevant)
+    def match_all(self, labels: Sequence[tuple[Label, Among | None]], places: Places) -> Iterator[Verdict]:
+        """Decide labels, each as `match` does; those that match in the first way that is tried are found together.
+
+        Args:
+            labels: Labels, each with what is known of who may play whom.
+            places: What is known of places of the map; see `look_up`.
+        """
+        casts: dict[Direct, list[tuple[int, Cast]]] = {}
+        for place, (label, among) in enumerate(labels):
+            if among is None or not self._plain or not label.has_ego:
+                continue
+            direct = self._direct_for(label, among)
+            numbers = None if direct is None else firsts(direct, among)
+            if direct is not None and numbers is not None:
+                casts.setdefault(direct, []).append((place, Cast(label, numbers, self._disc(label))))
+        found: dict[int, Match] = {}
+        for direct, mine in casts.items():
+            decided = together(direct, [each for _, each in mine], self.options.tolerance, places)
+            keys = self._keys(decided.variables)
+            for (place, each), values in zip(mine, decided.witnesses, strict=True):
+                if values is not None:
+                    assignment = dict(zip(direct.order, each.numbers, strict=True))
+                    witness = cast("dict[str, WitnessValue]", dict(zip(keys, values, strict=True)))
+                    found[place] = Match(self._names(each.label, 0, assignment), witness)
+        for place, (label, among) in enumerate(labels):
+            yield found.get(place) or self.match(label, among=among, places=places)
+
+    def _direct_for(self, label: Label, among: Among) -> Direct | None:
+        """How a label of a plain query can be decided without a search, if it can."""
+        signature = signature_of(label, self.scenario.ego, among, self._relevant)
         if signature is None:
             return None
         plan = self.plan(signature)
         if plan not in self._directs:
             self._directs[plan] = direct_of(plan, self.scenario)
-        direct = self._directs[plan]
+        return self._directs[plan]
+
+    def _disc(self, label: Label) -> Disc | None:
+        radius = self.options.radius
+        return None if radius is None else ((label.ego.x, label.ego.y), radius)
+
+    def _direct(self, label: Label, among: Among | None, places: Places) -> Match | NoMatch | None:
+        """What is found without a search, if it is clear."""
+        if not self._plain or not label.has_ego:
+            return None
+        options, ego = self.options, self.scenario.ego
+        roles = candidates_of(self.scenario, label, 0, options, {}) if among is None else among
+        direct = self._direct_for(label, roles)
         if direct is None:
             return None
-        disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
-        casting = Casting(direct, options, label, ego, roles, disc, places)
+        casting = Casting(direct, options, label, ego, roles, self._disc(label), places)
         found = casting.solve()
         if isinstance(found, Failure):
             # of roles that nothing is known of there may be too few candidates, which comes first
@@ -264,16 +302,24 @@ class Matcher:
         }
 
     def _match(self, label: Label, ego: int, solution: Solution) -> Match:
-        witness: dict[str, WitnessValue] = {}
-        counts: dict[str, int] = {}
-        for group, outcome in solution.outcomes:
-            for leaf in group.group.variables:
-                value = outcome.values.get(leaf.identity)
-                if value is not None:
-                    place = self._places.get(leaf)
-                    if place is None:
-                        place = self._places[leaf] = leaf.span.place if leaf.span else type(leaf).__name__
-                    counts[place] = counts.get(place, 0) + 1
-                    key = place if counts[place] == 1 else f"{place}#{counts[place]}"
-                    witness[key] = cast("WitnessValue", value)
+        known = [
+            (leaf, value)
+            for group, outcome in solution.outcomes
+            for leaf in group.group.variables
+            if (value := outcome.values.get(leaf.identity)) is not None
+        ]
+        keys = self._keys([leaf for leaf, _ in known])
+        witness = {key: cast("WitnessValue", value) for key, (_, value) in zip(keys, known, strict=True)}
         return Match(self._names(label, ego, solution.assignment), witness)
+
+    def _keys(self, variables: Sequence[Leaf]) -> list[str]:
+        """What a witness calls random variables: their places in the program, numbered where several share one."""
+        keys: list[str] = []
+        counts: dict[str, int] = {}
+        for leaf in variables:
+            place = self._places.get(leaf)
+            if place is None:
+                place = self._places[leaf] = leaf.span.place if leaf.span else type(leaf).__name__
+            counts[place] = counts.get(place, 0) + 1
+            keys.append(place if counts[place] == 1 else f"{place}#{counts[place]}")
+        return keys

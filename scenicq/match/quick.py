@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import cast
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias, cast
 
 import numpy as np
 
@@ -31,66 +31,34 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import postorder
-from scenicq.geometry.membership import contains, contains_many
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.match.formulas import Exact, Form, Formulas, Get, UnclearError, spread, truth
+from scenicq.match.formulas import (
+    Column,
+    Columns,
+    Exact,
+    Form,
+    Formulas,
+    Get,
+    UnclearError,
+    clipped,
+    spread,
+    truth,
+    turned,
+)
 from scenicq.match.ground import unlike
 from scenicq.match.ladder import No, Outcome, Yes
 from scenicq.match.options import Tolerance
+from scenicq.match.places import XY, Disc, Places
 
-__all__ = ["Disc", "Places", "Quick", "quick_of"]
+__all__ = ["Quick", "Satisfied", "quick_of"]
 
 _MARGIN = 1e-7
 """Metres or radians from a boundary within which nothing is decided here."""
 _MOST_CHOICES = 8
 
-Disc = tuple[tuple[float, float], float]
-"""The area that is looked at: centre and radius."""
-XY = tuple[float, float]
-
-
-@dataclass(eq=False, slots=True)
-class Places:
-    """What the map says of places, looked up for many of them together.
-
-    Attributes:
-        directions: The headings that each field allows, by place.
-        inside: Whether a place lies in each region.
-    """
-
-    directions: dict[RoadDirection, dict[XY, tuple[float, ...]]] = field(
-        default_factory=dict["RoadDirection", "dict[XY, tuple[float, ...]]"]
-    )
-    inside: dict[int, tuple[Region, dict[XY, bool]]] = field(
-        default_factory=dict["int", "tuple[Region, dict[XY, bool]]"]
-    )
-
-    def look_up(self, fields: Iterable[RoadDirection], regions: Iterable[Region], places: Iterable[XY]) -> None:
-        """Look up places in fields and regions."""
-        wanted = list(dict.fromkeys(places))
-        if not wanted:
-            return
-        xy = np.array(wanted)
-        for one in fields:
-            self.directions.setdefault(one, {}).update(zip(wanted, one.values_many(xy), strict=True))
-        for region in regions:
-            found = contains_many(region, xy).tolist()
-            self.inside.setdefault(id(region), (region, {}))[1].update(zip(wanted, found, strict=True))
-
-    def allowed(self, one: RoadDirection, place: XY) -> tuple[float, ...]:
-        """The headings that a field allows at a place."""
-        known = self.directions.setdefault(one, {})
-        if place not in known:
-            known[place] = one.values(*place)
-        return known[place]
-
-    def within(self, region: Region, place: XY) -> bool:
-        """Whether a place lies in a region."""
-        known = self.inside.setdefault(id(region), (region, {}))[1]
-        if place not in known:
-            known[place] = contains(region, *place)
-        return known[place]
+Satisfied: TypeAlias = "tuple[Sequence[bool], Mapping[Identity, Column | Sequence[Value]]]"
+"""Which of many labels surely satisfy a group, and a witness for each of them; for the others it means nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +72,8 @@ class Quick:
         region: The region that it asks for the position of `index`.
         index: The object whose position matters to field or region.
         narrow: The answer where a position is missed by less than its tolerance would reach in another direction.
+        satisfied: The same question about many labels at once, with the area of each; None if they are to be asked one
+            by one. Where `decide` says yes it does too, with the same witness. It may raise `UnclearError`.
     """
 
     decide: Callable[[Get, Disc | None, Tolerance, Places], Outcome | None]
@@ -111,6 +81,7 @@ class Quick:
     region: Region | None = None
     index: int = -1
     narrow: No | None = None
+    satisfied: Callable[[Columns, Sequence[Disc | None], Tolerance, Places], Satisfied] | None = None
 
 
 def quick_of(group: Group) -> Quick | None:
@@ -171,7 +142,11 @@ def _place(item: Comparison) -> Quick | None:
             return No(item, unlike("position", (x, y), (px, py)))
         return yes if off <= _surely(tolerance) else None
 
-    return Quick(decide)
+    def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: Places) -> Satisfied:
+        (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, "position"))
+        return _close(x - px, y - py, tolerance), {}
+
+    return Quick(decide, satisfied=satisfied)
 
 
 def _surely(tolerance: Tolerance) -> float:
@@ -185,13 +160,26 @@ def _point(item: Comparison, node: PointIn) -> Quick | None:
         return None
     region, index = cast(Region, node.region.value), item.object
 
+    def is_in(place: XY, disc: Disc | None, places: Places) -> bool:
+        if disc is not None and math.dist(place, disc[0]) > disc[1] - _MARGIN:
+            return False
+        return places.within(region, place)
+
     def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: Places) -> Outcome | None:
         place = cast(XY, get(index, "position"))
-        if disc is not None and math.dist(place, disc[0]) > disc[1] - _MARGIN:
-            return None
-        return Yes({node.identity: place}) if places.within(region, place) else None
+        return Yes({node.identity: place}) if is_in(place, disc, places) else None
 
-    return Quick(decide, region=region, index=index)
+    def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: Places) -> Satisfied:
+        where = _pairs(get, index)
+        return [is_in(place, disc, places) for place, disc in zip(where, discs, strict=True)], {node.identity: where}
+
+    return Quick(decide, region=region, index=index, satisfied=satisfied)
+
+
+def _pairs(get: Columns, index: int) -> list[XY]:
+    """The positions of an object in many labels."""
+    x, y = cast("tuple[Column, Column]", get(index, "position"))
+    return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
 def _misses(tolerance: Tolerance, sides: tuple[float, float, float, float], turn: float) -> bool:
@@ -241,8 +229,8 @@ def _offset(item: Comparison) -> Quick | None:
     index = item.object
     no, narrow = No(item), No(item)
 
-    @_decided
-    def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: Places) -> Outcome | None:
+    def seen(get: Get) -> tuple[float, float, float]:
+        """The position in the frame of the offset, and how far that is turned."""
         px, py = cast(XY, get(index, "position"))
         turn = 0.0
         for shift, exact in steps:
@@ -251,11 +239,16 @@ def _offset(item: Comparison) -> Quick | None:
                 px, py = px - qx, py - qy
             else:
                 angle = cast(float, exact(get))
-                turn += angle
-                c, s = math.cos(angle), math.sin(angle)
+                turn = turn + angle
+                c, s = turned(angle)
                 px, py = px * c + py * s, py * c - px * s
+        return px, py, turn
+
+    @_decided
+    def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: Places) -> Outcome | None:
+        px, py, turn = seen(get)
         a, b = x.known(get), y.known(get)
-        u, v = min(max(px, a + x.low), a + x.high), min(max(py, b + y.low), b + y.high)
+        u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
         off = math.hypot(u - px, v - py)
         if off > tolerance.reach + _MARGIN and math.isfinite(off):
             return no
@@ -264,7 +257,21 @@ def _offset(item: Comparison) -> Quick | None:
             return narrow if _misses(tolerance, sides, turn) else None
         return Yes({**spread(x, u - a), **spread(y, v - b)})
 
-    return Quick(decide, narrow=narrow)
+    def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: Places) -> Satisfied:
+        px, py, _ = seen(get)
+        a, b = x.known(get), y.known(get)
+        u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
+        values = {**spread(x, u - a), **spread(y, v - b)}
+        return _close(u - px, v - py, tolerance), cast("Mapping[Identity, Column]", values)
+
+    return Quick(decide, narrow=narrow, satisfied=satisfied)
+
+
+def _close(x: float, y: float, tolerance: Tolerance) -> list[bool]:
+    """Whether positions that are off by columns are surely within tolerance."""
+    sure = _surely(tolerance)
+    offs = zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True)
+    return [math.hypot(*off) <= sure for off in offs]
 
 
 def _heading(item: Comparison) -> Quick | None:
@@ -315,7 +322,24 @@ def _heading(item: Comparison) -> Quick | None:
             return None
         return No(item, unlike("heading", ways[0][1].known(get) + allowed[0], seen)) if known_first else no
 
-    return Quick(decide, field=flow, index=where)
+    if len(ways) > 1 or ways[0][1].unbounded:
+        return Quick(decide, field=flow, index=where)
+    form = ways[0][1]
+    middle, half = (form.low + form.high) / 2, (form.high - form.low) / 2
+
+    def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: Places) -> Satisfied:
+        seen = cast(Column, get(index, "heading"))
+        least = max(0.0, tolerance.heading - _MARGIN)
+        nowhere = [(0.0,)] * get.size
+        ways = nowhere if flow is None else [places.allowed(flow, place) for place in _pairs(get, where)]
+        offs: list[float] = []
+        for rest, allowed in zip((seen - form.known(get) - middle).tolist(), ways, strict=True):
+            turns = (math.remainder(rest - direction, math.tau) for direction in allowed)
+            offs.append(next((off for off in turns if abs(off) - half <= least), math.nan))
+        values = spread(form, middle + clipped(cast(float, np.array(offs)), -half, half))
+        return [not math.isnan(off) for off in offs], cast("Mapping[Identity, Column]", values)
+
+    return Quick(decide, field=flow, index=where, satisfied=satisfied)
 
 
 def _plain(node: DirectionAt) -> bool:

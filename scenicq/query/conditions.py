@@ -40,6 +40,7 @@ from scenicq.query.regions import RegionNames, near_region
 from scenicq.query.spans import (
     SLACK,
     Expr,
+    Interval,
     add,
     all_of,
     any_of,
@@ -251,18 +252,28 @@ class _Reader:
         alternatives = [((0.0, 0.0))]
         for term in rest:
             alternatives = [add(total, more) for total in alternatives for more in bounds.intervals(term)]
-        tests: list[str | bool] = []
+        spans: list[tuple[Interval, Expr]] = []
         for low, high in alternatives:
             ((_, span),) = (difference((high, high), (low, low)),)
             if (isinstance(span, float) and span + 2 * width >= math.tau) or math.inf in (high, span):
                 return ""
-            turned = f"{base} - d" if along else base
-            ((start, _),) = (difference((turned, turned), add((low, low), (-width, -width))),)
-            tests.append(less(modulo_turn(number(start)), add((span, span), (2 * width, 2 * width))[1]))
-        test = _sql(any_of(tests))
-        if not along or not test:
-            return test
-        return f"({base} IS NULL OR len(list_filter({alias}road_directions, lambda d: {test})) > 0)"
+            spans.append((add((low, low), (-width, -width)), add((span, span), (2 * width, 2 * width))[1]))
+
+        def holds(turned: str) -> str:
+            starts = [difference((turned, turned), start)[0] for start, _ in spans]
+            return _sql(
+                any_of([less(modulo_turn(number(start)), span) for start, (_, span) in zip(starts, spans, strict=True)])
+            )
+
+        if not along:
+            return holds(base)
+        directions = f"{alias}road_directions"
+        one, each = holds(f"{base} - {directions}[1]"), holds(f"{base} - d")
+        # most places have one direction, for which arithmetic takes a fraction of what a function of lists does
+        among = (
+            f"CASE WHEN len({directions}) = 1 THEN {one} ELSE len(list_filter({directions}, lambda d: {each})) > 0 END"
+        )
+        return f"({base} IS NULL OR {among})" if each else ""
 
     def _own_direction(self, node: DirectionAt, index: int) -> bool:
         field_, point = node.field, node.point

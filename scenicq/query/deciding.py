@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
+from scenicq.match.casting import Among
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.quick import Places
+from scenicq.match.places import Places
 from scenicq.match.verdict import Verdict
 from scenicq.query.plan import Plan, make_plan
 from scenicq.query.prefilter import Block, Candidate, candidates, names, sift
@@ -126,19 +127,18 @@ class Decider:
         """The results of labels, whose places are looked up so many at a time."""
         size = _FIRST_BATCH
         while batch := list(islice(left, size)):
-            places = matcher.look_up([(each.label, each.among) for each in batch])
-            yield from (self._results(matcher, each, places) for each in batch)
+            labels = [(each.label, each.among) for each in batch]
+            places = matcher.look_up(labels)
+            verdicts = None if self.all_matches else matcher.match_all(labels, places)
+            for label, among in labels:
+                found = self._every_match(matcher, label, among, places) if verdicts is None else [next(verdicts)]
+                yield [Result(label.frame, label.recording, label.timestamp_us, each, label.sensors) for each in found]
             size = _BATCH
 
-    def _results(self, matcher: Matcher, candidate: Candidate, places: Places) -> list[Result]:
-        label, among = candidate.label, candidate.among
-        verdicts: list[Verdict] = []
-        if self.all_matches:
-            verdicts += matcher.matches(label, among=among, places=places)
-        return [
-            Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors)
-            for verdict in verdicts or [matcher.match(label, among=among, places=places)]
-        ]
+    def _every_match(self, matcher: Matcher, label: Label, among: Among | None, places: Places) -> list[Verdict]:
+        """Every correspondence by which a label matches, or else why none does."""
+        matches = list(matcher.matches(label, among=among, places=places))
+        return [*matches] if matches else [matcher.match(label, among=among, places=places)]
 
 
 def every_label(dataset: Dataset, block: Block) -> Iterator[Label]:

@@ -270,12 +270,13 @@ class Query:
                     yield from self._lacking(name, world, progress)
                     continue
                 cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1)
-                for result in self._merge(world.plan, hands.decide(cut), progress):
-                    yield result
-                    if isinstance(result.verdict, Match) and left is not None:
-                        left -= 1
-                        if left <= 0:
-                            return
+                with closing(self._merge(world.plan, hands.decide(cut), progress)) as merged:
+                    for result in merged:
+                        yield result
+                        if isinstance(result.verdict, Match) and left is not None:
+                            left -= 1
+                            if left <= 0:
+                                return
 
     def _lacking(self, map_name: str, told: Diagnostic, progress: Callable[[int], None]) -> Iterator[Result]:
         """The frames of a map that lacks what the program needs, which are counted already."""
@@ -287,34 +288,39 @@ class Query:
                         yield Result(frame, recording, time, NoMatch(cause))
         progress(self._frames(map_name))
 
-    def _merge(self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]) -> Iterator[Result]:
+    def _merge(self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]) -> Generator[Result]:
         for block in decided:
             found = iter(block.found)
             start = 0
-            for place in np.flatnonzero(block.missed < 0).tolist():
-                yield from self._excluded(plan, block, start, place)
-                first, *more = next(found)
-                self.funnel.count(first.verdict)
-                progress(place + 1 - start)
-                start = place + 1
-                if self.options.every or isinstance(first.verdict, Match | Unknown):
-                    yield first
-                yield from more
-            yield from self._excluded(plan, block, start, len(block.missed))
-            progress(len(block.missed) - start)
+            try:
+                for place in np.flatnonzero(block.missed < 0).tolist():
+                    if self.options.every:
+                        yield from _excluded(plan, block, start, place)
+                    first, *more = next(found)
+                    self.funnel.count(first.verdict)
+                    progress(place + 1 - start)
+                    start = place + 1
+                    if self.options.every or isinstance(first.verdict, Match | Unknown):
+                        yield first
+                    yield from more
+                if self.options.every:
+                    yield from _excluded(plan, block, start, len(block.missed))
+                progress(len(block.missed) - start)
+                start = len(block.missed)
+            finally:
+                # as far as results were taken
+                past = block.missed[:start]
+                for step, count in enumerate(np.bincount(past[past >= 0], minlength=len(plan.steps)).tolist()):
+                    if count:
+                        self.funnel.exclude(plan.steps[step].what, count)
 
-    def _excluded(self, plan: Plan, block: Decided, start: int, end: int) -> Iterator[Result]:
-        """Count the frames between two candidates."""
-        if start == end:
-            return
-        missed = block.missed[start:end]
-        for step, count in zip(*np.unique(missed, return_counts=True), strict=True):
-            self.funnel.exclude(plan.steps[int(step)].what, int(count))
-        if self.options.every:
-            numbers: list[int] = missed.tolist()
-            for (frame, recording, time), number in zip(block.names[start:end], numbers, strict=True):
-                step = plan.steps[number]
-                yield Result(frame, recording, time, NoMatch(Cause(step.what, step.detail, step.span)))
+
+def _excluded(plan: Plan, block: Decided, start: int, end: int) -> Iterator[Result]:
+    """The frames between two candidates."""
+    numbers: list[int] = block.missed[start:end].tolist()
+    for (frame, recording, time), number in zip(block.names[start:end], numbers, strict=True):
+        step = plan.steps[number]
+        yield Result(frame, recording, time, NoMatch(Cause(step.what, step.detail, step.span)))
 
 
 def _ignore(frames: int) -> None:

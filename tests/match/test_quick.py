@@ -18,7 +18,7 @@ from scenicq.match.ground import replay
 from scenicq.match.ladder import No, Yes, decide
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions, Tolerance
-from scenicq.match.quick import Places
+from scenicq.match.places import Places
 from scenicq.match.verdict import Match, NoMatch
 
 OPTIONS = (
