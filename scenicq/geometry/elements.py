@@ -76,14 +76,20 @@ class NetworkElement:
 
 
 @dataclass(eq=False)
-class LinearElement(NetworkElement):
-    """An element with a direction of travel.
+class LongElement(NetworkElement):
+    """An element that runs along a line.
 
     Attributes:
-        centerline: Polylines in the direction of travel, or None where the map gives none.
+        centerline: Polylines in the direction of travel, of a sidewalk in the road's, or None where the map gives none.
     """
 
     centerline: PolylineSet | None = field(default=None, repr=False, kw_only=True)
+
+
+@dataclass(eq=False)
+class LinearElement(LongElement):
+    """An element with a direction of travel and others before and after it."""
+
     _predecessor: NetworkElement | None = field(default=None, repr=False, kw_only=True)
     _successor: NetworkElement | None = field(default=None, repr=False, kw_only=True)
 
@@ -273,25 +279,13 @@ class PedestrianCrossing(NetworkElement):
 
 
 @dataclass(eq=False)
-class Sidewalk(NetworkElement):
-    """A sidewalk.
-
-    Attributes:
-        centerline: Polylines in the direction of the road, or None where the map gives none.
-    """
-
-    centerline: PolylineSet | None = field(default=None, repr=False, kw_only=True)
+class Sidewalk(LongElement):
+    """A sidewalk."""
 
 
 @dataclass(eq=False)
-class Shoulder(NetworkElement):
-    """A shoulder of a road.
-
-    Attributes:
-        centerline: Polylines in the direction of traffic, or None where the map gives none.
-    """
-
-    centerline: PolylineSet | None = field(default=None, repr=False, kw_only=True)
+class Shoulder(LongElement):
+    """A shoulder of a road."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

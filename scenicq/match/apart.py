@@ -11,13 +11,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from scenicq.forest.bounds import Interval
-from scenicq.forest.condition import condition
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Node, Range, TruncatedNormal, Value
 from scenicq.forest.walk import leaves, postorder, transform
 from scenicq.match.following import decide_directions
-from scenicq.match.ground import holds, replay
+from scenicq.match.ground import ground_cause, holds, replay
 from scenicq.match.interval import ends
-from scenicq.match.ladder import LINEAR_SLACK, Item, Maybe, No, Outcome, Yes, decide, ground_cause
+from scenicq.match.items import Item, conditioned
+from scenicq.match.ladder import LINEAR_SLACK, Maybe, No, Outcome, Yes, decide
 from scenicq.match.options import Tolerance
 from scenicq.match.picked import Picked, picked
 
@@ -64,11 +64,6 @@ def decide_apart(items: list[Item], tolerance: Tolerance) -> Outcome:
 def _fields(nodes: list[Node]) -> int:
     """At how many hidden points fields are asked for; the ranks of one look-up ask for one and the same."""
     return len({id(node.point) for node in postorder(nodes) if isinstance(node, DirectionAt)})
-
-
-def _given(items: Sequence[Item], given: Mapping[Identity, Value]) -> list[Item]:
-    memo: dict[int, Node] = {}
-    return [(c, condition(node, {}, given, memo), seen) for c, node, seen in items]
 
 
 def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance) -> Outcome:
@@ -199,7 +194,7 @@ class _Sharing:
             return None
         self.tried.add(value)
         given: dict[Identity, Value] = {self.identity: value}
-        outcome = decide_apart(_given(self.left, given), self.tolerance)
+        outcome = decide_apart(conditioned(self.left, given), self.tolerance)
         if not isinstance(outcome, Yes):
             return None
         values = given | dict(outcome.values)

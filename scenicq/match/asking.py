@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.match.following import repaired
 from scenicq.match.ground import replay
-from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
+from scenicq.match.items import Item
+from scenicq.match.ladder import Maybe, No, Outcome, Yes
 from scenicq.match.options import MatchOptions
 from scenicq.smt.answer import Sat, Solver, Unknown, Unsat
 from scenicq.smt.encode import Encoding, Target, UnsupportedError, encode

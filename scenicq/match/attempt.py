@@ -18,7 +18,8 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.apart import decide_apart
 from scenicq.match.casting import Cast
 from scenicq.match.decisions import Asker, Decisions, translated
-from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
+from scenicq.match.items import Item
+from scenicq.match.ladder import Maybe, No, Outcome, Yes
 from scenicq.match.options import MatchOptions
 from scenicq.match.places import Places
 from scenicq.match.planning import GroupPlan, MatchPlan

@@ -56,7 +56,7 @@ from scenicq.match.enclosures import (
     turning,
     turns_near,
 )
-from scenicq.match.ladder import Item
+from scenicq.match.items import Item
 from scenicq.match.multiples import Multiples, multiples_of, solved
 from scenicq.match.tape import SLACK, Tape
 

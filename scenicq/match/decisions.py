@@ -15,7 +15,8 @@ from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Value
 from scenicq.match.apart import decide_apart
 from scenicq.match.casting import Cast
-from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes, condition_group
+from scenicq.match.items import Item, condition_group
+from scenicq.match.ladder import Maybe, No, Outcome, Yes
 from scenicq.match.options import MatchOptions
 from scenicq.match.places import Places
 from scenicq.match.planning import GroupPlan

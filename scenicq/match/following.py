@@ -16,7 +16,6 @@ from typing import cast
 import numpy as np
 
 from scenicq.forest.bounds import Interval
-from scenicq.forest.condition import condition
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import leaves, postorder
@@ -24,7 +23,8 @@ from scenicq.match.agreeing import agreed, joined
 from scenicq.match.branches import Branches
 from scenicq.match.directions import TooMany, directed, halved, settled
 from scenicq.match.ground import holds
-from scenicq.match.ladder import Item, Maybe, No, Outcome, Yes
+from scenicq.match.items import Item, conditioned
+from scenicq.match.ladder import Maybe, No, Outcome, Yes
 from scenicq.match.options import Tolerance
 from scenicq.match.tape import Tape
 from scenicq.match.ways import Way, solved, way_of
@@ -87,8 +87,7 @@ def _whole(items: Sequence[Item], tolerance: Tolerance) -> Outcome:
         given: dict[Identity, Value] = {
             leaf.identity: float(option) for leaf, option in zip(deciding, options, strict=True)
         }
-        memo: dict[int, Node] = {}
-        fixed = [(c, condition(node, {}, given, memo), seen) for c, node, seen in items] if given else items
+        fixed = conditioned(items, given) if given else items
         known = [item for item in fixed if isinstance(item[1], Constant)]
         if not all(holds(c, cast(Constant, node).value, seen, tolerance) for c, node, seen in known):
             continue
@@ -174,8 +173,7 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
     given = {identity: near[identity] for identity in discrete if identity in near}
     if len(given) < len(set(discrete)):
         return None
-    memo: dict[int, Node] = {}
-    tape = Tape([(c, condition(node, {}, given, memo), seen) for c, node, seen in items], tolerance)
+    tape = Tape(conditioned(items, given), tolerance)
     ways = _one_by_one(directed(Branches.around(tape, near, _CLOSE)))
     found = _alone(ways, items[0][0], tolerance)
     return Yes({**given, **found.values}) if isinstance(found, Yes) else None

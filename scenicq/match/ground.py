@@ -7,15 +7,15 @@ from collections.abc import Callable, Mapping
 from typing import cast
 
 from scenicq.forest.compute import CannotEvaluate
-from scenicq.forest.condition import condition
 from scenicq.forest.evaluate import admits, evaluate_all
 from scenicq.forest.groups import Comparison, Constraint
-from scenicq.forest.nodes import DirectionAt, Identity, Index, Leaf, Node, Undefined, Value
+from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, Undefined, Value
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.geometry.angles import distance
+from scenicq.match.items import Item, conditioned
 from scenicq.match.options import Tolerance
 
-__all__ = ["ROUNDING", "agrees", "holds", "replay", "show_value", "unlike"]
+__all__ = ["ROUNDING", "agrees", "ground_cause", "holds", "replay", "show_value", "unlike"]
 
 ROUNDING = 1e-9
 """Metres or radians that floating point may be off."""
@@ -96,9 +96,7 @@ def replay(
     if any(leaf.identity not in assignment for leaf in asked):
         # what is not picked needs no value
         picked = [leaf.identity for leaf in asked if isinstance(leaf, Index) and leaf.identity in assignment]
-        choices = {identity: assignment[identity] for identity in picked}
-        memo: dict[int, Node] = {}
-        items = [(c, condition(node, {}, choices, memo), seen) for c, node, seen in items]
+        items = conditioned(items, {identity: assignment[identity] for identity in picked})
     if headings is not None:
 
         def nearest(node: DirectionAt, allowed: tuple[float, ...]) -> float:
@@ -181,3 +179,12 @@ def _holds_with(
     return all(
         holds(constraint, values[id(node)], seen, tolerance, slack + ROUNDING) for constraint, node, seen in items
     )
+
+
+def ground_cause(item: Item) -> str:
+    """What a ground constraint that fails looks like, for a person."""
+    constraint, node, observed = item
+    value = cast(Constant, node).value
+    if isinstance(constraint, Comparison):
+        return unlike(constraint.property, value, observed)
+    return value.reason if isinstance(value, Undefined) else "does not hold"

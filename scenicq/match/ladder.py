@@ -16,8 +16,7 @@ from typing import cast
 from scenicq.forest import build
 from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.condition import condition
-from scenicq.forest.evaluate import Observation
-from scenicq.forest.groups import Comparison, Condition, Constraint, Group
+from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     Compare,
@@ -31,23 +30,19 @@ from scenicq.forest.nodes import (
     LogicOp,
     Node,
     Select,
-    Undefined,
     Value,
 )
-from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import deciding_first, leaves, postorder
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.match.affine import AffineVector, affine_scalar, affine_vector
-from scenicq.match.ground import holds, replay, unlike
+from scenicq.match.ground import ground_cause, holds, replay
 from scenicq.match.interval import Reach, reach_heading, reach_number, reach_position
+from scenicq.match.items import Item, conditioned, fact
 from scenicq.match.linear import NotLinear, inside, position_boxes, solve_affine
 from scenicq.match.options import Tolerance
 from scenicq.match.program import Row
 
-__all__ = ["LINEAR_SLACK", "Item", "Maybe", "No", "Outcome", "Yes", "condition_group", "decide", "fact", "ground_cause"]
-
-Item = tuple[Constraint, Node, Value]
-"""A constraint, what conditioning left of its expression, and the label's value if it is a comparison."""
+__all__ = ["LINEAR_SLACK", "Maybe", "No", "Outcome", "Yes", "decide"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,33 +79,6 @@ _MOST_PROGRAMS = 20_000
 """Linear programs for one decision: some seconds, after which a solver does no worse."""
 LINEAR_SLACK = 1e-6
 """Metres or radians that the witness of a linear program may be off."""
-
-
-def condition_group(group: Group, observed: Observation, scope: Mapping[Identity, Value] | None = None) -> list[Item]:
-    """A group's constraints given the label (algorithm 1, line 11); what they share stays shared."""
-    items: list[Item] = []
-    memo: dict[int, Node] = {}
-    for constraint in group.constraints:
-        node = condition(constraint.expression, observed, scope, memo)
-        known: Value = None
-        if isinstance(constraint, Comparison):
-            known = observed[(constraint.object, constraint.property)]
-        items.append((constraint, node, known))
-    return items
-
-
-def ground_cause(item: Item) -> str:
-    """What a ground constraint that fails looks like, for a person."""
-    constraint, node, observed = item
-    value = cast(Constant, node).value
-    if isinstance(constraint, Comparison):
-        return unlike(constraint.property, value, observed)
-    return value.reason if isinstance(value, Undefined) else "does not hold"
-
-
-def fact(holding: Node) -> Item:
-    """A condition that holds in one branch of a decision, as a constraint."""
-    return (Condition(Requirement(holding, holding.span), holding), holding, None)
 
 
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
@@ -193,10 +161,8 @@ class _Ladder:
     ) -> Outcome:
         def outcomes() -> Iterator[Outcome]:
             for option in options:
-                chosen = {leaf.identity: float(option)}
-                memo: dict[int, Node] = {}
-                fixed = [(c, condition(node, {}, chosen, memo), value) for c, node, value in items]
-                yield self.decide(fixed, given | chosen, rows)
+                chosen: dict[Identity, Value] = {leaf.identity: float(option)}
+                yield self.decide(conditioned(items, chosen), given | chosen, rows)
 
         return self._branch(items[0][0], outcomes())
 
@@ -205,8 +171,7 @@ class _Ladder:
 
         def outcomes() -> Iterator[Outcome]:
             for value in (True, False):
-                memo: dict[int, Node] = {id(truth): Constant(value, span=truth.span)}
-                fixed = [(c, condition(node, {}, None, memo), known) for c, node, known in items]
+                fixed = conditioned(items, memo={id(truth): Constant(value, span=truth.span)})
                 yield self.decide([*fixed, fact(truth if value else _opposite(truth))], given, rows)
 
         return self._branch(items[0][0], outcomes())
@@ -272,8 +237,7 @@ class _Ladder:
         self, items: list[Item], field: DirectionAt, heading: float, rows: list[Row]
     ) -> tuple[list[Item], Box] | No:
         """The constraints where the field has a heading, and where its point can then be."""
-        memo: dict[int, Node] = {id(field): Constant(heading, span=field.span)}
-        fixed = [(c, condition(node, {}, None, memo), value) for c, node, value in items]
+        fixed = conditioned(items, memo={id(field): Constant(heading, span=field.span)})
         for item in fixed:
             if isinstance(item[1], Constant) and not holds(item[0], item[1].value, item[2], self.tolerance):
                 return No(item[0], ground_cause(item))

@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 
 from scenicq.forest.bounds import Box, leaf_boxes, scalar_bounds
-from scenicq.forest.groups import Comparison, Constraint
+from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import (
     Compare,
     CompareOp,
@@ -39,6 +39,7 @@ from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
 from scenicq.match.affine import Affine, AffineVector, Variable, affine_scalar, affine_vector
 from scenicq.match.interval import ends
+from scenicq.match.items import Item
 from scenicq.match.options import Tolerance
 from scenicq.match.program import LinearSystem, NotSolved, Row
 
@@ -52,7 +53,6 @@ _MOST_EXTENTS = 16
 _CULLING = 1e-6
 """Metres by which boxes are grown so that rounding loses nothing."""
 
-_Item = tuple[Constraint, Node, Value]
 Alternative = list[list[Row]]
 """Sets of linear facts, one of which holds."""
 
@@ -61,7 +61,7 @@ class NotLinear(Exception):
     """The constraints are not affine, or the linear programs do not tell."""
 
 
-def position_boxes(items: Sequence[_Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> dict[Identity, Box]:
+def position_boxes(items: Sequence[Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> dict[Identity, Box]:
     """Where each random point can lie, from the positions that it leads to and what it must be close to.
 
     A little too much, never too little.
@@ -112,7 +112,7 @@ def inside(place: AffineVector, polygon: np.ndarray) -> list[Row]:
 
 
 def solve_affine(
-    items: Sequence[_Item],
+    items: Sequence[Item],
     rows: Sequence[Row],
     tolerance: Tolerance,
     places: Sequence[Node] = (),
@@ -143,7 +143,7 @@ def solve_affine(
 
 
 def extent_affine(
-    items: Sequence[_Item],
+    items: Sequence[Item],
     rows: Sequence[Row],
     tolerance: Tolerance,
     places: Sequence[Node],
@@ -159,7 +159,7 @@ def extent_affine(
 
 
 def _problem(
-    items: Sequence[_Item],
+    items: Sequence[Item],
     rows: Sequence[Row],
     tolerance: Tolerance,
     places: Sequence[Node],
@@ -184,7 +184,7 @@ class _Problem:
     alternatives: list[Alternative] = field(default_factory=list["Alternative"])
     discs: list[tuple[Affine, Affine, float]] = field(default_factory=list[tuple[Affine, Affine, float]])
 
-    def add(self, item: _Item) -> None:
+    def add(self, item: Item) -> None:
         """Add a constraint."""
         constraint, node, observed = item
         if not isinstance(constraint, Comparison):

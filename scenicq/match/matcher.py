@@ -23,7 +23,8 @@ from scenicq.match.attempt import Attempt, Failure, Solution
 from scenicq.match.casting import Among, candidates_of, cast_roles, egos
 from scenicq.match.constraints import Signature, describe_constraint
 from scenicq.match.direct import Casting, Direct, direct_of, signature_of
-from scenicq.match.ladder import Item, No, Outcome
+from scenicq.match.items import Item
+from scenicq.match.ladder import No, Outcome
 from scenicq.match.options import MatchOptions
 from scenicq.match.places import Disc, Places
 from scenicq.match.planning import MatchPlan, make_plan, relevant_properties

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from scenicq.forest import build
 from scenicq.forest.bounds import Box
-from scenicq.forest.condition import condition
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import CompareOp, Constant, Identity, Index, Node, PointIn, Select, Undefined, Value
 from scenicq.forest.walk import leaves
@@ -25,7 +24,7 @@ from scenicq.geometry import shapes
 from scenicq.geometry.meeting import meets
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
-from scenicq.match.ladder import Item, fact
+from scenicq.match.items import Item, conditioned, fact
 from scenicq.match.linear import position_boxes
 from scenicq.match.options import Tolerance
 
@@ -104,9 +103,7 @@ def _with(items: Sequence[Item], index: Node, number: int) -> Picked:
     value = float(number)
     if isinstance(index, Index):
         given: dict[Identity, Value] = {index.identity: value}
-        memo: dict[int, Node] = {}
-        return Picked([(c, condition(node, {}, given, memo), seen) for c, node, seen in items], given)
-    memo = {id(index): Constant(value, span=index.span)}
-    fixed = [(c, condition(node, {}, None, memo), seen) for c, node, seen in items]
+        return Picked(conditioned(items, given), given)
+    fixed = conditioned(items, memo={id(index): Constant(value, span=index.span)})
     holds = build.compare(CompareOp.EQ, index, Constant(value, span=index.span), index.span)
     return Picked([*fixed, fact(holds)], {})

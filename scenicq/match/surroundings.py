@@ -8,7 +8,7 @@ from typing import cast
 from scenicq.forest.nodes import Constant, Node, PointIn, RegionIntersection
 from scenicq.forest.walk import transform
 from scenicq.geometry.regions import Disc, Region, intersection
-from scenicq.match.ladder import Item
+from scenicq.match.items import Item
 
 __all__ = ["within_radius"]
 

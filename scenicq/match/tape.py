@@ -12,7 +12,7 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node
 from scenicq.forest.walk import is_leaf, postorder
 from scenicq.match.enclosures import Enclosure
-from scenicq.match.ladder import Item
+from scenicq.match.items import Item
 from scenicq.match.options import Tolerance
 
 __all__ = ["SLACK", "Tape"]

@@ -23,7 +23,8 @@ from scenicq.geometry.shapes import Bounds
 from scenicq.match.affine import Affine, AffineVector, affine_scalar, affine_vector
 from scenicq.match.branches import Branches
 from scenicq.match.ground import holds, replay
-from scenicq.match.ladder import LINEAR_SLACK, Item, Maybe, No, Outcome, Yes
+from scenicq.match.items import Item, conditioned
+from scenicq.match.ladder import LINEAR_SLACK, Maybe, No, Outcome, Yes
 from scenicq.match.linear import Alternative, NotLinear, extent_affine, inside, solve_affine
 from scenicq.match.options import Tolerance
 from scenicq.match.program import Row
@@ -139,7 +140,7 @@ def way_of(cases: Branches, number: int, shared: Identity | None) -> Way | None:
         else:
             headings[id(node)] = chosen
             memo[id(node)] = Constant(chosen, span=node.span)
-    items = [(c, condition(node, {}, given, memo), seen) for c, node, seen in tape.items]
+    items = conditioned(tape.items, given, memo=memo)
     if any(isinstance(node, Constant) and not holds(c, node.value, seen, tape.tolerance) for c, node, seen in items):
         return None
     exact = all(_is_affine(node, seen) for c, node, seen in items if isinstance(c, Comparison))

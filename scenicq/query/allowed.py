@@ -18,7 +18,8 @@ from scenicq.geometry.angles import normalize
 from scenicq.match.attempt import Attempt
 from scenicq.match.constraints import describe_constraint
 from scenicq.match.ground import show_value
-from scenicq.match.ladder import Item, No, Yes, decide
+from scenicq.match.items import Item
+from scenicq.match.ladder import No, Yes, decide
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import Tolerance
 

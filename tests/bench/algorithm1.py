@@ -26,7 +26,8 @@ from scenicq.geometry.cells import triangles
 from scenicq.geometry.regions import Region
 from scenicq.match.asking import ask
 from scenicq.match.constraints import build_groups
-from scenicq.match.ladder import Yes, condition_group
+from scenicq.match.items import condition_group
+from scenicq.match.ladder import Yes
 from scenicq.match.observe import observe
 from scenicq.match.options import MatchOptions
 from scenicq.smt import inside
