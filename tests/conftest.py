@@ -14,10 +14,18 @@ from scenicq_cli.sources import remember
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "sample_data"
+_HANGS_S = 1800
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write golden files instead of comparing with them")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What is slow is slower still on a busy machine: only what hangs is to be stopped."""
+    for item in items:
+        if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(_HANGS_S))
 
 
 @pytest.fixture(scope="session", autouse=True)

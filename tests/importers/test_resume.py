@@ -171,7 +171,6 @@ class Deadly:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_twenty_kills(source: Path, tmp_path: Path, jobs: int) -> None:

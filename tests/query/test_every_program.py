@@ -114,7 +114,6 @@ def test_some_programs_find_the_same(dataset: Dataset, step: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="timers of POSIX")
-@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("dataset", SOURCES, indirect=True)
 def test_every_program_finds_the_same(

@@ -171,7 +171,6 @@ def test_dask_gives_the_same_and_listens_on_the_loopback_only(dataset: Dataset, 
 
 @needs_signals
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
 @pytest.mark.usefixtures("needs_dask")
 def test_dask_workers_that_are_killed(dataset: Dataset, undisturbed: Found) -> None:
     chance, killed = random.Random(0), 0
