@@ -140,7 +140,7 @@ def _case(blamed: Sequence[tuple[str, int]]) -> str:
 def _level(conditions_: Sequence[str], first: int = 0) -> str:
     """How many conditions hold before the first that does not."""
     if not conditions_:
-        return str(first)
+        return f"{first}::UTINYINT"
     cases = " ".join(f"WHEN NOT coalesce({sql}, true) THEN {place}" for place, sql in enumerate(conditions_, first))
     return f"(CASE {cases} ELSE {first + len(conditions_)} END)::UTINYINT"
 
@@ -232,6 +232,12 @@ def _frames(
     draft.stages.append(Stage("stage0", (_table("stage0", query),)))
 
 
+def _reached(role: _Role, classes: Sequence[str]) -> str:
+    """How far an object of one of some classes comes in a role: 1 by its class, more by what is asked of it alone."""
+    plain = [each.sql for each in role.plain]
+    return _level(plain, 1) if len(classes) == 1 else _level([role.classes, *plain])
+
+
 def _objects(
     draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[Condition]], options: MatchOptions
 ) -> None:
@@ -242,14 +248,12 @@ def _objects(
     if any(role.placed for role in roles):
         kept.append("a.id")
     distinct = {role.column: role for role in roles}
-    levels = [
-        f"{_level([role.classes, *(each.sql for each in role.plain)])} AS {role.column}" for role in distinct.values()
-    ]
-    classes = " OR ".join(dict.fromkeys(role.classes for role in roles))
+    classes = tuple(dict.fromkeys(role.classes for role in roles))
+    levels = [f"{_reached(role, classes)} AS {role.column}" for role in distinct.values()]
     near = f" AND a.ego_distance <= {number(options.radius + SLACK)}" if own_ego and options.radius is not None else ""
     narrow = (
         f"SELECT {EGO}.f, a.number AS row, {', '.join([*kept, *levels])} FROM {OBJECTS} a "
-        f"JOIN stage0 {EGO} ON a.frame = {EGO}.frame WHERE {EGO}.missed IS NULL AND ({classes}){near}"
+        f"JOIN stage0 {EGO} ON a.frame = {EGO}.frame WHERE {EGO}.missed IS NULL AND ({' OR '.join(classes)}){near}"
     )
     pools: dict[str, int] = {}
     blamed: list[tuple[str, int]] = []
