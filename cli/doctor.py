@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import click
 
+from scenicq import __version__
 from scenicq.smt.solver import available
 
 from .main import ERROR
@@ -17,7 +18,7 @@ from .report import columns
 
 __all__ = ["doctor"]
 
-_PACKAGES = ("scenicq", "click", "duckdb", "highspy", "numpy", "pyarrow", "shapely", "tqdm", "dreal")
+_PACKAGES = ("click", "duckdb", "highspy", "msgspec", "numpy", "pyarrow", "shapely", "tqdm", "dreal")
 
 
 def _version(package: str) -> str | None:
@@ -41,7 +42,8 @@ def doctor(ctx: click.Context, *, format_: str) -> None:
 
     dReal is preferred where it loads; the portable solver needs nothing.
     """
-    versions = {"python": platform.python_version(), **{package: _version(package) for package in _PACKAGES}}
+    versions = {"python": platform.python_version(), "scenicq": __version__}
+    versions |= {package: _version(package) for package in _PACKAGES}
     solvers = available()
     if format_ == "json":
         content = {"platform": platform.platform(), "versions": versions, "solvers": [asdict(each) for each in solvers]}

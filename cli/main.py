@@ -6,6 +6,7 @@ Subcommands are imported when they are called, so that `--help` and `--version` 
 from __future__ import annotations
 
 import difflib
+import errno
 import gc
 import os
 import sys
@@ -14,7 +15,8 @@ from typing import Any, NoReturn
 
 import click
 
-from scenicq.errors import ScenicqError
+from scenicq import __version__
+from scenicq.errors import Diagnostic, ScenicqError
 from scenicq.garbage import seldom_collected
 
 from .interrupts import Interrupts
@@ -44,6 +46,8 @@ _MODULES = {"report": "compare"}
 
 NOTHING, ERROR, INTERRUPTED = 1, 2, 130
 """Exit codes besides 0, in the manner of grep."""
+
+_NO_ROOM = {errno.ENOSPC, errno.EFBIG, errno.EIO, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
 INTERRUPTS = Interrupts()
 """Of this process."""
@@ -103,15 +107,29 @@ class Commands(click.Group):
         except KeyboardInterrupt:
             _interrupted(ctx)
         except BrokenPipeError:
-            # The reader has what it wanted. What is left in the buffer must not fail again when the interpreter ends.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            ctx.exit(0)
-        except Exception:  # noqa: BLE001 - our own mistake, whatever it is
+            ctx.exit(0)  # the reader has what it wanted
+        except Exception as error:
             if INTERRUPTS.noticed:
                 _interrupted(ctx)
+            if _is_of_output(error):
+                raise
+            # our own mistake, whatever it is
             click.echo(f"internal error: this is a mistake in scenicq; please report it with {_written()}", err=True)
             ctx.exit(ERROR)
         return result
+
+
+def _is_of_output(error: Exception) -> bool:
+    """Whether standard output takes no more. Other files are looked after where they are written."""
+    return isinstance(error, OSError) and error.filename is None and error.errno in _NO_ROOM
+
+
+def _let_go_of_output() -> None:
+    """What standard output did not take must not fail again when the interpreter ends, and take the exit code."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _interrupted(ctx: click.Context) -> NoReturn:
@@ -124,12 +142,11 @@ def _written() -> str:
     """Write what is needed to find a mistake into a file, and give its name."""
     import tempfile  # noqa: PLC0415 - these take long to load, and no run should need them
     import traceback  # noqa: PLC0415
-    from importlib.metadata import version  # noqa: PLC0415
 
     with tempfile.NamedTemporaryFile(
         "w", prefix="scenicq-error-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:
-        file.write(f"scenicq {version('scenicq')}, Python {sys.version}, {sys.platform}\n{sys.argv}\n\n")
+        file.write(f"scenicq {__version__}, Python {sys.version}, {sys.platform}\n{sys.argv}\n\n")
         file.write(traceback.format_exc())
     return file.name
 
@@ -145,7 +162,7 @@ def _written() -> str:
     epilog="\b\nExample:\n  scenicq ingest sample_data/crossroads demo/crossroads\n"
     "  scenicq match sample_data/scenarios/02_crossing_cars.scenic demo/crossroads",
 )
-@click.version_option(package_name="scenicq", message="%(prog)s %(version)s")
+@click.version_option(__version__, message="%(prog)s %(version)s")
 def cli() -> None:
     """Find the recorded frames that match a Scenic scenario.
 
@@ -162,4 +179,14 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # until the subcommand is loaded there is no garbage to be looked for
     gc.disable()
-    cli(prog_name="scenicq")
+    if sys.stdout is None:  # pyright: ignore[reportUnnecessaryComparison] - the caller closed it
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
+    try:
+        cli(prog_name="scenicq")
+    except OSError as error:
+        if not _is_of_output(error):
+            raise
+        show([Diagnostic("target-unwritable", f"standard output cannot be written: {error.strerror}")])
+        raise SystemExit(ERROR) from None
+    finally:
+        _let_go_of_output()

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from scenicq.query.run import Query, QueryOptions, read_program
     from scenicq.store.dataset import open_dataset
 
+__version__ = "0.1.0"
+
 __all__ = [
     "MatchOptions",
     "Matcher",
@@ -29,6 +31,7 @@ __all__ = [
     "QueryOptions",
     "ScenicqError",
     "Source",
+    "__version__",
     "compile_scenario",
     "ingest",
     "open_dataset",

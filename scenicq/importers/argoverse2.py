@@ -21,6 +21,7 @@ from scenicq.importers.by_file import Place, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_feather
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.folders import first_files, readable
+from scenicq.importers.layouts import ARGOVERSE2_FILES, argoverse2_logs
 from scenicq.importers.motion import Rigid, quaternion, velocities
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
@@ -36,7 +37,8 @@ _AXLE_TO_CENTRE_M = 1.42
 
 _REACH_US, _LONGEST_STEP_US = 250_000, 550_000
 _FARTHEST_M = 1e7
-_BOXES, _POSES, _FRAMES = "annotations", "city_SE3_egovehicle", 156
+_BOXES, _POSES = ARGOVERSE2_FILES
+_FRAMES = 156
 _EGO_CLASS = "EGO_VEHICLE"
 _POSE = {"qw": "real", "qx": "real", "qy": "real", "qz": "real", "tx_m": "real", "ty_m": "real", "tz_m": "real"}
 _SIZE = ("width_m", "length_m", "height_m")
@@ -51,7 +53,7 @@ class Argoverse2:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is a log, or a folder of them, or one of the official folders above."""
-        return bool(_log_folders(path))
+        return bool(argoverse2_logs(path))
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open logs; each is read when it is its turn, so memory is that of the largest and of the maps.
@@ -59,7 +61,7 @@ class Argoverse2:
         Raises:
             DataError: `file-missing`; with a strict report whatever is unsound.
         """
-        logs = _log_folders(path)
+        logs = argoverse2_logs(path)
         if not logs:
             raise missing(path, "no log with `annotations.feather`")
         maps = read_maps(options.maps, report)
@@ -69,10 +71,7 @@ class Argoverse2:
         return by_file_source(
             f"argoverse2-{path.resolve().name}",
             maps,
-            [
-                Place(log.name, tuple(log / f"{name}.feather" for name in (_BOXES, _POSES)), path, log.name)
-                for log in logs
-            ],
+            [Place(log.name, tuple(log / name for name in ARGOVERSE2_FILES), path, log.name) for log in logs],
             {**taxonomy("argoverse2"), **options.class_map},
             _read_log,
             frames=_FRAMES * len(logs),
@@ -105,7 +104,7 @@ def archive_of(folder: Path) -> Path | None:
 
 def _read_log(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     labels = _Log(place, classes, report).labels()
-    return [(label, f"{place.name}/{_BOXES}.feather") for label in labels]
+    return [(label, f"{place.name}/{_BOXES}") for label in labels]
 
 
 class _Log:
@@ -119,13 +118,13 @@ class _Log:
         self._report = report
         self._boxes: defaultdict[int, list[_Box]] = defaultdict(list)
         self._tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
-        rows = read_feather(log / f"{_BOXES}.feather", _BOX, {"num_interior_pts": "integer"})
+        rows = read_feather(log / _BOXES, _BOX, {"num_interior_pts": "integer"})
         self._poses = self._read_poses({time for time in rows["timestamp_ns"] if time is not None})
         for number in range(len(rows["timestamp_ns"])):
             try:
                 self._add({key: values[number] for key, values in rows.items()})
             except InvalidError as error:
-                report.left_out("object", "record-invalid", f"{log.name}/{_BOXES}.feather:{number + 1}: {error}")
+                report.left_out("object", "record-invalid", f"{log.name}/{_BOXES}:{number + 1}: {error}")
 
     def labels(self) -> list[Label]:
         times = sorted(self._poses)
@@ -171,14 +170,14 @@ class _Log:
         )
 
     def _read_poses(self, wanted: set[int]) -> dict[int, Rigid]:
-        rows = read_feather(self._log / f"{_POSES}.feather", {"timestamp_ns": "integer", **_POSE})
+        rows = read_feather(self._log / _POSES, {"timestamp_ns": "integer", **_POSE})
         poses: dict[int, Rigid] = {}
         for number, time in enumerate(rows["timestamp_ns"]):
             if time in wanted and time not in poses:
                 try:
                     poses[time] = _pose({key: values[number] for key, values in rows.items()})
                 except InvalidError as error:
-                    place = f"{self._log.name}/{_POSES}.feather:{number + 1}"
+                    place = f"{self._log.name}/{_POSES}:{number + 1}"
                     self._report.left_out("ego pose", "record-invalid", f"{place}: {error}")
         for time in sorted(wanted - set(poses)):
             message = f"{self._log.name}: annotations at {time} have no sound pose of the ego"
@@ -234,17 +233,3 @@ def _pose(row: Mapping[str, Any]) -> Rigid:
     if any(row[name] is None or not abs(row[name]) < _FARTHEST_M for name in _POSE):
         raise InvalidError("its pose is not finite")
     return quaternion(row["qw"], row["qx"], row["qy"], row["qz"], (row["tx_m"], row["ty_m"], row["tz_m"]))
-
-
-def _log_folders(path: Path) -> list[Path]:
-    """Folders of logs at or up to three levels below a path, such as `sensor/val/LOG`, by name."""
-    if _is_log(path):
-        return [path]
-    for pattern in ("*/annotations.feather", "*/*/annotations.feather", "sensor/*/*/annotations.feather"):
-        if found := [file.parent for file in path.glob(pattern) if _is_log(file.parent)]:
-            return sorted(found, key=lambda folder: (folder.name, folder))
-    return []
-
-
-def _is_log(path: Path) -> bool:
-    return all((path / f"{name}.feather").is_file() for name in (_BOXES, _POSES))

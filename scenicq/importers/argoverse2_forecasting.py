@@ -17,7 +17,7 @@ from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_parquet
 from scenicq.importers.fields import InvalidError
-from scenicq.importers.folders import first_files
+from scenicq.importers.layouts import argoverse2_scenarios
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
@@ -41,7 +41,7 @@ class Argoverse2Forecasting:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is a scenario's folder, or one that holds them at up to two levels."""
-        return bool(_scenarios(path))
+        return bool(argoverse2_scenarios(path))
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open scenarios; each is a recording.
@@ -49,7 +49,7 @@ class Argoverse2Forecasting:
         Raises:
             DataError: `file-missing`; with a strict report whatever is unsound.
         """
-        files = _scenarios(path)
+        files = argoverse2_scenarios(path)
         if not files:
             raise missing(path, "no `scenario_*.parquet`")
         maps = read_maps(options.maps, report)
@@ -66,10 +66,6 @@ class Argoverse2Forecasting:
             object_bytes=40,
             facts={"time": "steps of 0.1 s from 0", "sizes": "none in the source"},
         )
-
-
-def _scenarios(path: Path) -> list[Path]:
-    return first_files(path, "scenario_*.parquet", "*/scenario_*.parquet", "*/*/scenario_*.parquet")
 
 
 def _name(file: Path) -> str:

@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.geometry.features import MapFeature, ProblemSink, dangling, read_geojson
 from scenicq.importers.fields import InvalidError, check_characters, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.labels import Label, LabelObject, Recording
+
+if TYPE_CHECKING:
+    from scenicq.geometry.features import MapFeature, ProblemSink
 
 __all__ = [
     "ClassNames",
@@ -254,6 +256,10 @@ def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapF
     Raises:
         DataError: `file-missing` or `file-invalid`.
     """
+    if not files:
+        return {}
+    from scenicq.geometry.features import dangling, read_geojson  # noqa: PLC0415 - slow to load, and for maps
+
     maps: dict[str, tuple[MapFeature, ...]] = {}
     for name in sorted(files):
         problems: list[tuple[str, str]] = []

@@ -17,9 +17,10 @@ from scenicq.importers.by_file import Place, by_file_source, missing, take_map
 from scenicq.importers.commonroad_map import lanelet_features
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
+from scenicq.importers.layouts import commonroad_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.report import Report
-from scenicq.importers.xml_tree import attribute, number, read_xml, root_name
+from scenicq.importers.xml_tree import attribute, number, read_xml
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
@@ -37,7 +38,7 @@ class CommonRoad:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is such a file or a folder of them."""
-        return bool(_files(path))
+        return bool(commonroad_files(path))
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open scenarios: their maps are read here, obstacles in turn.
@@ -45,7 +46,7 @@ class CommonRoad:
         Raises:
             DataError: `file-missing`; with a strict report whatever is unsound.
         """
-        files = _files(path)
+        files = commonroad_files(path)
         if not files:
             raise missing(path, "no `*.xml` with a root `commonRoad`")
         maps = read_maps(options.maps, report)
@@ -62,11 +63,6 @@ class CommonRoad:
             object_bytes=500,
             facts={**ego_facts(options.ego), "velocity": "the speed of the source, along the heading"},
         )
-
-
-def _files(path: Path) -> list[Path]:
-    found = [path] if path.suffix == ".xml" else sorted(path.glob("*.xml"))
-    return [file for file in found if file.is_file() and root_name(file) == "commonRoad"]
 
 
 def _read_map(file: Path, on_problem: ProblemSink) -> tuple[MapFeature, ...]:

@@ -10,9 +10,9 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.base import Entry, Importer, Options, Source, read_class_map
 from scenicq.importers.folders import readable
@@ -20,7 +20,6 @@ from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
 from scenicq.importers.segments import Job, World, fingerprint, maps_digest, write_segments
-from scenicq.processes import as_many_as_pay
 from scenicq.store.manifest import LeftOut, Manifest, is_dataset
 from scenicq.store.segment import SEGMENT_OBJECTS, Segment, read_segments, segments_of
 from scenicq.store.writer import DatasetWriter
@@ -122,9 +121,7 @@ def ingest(
         ]
         reached = _Reached(opened.frames, progress)
         known = _known(writer, target_path if update and not force else None)
-        reused = _write_all(
-            opened, writer, groups, known, strict=strict, jobs=jobs or as_many_as_pay(), reached=reached
-        )
+        reused = _write_all(opened, writer, groups, known, strict=strict, jobs=jobs, reached=reached)
         for segment in writer.segments:
             report.merge(segment.counts, segment.told)
         if not any(segment.recordings for segment in writer.segments):
@@ -185,7 +182,7 @@ def _write_all(
     known: _Known,
     *,
     strict: bool,
-    jobs: int,
+    jobs: int | None,
     reached: _Reached,
 ) -> int:
     """Write or take over every segment; the result is the number of recordings that were taken over."""
@@ -276,8 +273,8 @@ def _provenance(
     return {
         "source": readable(source),
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": {"python": platform.python_version()}
-        | {package: _version(package) for package in ("scenicq", "numpy", "pyarrow", "shapely")},
+        "versions": {"python": platform.python_version(), "scenicq": __version__}
+        | {package: _version(package) for package in ("numpy", "pyarrow", "shapely")},
         "options": {
             "maps": {readable(name): readable(file) for name, file in options.maps.items()},
             "class_map": None if class_map is None else readable(class_map),
@@ -289,6 +286,8 @@ def _provenance(
 
 
 def _version(package: str) -> str | None:
+    from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415 - slow to load
+
     try:
         return version(package)
     except PackageNotFoundError:

@@ -16,8 +16,8 @@ from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, missing, take_map
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
-from scenicq.importers.folders import first_files
 from scenicq.importers.lanelet2_map import read_lanelets
+from scenicq.importers.layouts import interaction_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
@@ -37,7 +37,7 @@ class Interaction:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is the dataset, a scene's folder or one above."""
-        return bool(_files(path))
+        return bool(interaction_files(path))
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open track files; each is a recording.
@@ -45,7 +45,7 @@ class Interaction:
         Raises:
             DataError: `file-missing`; with a strict report whatever is unsound.
         """
-        files = _files(path)
+        files = interaction_files(path)
         if not files:
             raise missing(path, "no `vehicle_tracks_*.csv`")
         maps = read_maps(options.maps, report)
@@ -69,11 +69,6 @@ class Interaction:
             object_bytes=90,
             facts={**ego_facts(options.ego), "people": "neither heading nor size in the source"},
         )
-
-
-def _files(path: Path) -> list[Path]:
-    name = "vehicle_tracks_*.csv"
-    return first_files(path, name, f"*/{name}", f"recorded_trackfiles/*/{name}")
 
 
 def _map_file(file: Path, scene: str) -> Path | None:

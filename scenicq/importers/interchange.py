@@ -32,6 +32,7 @@ from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.folders import first_files, read_bytes, readable
 from scenicq.importers.grouped_lines import GroupedLines, group_lines
 from scenicq.importers.interchange_columns import read_columns
+from scenicq.importers.layouts import is_interchange
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy, taxonomy_names
 from scenicq.store.columns import RecordingColumns
@@ -59,10 +60,7 @@ class Interchange:
 
     def recognises(self, path: Path) -> bool:
         """Whether `dataset.json` has the key `interchange`."""
-        try:
-            return "interchange" in fields.record(fields.parse_json(read_bytes(path / "dataset.json")), "it")
-        except (OSError, InvalidError):
-            return False
+        return is_interchange(path)
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open an interchange folder.

@@ -5,13 +5,19 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
+
+import msgspec
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
 
-__all__ = ["Block", "read_list"]
+__all__ = ["Block", "Rows", "read_list"]
+
+Rows: TypeAlias = "msgspec.json.Decoder[list[Any]]"
+"""Decodes elements that are sound, as structs or what else msgspec has for objects."""
 
 _CHUNK = 1 << 20
 _LONGEST = 1 << 23
@@ -28,18 +34,28 @@ class Block:
     """Neighbouring elements of a list.
 
     Attributes:
-        elements: One or more.
         text: What they were read from, from the beginning of the first to the end of the last.
+        rows: The elements as the decoder has them; None where they were not asked for, or not all are sound.
     """
 
-    __slots__ = ("_first", "_lines", "elements", "text")
+    __slots__ = ("_elements", "_first", "_lines", "rows", "text")
 
-    def __init__(self, elements: list[Any], text: str, first: int) -> None:
-        """Take elements, their text and the line where it begins."""
-        self.elements = elements
+    def __init__(
+        self, text: str, first: int, *, elements: list[Any] | None = None, rows: list[Any] | None = None
+    ) -> None:
+        """Take a text, the line where it begins, and the elements in one form at least."""
         self.text = text
+        self.rows = rows
+        self._elements = elements
         self._first = first
         self._lines: list[int] = []
+
+    @property
+    def elements(self) -> list[Any]:
+        """One or more elements as `json` decodes them; where there are rows, only when they are asked for."""
+        if self._elements is None:
+            self._elements = json.loads(f"[{self.text}]")
+        return self._elements
 
     def line(self, number: int) -> int:
         """The line of the file where an element begins; found only when it is asked for, as few are."""
@@ -54,10 +70,14 @@ class Block:
         return self._lines[number]
 
 
-def read_list(path: Path) -> Iterator[Block]:
+def read_list(path: Path, rows: Rows | None = None) -> Iterator[Block]:
     """The elements of a JSON list in order.
 
     Memory is that of a chunk of the file and of what it holds, or of one element.
+
+    Args:
+        path: The file.
+        rows: Makes rows of sound elements, in a fraction of the time that `json` needs.
 
     Raises:
         DataError: `file-missing`, or `file-invalid` with file and line, after the elements before.
@@ -74,7 +94,7 @@ def read_list(path: Path) -> Iterator[Block]:
                 line, position = _skip_gap(buffer, line, position)
                 if buffer.startswith("]", position):
                     return
-                block = _at_once(buffer, position, line) if untried else None
+                block = _at_once(buffer, position, line, rows) if untried else None
                 untried = False
                 if block is None:
                     try:
@@ -88,7 +108,7 @@ def read_list(path: Path) -> Iterator[Block]:
                             raise _invalid(path, line, "is cut off or is not JSON here") from error
                         buffer, position, untried = buffer[position:] + more, 0, True
                         continue
-                    block = Block([element], buffer[position:end], line)
+                    block = Block(buffer[position:end], line, elements=[element])
                 yield block
                 line += block.text.count("\n")
                 position += len(block.text)
@@ -104,7 +124,7 @@ def _skip_gap(text: str, line: int, position: int) -> tuple[int, int]:
     return line + text.count("\n", position, end), end
 
 
-def _at_once(buffer: str, position: int, line: int) -> Block | None:
+def _at_once(buffer: str, position: int, line: int, rows: Rows | None) -> Block | None:
     """All elements but what may be cut off; None where they must be read one by one.
 
     Wherever the text is cut but between two elements of the list, it is left with an open string or bracket. So what
@@ -114,11 +134,13 @@ def _at_once(buffer: str, position: int, line: int) -> Block | None:
     if not ends:
         return None
     text = buffer[position : ends[-1]]
-    try:
-        with without_collector():
-            return Block(json.loads(f"[{text}]"), text, line)
-    except (RecursionError, ValueError):
-        return None
+    with without_collector():
+        if rows is not None:
+            with suppress(RecursionError, msgspec.DecodeError):
+                return Block(text, line, rows=rows.decode(f"[{text}]"))
+        with suppress(RecursionError, ValueError):
+            return Block(text, line, elements=json.loads(f"[{text}]"))
+    return None
 
 
 def _invalid(path: Path, line: int, what: str) -> DataError:

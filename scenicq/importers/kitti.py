@@ -15,6 +15,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, missing
 from scenicq.importers.fields import InvalidError
+from scenicq.importers.layouts import kitti_files
 from scenicq.importers.motion import Rigid, euler, matrix, velocities
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
@@ -39,7 +40,7 @@ class Kitti:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path has the labels."""
-        return bool(_label_files(path))
+        return bool(kitti_files(path))
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open sequences; each is a recording.
@@ -47,7 +48,7 @@ class Kitti:
         Raises:
             DataError: `file-missing`; with a strict report whatever is unsound.
         """
-        files = _label_files(path)
+        files = kitti_files(path)
         if not files:
             raise missing(path, "no `label_02/*.txt`")
         maps = read_maps(options.maps, report)
@@ -65,13 +66,6 @@ class Kitti:
                 "time": "steps of 0.1 s from 0",
             },
         )
-
-
-def _label_files(path: Path) -> list[Path]:
-    for folder in (path, path / "training"):
-        if found := sorted(file for file in folder.glob("label_02/*.txt") if file.is_file()):
-            return found
-    return []
 
 
 def _place(file: Path, root: Path, map_name: str) -> Place:

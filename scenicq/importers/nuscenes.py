@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.geometry.features import MapFeature
 from scenicq.importers.base import Entry, Options, Source, read_maps
 from scenicq.importers.folders import readable
-from scenicq.importers.nuscenes_map import read_expansion
+from scenicq.importers.layouts import is_nuscenes, nuscenes_folders
 from scenicq.importers.nuscenes_scenes import AXLE_TO_CENTRE_M, EGO_SIZE_M, LONGEST_STEP_US, POSE_CHANNEL, SceneReader
 from scenicq.importers.nuscenes_tables import Tables
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
+
+if TYPE_CHECKING:
+    from scenicq.geometry.features import MapFeature
 
 __all__ = ["NuScenes"]
 
@@ -35,7 +38,7 @@ class NuScenes:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is a folder of tables, or has exactly one."""
-        return len(_table_folders(path)) == 1
+        return is_nuscenes(path)
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open a dataroot or one of its `v1.0-*` folders.
@@ -45,7 +48,7 @@ class NuScenes:
         Raises:
             DataError: `file-missing` or `file-invalid`; with a strict report whatever is unsound.
         """
-        folders = _table_folders(path)
+        folders = nuscenes_folders(path)
         if len(folders) != 1:
             message = f"{path} has {len(folders)} folders `v1.0-*` with tables, not one"
             hints = tuple(f"give {folder}" for folder in folders)
@@ -76,17 +79,13 @@ class NuScenes:
         )
 
 
-def _table_folders(path: Path) -> list[Path]:
-    folders = [path] if path.name.startswith("v1.0-") else sorted(path.glob("v1.0-*"))
-    return [f for f in folders if (f / "scene.json").is_file() or (f / "sample_annotation.json").is_file()]
-
-
 def _maps(dataroot: Path, locations: list[str], options: Options, report: Report) -> dict[str, tuple[MapFeature, ...]]:
     maps = read_maps(options.maps, report)
     for location in locations:
         expansion = dataroot / "maps" / "expansion" / f"{location}.json"
         if location in maps or Path(location).name != location or not expansion.is_file():
             continue
+        from scenicq.importers.nuscenes_map import read_expansion  # noqa: PLC0415 - slow to load, and for maps
 
         def tell(element: str, problem: str, file: str = expansion.name) -> None:
             report.left_out("map element", "map-invalid", f"{file}: element `{element}`: {problem}")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import chain, starmap
 from typing import Any
 
 import numpy as np
@@ -13,13 +15,12 @@ from numpy.typing import NDArray
 from scenicq.geometry.angles import normalize, normalize_array
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.sound_columns import UNUSUAL, are, column, demand, vectors
+from scenicq.importers.nuscenes_rows import Annotation
 from scenicq.store.columns import to_json
 
 __all__ = ["Box", "BoxReader", "Boxes", "found", "joined", "of_rows", "pose"]
 
 _COUNTS = ("num_lidar_pts", "num_radar_pts")
-_LARGEST = 2**63 - 1
 
 Box = tuple[str, int, int, tuple[float, ...], str | None]
 """One annotation: see `Boxes`."""
@@ -92,7 +93,8 @@ class BoxReader:
         self._tracks = tracks
         self._attributes = attributes
         self._visible = visible
-        self._beginnings: dict[tuple[tuple[str, ...], str | None], str] = {}
+        # many rows say the same
+        self._also = cache(self._text)
 
     def row(self, token: str, row: Record) -> Box:
         """A single annotation.
@@ -112,57 +114,32 @@ class BoxReader:
                 told[key] = fields.integer(row, key)
         return token, sample, track, (x, y, heading, *size), to_json(told)
 
-    def columns(self, rows: list[Any]) -> Boxes | None:
-        """All annotations of a block; None if anything is not as it should be."""
+    def columns(self, rows: Sequence[Annotation]) -> Boxes | None:
+        """All of some annotations, as `row` makes them; None where it would refuse one."""
         try:
-            return self._columns(rows)
-        except (InvalidError, *UNUSUAL):
+            samples = _numbers(self._samples, [row.sample_token for row in rows])
+            tracks = _numbers(self._tracks, [row.instance_token for row in rows])
+            values = np.empty((len(rows), 6))
+            values[:, :2] = _vectors([row.translation for row in rows], 3)[:, :2]
+            values[:, 2] = _headings([row.rotation for row in rows])
+            values[:, 3:] = _vectors([row.size for row in rows], 3)
+            also = [
+                self._also(row.attribute_tokens, row.visibility_token, row.num_lidar_pts, row.num_radar_pts)
+                for row in rows
+            ]
+        except InvalidError:
             return None
+        return Boxes([row.token for row in rows], samples, tracks, values, also)
 
-    def _columns(self, rows: list[Any]) -> Boxes:
-        tokens = column(rows, "token")
-        demand(are(tokens, str) and "" not in tokens)
-        values = np.empty((len(rows), 6))
-        values[:, :2] = vectors(column(rows, "translation"), 3)[:, :2]
-        values[:, 2] = _headings(vectors(column(rows, "rotation"), 4))
-        values[:, 3:] = vectors(column(rows, "size"), 3)
-        demand(not np.any(values[:, 3:] <= 0))
-        return Boxes(
-            tokens,
-            _numbers(self._samples, column(rows, "sample_token")),
-            _numbers(self._tracks, column(rows, "instance_token")),
-            values,
-            self._texts(rows),
-        )
+    def _text(
+        self, tokens: tuple[str, ...] | None, level: str | None, lidar: int | None, radar: int | None
+    ) -> str | None:
+        """What else an annotation says, as JSON."""
+        told = self._told(tokens or (), level or None)
+        told |= {key: count for key, count in zip(_COUNTS, (lidar, radar), strict=True) if count is not None}
+        return to_json(told)
 
-    def _texts(self, rows: list[dict[str, Any]]) -> list[str | None]:
-        """What `to_json` makes of the attributes of each row: the counts differ, what is before them hardly does."""
-        counts = [column(rows, key) for key in _COUNTS]
-        demand(all(are(values, int, type(None)) for values in counts))
-        names, levels = column(rows, "attribute_tokens"), column(rows, "visibility_token")
-        demand(are(names, list, type(None)) and are(levels, str, type(None)))
-        known, texts = self._beginnings, list[str | None]()
-        for given, level, lidar, radar in zip(names, levels, *counts, strict=True):
-            key = tuple(given or ()), level
-            beginning = known.get(key)
-            if beginning is None:
-                beginning = known[key] = self._beginning(given or [], level or None)
-            if lidar is not None:
-                demand(abs(lidar) <= _LARGEST)
-                beginning += f',"num_lidar_pts":{lidar}'
-            if radar is not None:
-                demand(abs(radar) <= _LARGEST)
-                beginning += f',"num_radar_pts":{radar}'
-            texts.append(f"{{{beginning[1:]}}}" if beginning else None)
-        return texts
-
-    def _beginning(self, tokens: list[Any], level: str | None) -> str:
-        """The JSON of attributes and visibility without its braces, with a comma before; "" for nothing."""
-        told = self._told(tokens, level)
-        demand(told.keys().isdisjoint(_COUNTS))
-        return f",{(to_json(told) or '')[1:-1]}" if told else ""
-
-    def _told(self, tokens: list[Any], level: str | None) -> dict[str, str | int]:
+    def _told(self, tokens: Iterable[Any], level: str | None) -> dict[str, str | int]:
         """What else an annotation says: `vehicle.parked` becomes `vehicle: parked`."""
         told: dict[str, str | int] = {}
         for token in tokens:
@@ -189,20 +166,36 @@ def pose(row: Record) -> tuple[float, float, float]:
     return x, y, normalize(yaw - math.pi / 2)
 
 
-def _headings(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The headings of `pose` to the last bit, which NumPy's own functions of angles would not give."""
-    norms = np.array(list(map(math.hypot, *rotations.T.tolist())), dtype=np.float64)
-    demand(bool(np.all((norms > 0.5) & (norms < 2))))
-    a, b, c, d = rotations.T / norms
+def _headings(rotations: Sequence[tuple[float, ...]]) -> NDArray[np.float64]:
+    """The headings of `pose`, shape (n,), to the last bit, as NumPy's own functions would not give them.
+
+    Raises:
+        InvalidError: A rotation is unsound.
+    """
+    norms = np.fromiter(starmap(math.hypot, rotations), np.float64, len(rotations))
+    if not np.all((norms > 0.5) & (norms < 2)):
+        raise InvalidError("`rotation` is not a unit quaternion")
+    a, b, c, d = _vectors(rotations, 4).T / norms
     across, along = 2 * (a * d + b * c), 1 - 2 * (c * c + d * d)
-    yaws = np.array(list(map(math.atan2, across.tolist(), along.tolist())), dtype=np.float64)
+    yaws = np.fromiter(map(math.atan2, across.tolist(), along.tolist()), np.float64, len(rotations))
     return normalize_array(yaws - math.pi / 2)
 
 
-def _numbers(known: Mapping[str, int], tokens: list[Any]) -> NDArray[np.int64]:
-    numbers = list(map(known.get, tokens))
-    demand(None not in numbers)
-    return np.array(numbers, dtype=np.int64)
+def _vectors(values: Collection[tuple[float, ...]], size: int) -> NDArray[np.float64]:
+    """Some vectors of one size, shape (n, size)."""
+    return np.fromiter(chain.from_iterable(values), np.float64, size * len(values)).reshape(-1, size)
+
+
+def _numbers(known: Mapping[str, int], tokens: Sequence[str]) -> NDArray[np.int64]:
+    """The numbers of some tokens, shape (n,).
+
+    Raises:
+        InvalidError: One has none.
+    """
+    try:
+        return np.array([known[token] for token in tokens], dtype=np.int64)
+    except KeyError as error:
+        raise InvalidError(f"`{error.args[0]}` is not there") from error
 
 
 def found(table: Mapping[str, Any], token: object, name: str) -> Any:

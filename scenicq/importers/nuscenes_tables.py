@@ -13,8 +13,9 @@ import numpy as np
 
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.json_tables import Block, read_list
+from scenicq.importers.json_tables import Block, Rows, read_list
 from scenicq.importers.nuscenes_boxes import Box, Boxes, BoxReader, found, joined, of_rows, pose
+from scenicq.importers.nuscenes_rows import ANNOTATIONS, EGO_POSES, SENSOR_FILES
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
 from scenicq.importers.report import Report
 
@@ -131,7 +132,7 @@ class Tables:
             "calibrated_sensor", lambda row: found(channels, fields.text(row, "sensor_token"), "sensor")
         )
         pose_of: dict[str, str] = {}
-        for token, row, place in self._rows("sample_data", "sensor file"):
+        for token, row, place in self._rows("sample_data", "sensor file", SENSOR_FILES):
             if row.get("is_key_frame") is not True or str(row.get("sample_token")) not in self.samples:
                 continue
 
@@ -146,7 +147,7 @@ class Tables:
         wanted = set(pose_of.values())
         poses = {
             token: made
-            for token, row, place in self._rows("ego_pose", "ego pose")
+            for token, row, place in self._rows("ego_pose", "ego pose", EGO_POSES)
             if token in wanted
             and (made := self._try("ego pose", place, lambda row=row: pose(row), f"ego_pose `{token}`"))
         }
@@ -166,7 +167,7 @@ class Tables:
         track_numbers = {token: number for number, token in enumerate(sorted(self._classes))}
         reader = BoxReader(sample_numbers, track_numbers, attributes, visible)
         path = self._folder / "sample_annotation.json"
-        self._boxes = joined([self._boxes_in(reader, path.name, block) for block in read_list(path)])
+        self._boxes = joined([self._boxes_in(reader, path.name, block) for block in read_list(path, ANNOTATIONS)])
         self._tracks: list[tuple[str, str]] = [(token, self._classes[token]) for token in track_numbers]
         # Boxes by scene, then by sample; those of one sample as they come.
         counts: list[int] = np.bincount(self._boxes.samples, minlength=len(self.samples)).tolist()
@@ -184,7 +185,7 @@ class Tables:
         self._order = np.argsort(rank[self._boxes.samples], kind="stable")
 
     def _boxes_in(self, reader: BoxReader, file: str, block: Block) -> Boxes:
-        boxes = None if "\\u" in block.text else reader.columns(block.elements)
+        boxes = reader.columns(block.rows) if block.rows is not None else None
         if boxes is not None:
             return boxes
         rows: list[Box] = []
@@ -202,16 +203,18 @@ class Tables:
                 values[token] = made
         return values
 
-    def _rows(self, table: str, what: str) -> Iterator[tuple[str, Record, _Place]]:
+    def _rows(self, table: str, what: str, decoder: Rows | None = None) -> Iterator[tuple[str, Record, _Place]]:
         """Token, fields and place of each row."""
         path = self._folder / f"{table}.json"
-        for block in read_list(path):
-            yield from self._rows_in(block, path.name, what)
+        for block in read_list(path, decoder):
+            yield from self._rows_in(block, path.name, what, block.rows)
 
-    def _rows_in(self, block: Block, file: str, what: str) -> Iterator[tuple[str, Record, _Place]]:
+    def _rows_in(
+        self, block: Block, file: str, what: str, decoded: list[Any] | None = None
+    ) -> Iterator[tuple[str, Record, _Place]]:
         # only where a character is named by its number can there be half of one
-        escapes = "\\u" in block.text
-        for number, element in enumerate(block.elements):
+        escapes = decoded is None and "\\u" in block.text
+        for number, element in enumerate(block.elements if decoded is None else decoded):
             place = _Place(file, block, number)
             try:
                 row = fields.record(element, "it")

@@ -20,6 +20,7 @@ from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, missing
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError, Record
+from scenicq.importers.layouts import openlabel_files
 from scenicq.importers.motion import Rigid, euler, matrix, quaternion
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
@@ -29,7 +30,6 @@ __all__ = ["OpenLabel"]
 
 _MAP = "none"
 _STEP_US = 100_000
-_HEAD = 4096
 _LARGEST_BYTES = 1 << 30
 _PSEUDO = ("DontCare", "Egocar", "EgoCar", "ego_vehicle")
 _IDENTITY = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
@@ -43,7 +43,7 @@ class OpenLabel:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is such a file or a folder of them."""
-        return bool(_files(path))
+        return bool(openlabel_files(path))
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open files.
@@ -51,7 +51,7 @@ class OpenLabel:
         Raises:
             DataError: `file-missing`; with a strict report whatever is unsound.
         """
-        files = _files(path)
+        files = openlabel_files(path)
         if not files:
             raise missing(path, "no `*.json` of OpenLABEL")
         maps = read_maps(options.maps, report)
@@ -70,19 +70,6 @@ class OpenLabel:
                 "time": "of the frame, else steps of 0.1 s",
             },
         )
-
-
-def _files(path: Path) -> list[Path]:
-    found = [path] if path.suffix == ".json" else sorted(path.glob("*.json"))
-    return [file for file in found if file.is_file() and _begins(file)]
-
-
-def _begins(file: Path) -> bool:
-    try:
-        with file.open("rb") as content:
-            return b'"openlabel"' in content.read(_HEAD)
-    except OSError:
-        return False
 
 
 def _read_file(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:

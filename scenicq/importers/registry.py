@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.argoverse2 import Argoverse2
-from scenicq.importers.argoverse2_forecasting import Argoverse2Forecasting
+from scenicq.importers import layouts
 from scenicq.importers.base import Importer
-from scenicq.importers.commonroad import CommonRoad
-from scenicq.importers.interaction import Interaction
-from scenicq.importers.interchange import Interchange
-from scenicq.importers.kitti import Kitti
-from scenicq.importers.nuscenes import NuScenes
-from scenicq.importers.openlabel import OpenLabel
-from scenicq.importers.waymo import Waymo
 from scenicq.store.manifest import is_dataset
 
 __all__ = ["ENTRY_POINTS", "choose_importer", "importers"]
@@ -24,22 +18,49 @@ ENTRY_POINTS = "scenicq.importers"
 """Group of entry points by which other packages add importers; each names a class without arguments."""
 
 
+@dataclass(frozen=True, slots=True)
+class _BuiltIn:
+    """An importer of this package, loaded when it is needed: one of them reads a source.
+
+    Attributes:
+        module, type: Where its class is.
+        finds: Its `recognises`, or what that asks whether it has found anything.
+    """
+
+    module: str
+    type: str
+    finds: Callable[[Path], object]
+
+    def load(self) -> Importer:
+        """Make it."""
+        importer: Importer = getattr(import_module(f"scenicq.importers.{self.module}"), self.type)()
+        return importer
+
+
+_BUILT_IN = {
+    "interchange": _BuiltIn("interchange", "Interchange", layouts.is_interchange),
+    "nuscenes": _BuiltIn("nuscenes", "NuScenes", layouts.is_nuscenes),
+    "argoverse2": _BuiltIn("argoverse2", "Argoverse2", layouts.argoverse2_logs),
+    "argoverse2-forecasting": _BuiltIn("argoverse2_forecasting", "Argoverse2Forecasting", layouts.argoverse2_scenarios),
+    "waymo": _BuiltIn("waymo", "Waymo", layouts.waymo_files),
+    "commonroad": _BuiltIn("commonroad", "CommonRoad", layouts.commonroad_files),
+    "kitti": _BuiltIn("kitti", "Kitti", layouts.kitti_files),
+    "openlabel": _BuiltIn("openlabel", "OpenLabel", layouts.openlabel_files),
+    "interaction": _BuiltIn("interaction", "Interaction", layouts.interaction_files),
+}
+
+
 def importers() -> dict[str, Importer]:
     """All importers by name: the built-in ones, then those of installed packages."""
-    built_in: tuple[Importer, ...] = (
-        Interchange(),
-        NuScenes(),
-        Argoverse2(),
-        Argoverse2Forecasting(),
-        Waymo(),
-        CommonRoad(),
-        Kitti(),
-        OpenLabel(),
-        Interaction(),
-    )
-    found: dict[str, Importer] = {importer.name: importer for importer in built_in}
+    return {name: importer.load() for name, importer in _BUILT_IN.items()} | _installed()
+
+
+def _installed() -> dict[str, Importer]:
+    from importlib.metadata import entry_points  # noqa: PLC0415 - slow to load
+
+    found: dict[str, Importer] = {}
     for entry in sorted(entry_points(group=ENTRY_POINTS), key=lambda entry: (entry.name, entry.value)):
-        if entry.name not in found:
+        if entry.name not in _BUILT_IN and entry.name not in found:
             found[entry.name] = entry.load()()
     return found
 
@@ -54,22 +75,29 @@ def choose_importer(source: Path, name: str | None = None) -> Importer:
     Raises:
         DataError: `file-missing`, `option-invalid`, `dataset-unrecognised` or `dataset-ambiguous`.
     """
-    known = importers()
+    installed = _installed()
+    known = [*_BUILT_IN, *installed]
     if name is not None and name not in known:
         hint = f"known formats: {', '.join(known)}"
         raise DataError(Diagnostic("option-invalid", f"there is no format `{name}`", hints=(hint,)))
     if not source.exists():
         raise DataError(Diagnostic("file-missing", f"{source} is not there"))
-    if name is not None:
-        return known[name]
-    claimants = [importer for importer in known.values() if importer.recognises(source)]
+    claimants = (
+        [name]
+        if name is not None
+        else [
+            *(name for name, importer in _BUILT_IN.items() if importer.finds(source)),
+            *(name for name, importer in installed.items() if importer.recognises(source)),
+        ]
+    )
     if len(claimants) == 1:
-        return claimants[0]
+        chosen = claimants[0]
+        return installed[chosen] if chosen in installed else _BUILT_IN[chosen].load()
     if claimants:
-        names = " and ".join(f"`{importer.name}`" for importer in claimants)
-        hints = tuple(f"`--format {importer.name}` chooses one" for importer in claimants)
+        names = " and ".join(f"`{importer}`" for importer in claimants)
+        hints = tuple(f"`--format {importer}` chooses one" for importer in claimants)
         raise DataError(Diagnostic("dataset-ambiguous", f"{source} is recognised by {names}", hints=hints))
-    hints = tuple(f"`{importer.name}` looks for {importer.layout}" for importer in known.values())
+    hints = tuple(f"`{importer.name}` looks for {importer.layout}" for importer in importers().values())
     if is_dataset(source):
         hints = ("it is a dataset of scenicq already",)
     raise DataError(Diagnostic("dataset-unrecognised", f"no importer recognises {source}", hints=hints))

@@ -10,21 +10,22 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
-from scenicq.geometry.features import MapFeature
 from scenicq.importers.base import Entry, Labels, Reader
 from scenicq.importers.report import Report
-from scenicq.processes import Lost, Workers
 from scenicq.store.columns import columns_of
 from scenicq.store.labels import Recording
-from scenicq.store.placement import MapIndex
 from scenicq.store.schema import SCHEMA_VERSION
 from scenicq.store.segment import Segment, SegmentWriter
+
+if TYPE_CHECKING:
+    from scenicq.geometry.features import MapFeature
+    from scenicq.store.placement import MapIndex
 
 __all__ = ["Job", "World", "fingerprint", "maps_digest", "write_segments"]
 
@@ -83,6 +84,10 @@ def fingerprint(context: Sequence[str], entries: Sequence[Entry], taken: frozens
 def maps_digest(maps: Mapping[str, Sequence[MapFeature]]) -> str:
     """What changes with any element of any map."""
     digest = hashlib.blake2b(digest_size=16)
+    if not maps:
+        return digest.hexdigest()
+    import shapely  # noqa: PLC0415 - slow to load, and for maps
+
     for name in sorted(maps):
         digest.update(json.dumps(name).encode())
         shapes = shapely.to_wkb(np.array([feature.shape for feature in maps[name]], dtype=object))
@@ -92,13 +97,15 @@ def maps_digest(maps: Mapping[str, Sequence[MapFeature]]) -> str:
     return digest.hexdigest()
 
 
-def write_segments(world: World, jobs: Sequence[Job], processes: int, on_recording: OnRecording) -> Iterator[Segment]:
+def write_segments(
+    world: World, jobs: Sequence[Job], at_once: int | None, on_recording: OnRecording
+) -> Iterator[Segment]:
     """Write segments, here or in other processes; the files do not depend on where.
 
     Args:
         world: What the jobs share.
         jobs: In order.
-        processes: How many work side by side; with one it is this one.
+        at_once: How many processes work side by side; with one it is this one, None for as many as pay.
         on_recording: Called in this process; what it raises ends the work.
 
     Yields:
@@ -108,12 +115,24 @@ def write_segments(world: World, jobs: Sequence[Job], processes: int, on_recordi
         DataError: A problem of the source where the ingest is strict, or processes died again and again.
         OSError: The folder cannot be written.
     """
-    if processes <= 1 or len(jobs) <= 1:
-        indexes: dict[str, MapIndex] = {}
-        for job in jobs:
-            yield _write(world, job, indexes, on_recording)
+    many = 1 if len(jobs) <= 1 else at_once
+    if not many:
+        from scenicq.processes import as_many_as_pay  # noqa: PLC0415 - slow to load, and for several segments
+
+        many = as_many_as_pay()
+    if many > 1:
+        yield from _write_apart(world, jobs, many, on_recording)
         return
-    workers: Workers[Job, Segment] = Workers(min(processes, len(jobs)), _start_worker, (world,))
+    indexes: dict[str, MapIndex] = {}
+    for job in jobs:
+        yield _write(world, job, indexes, on_recording)
+
+
+def _write_apart(world: World, jobs: Sequence[Job], many: int, on_recording: OnRecording) -> Iterator[Segment]:
+    """Write segments in so many processes."""
+    from scenicq.processes import Lost, Workers  # noqa: PLC0415 - slow to load, and for several segments
+
+    workers: Workers[Job, Segment] = Workers(min(many, len(jobs)), _start_worker, (world,))
     known: set[tuple[str, int]] = set()
 
     def told(said: tuple[str, int]) -> None:
@@ -140,9 +159,11 @@ def _write(world: World, job: Job, indexes: dict[str, MapIndex], on_recording: O
             writer.open()
             for found in job.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
                 columns = columns_of(found) if isinstance(found, Recording) else found
-                if columns.map not in indexes:
-                    indexes[columns.map] = MapIndex(world.maps.get(columns.map, ()))
-                writer.add(columns, indexes[columns.map])
+                if columns.map not in indexes and world.maps.get(columns.map):
+                    from scenicq.store.placement import MapIndex  # noqa: PLC0415 - slow to load, and for maps
+
+                    indexes[columns.map] = MapIndex(world.maps[columns.map])
+                writer.add(columns, indexes.get(columns.map))
                 on_recording(columns.name, len(columns.frames))
             return writer.finish(job.fingerprint, report.tally, report.told)
     finally:

@@ -16,6 +16,7 @@ from scenicq.geometry.features import MapFeature
 from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, map_sink, missing
 from scenicq.importers.fields import InvalidError
+from scenicq.importers.layouts import waymo_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.protobuf import Message, parse, signed
 from scenicq.importers.report import Report
@@ -41,7 +42,7 @@ class Waymo:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is such a file or a folder of them."""
-        return bool(_files(path))
+        return bool(waymo_files(path))
 
     def read(self, path: Path, options: Options, report: Report) -> Source:
         """Open files: their scenarios are listed and their maps are read; tracks are read in turn.
@@ -49,7 +50,7 @@ class Waymo:
         Raises:
             DataError: `file-missing`; with a strict report whatever is unsound.
         """
-        files = _files(path)
+        files = waymo_files(path)
         if not files:
             raise missing(path, "no `*.tfrecord`")
         maps = read_maps(options.maps, report)
@@ -73,12 +74,6 @@ class Waymo:
                 "intersections": "unions of `interpolating` lanes that touch",
             },
         )
-
-
-def _files(path: Path) -> list[Path]:
-    if path.is_file():
-        return [path] if ".tfrecord" in path.name else []
-    return sorted(file for file in path.glob("*.tfrecord*") if file.is_file())
 
 
 def _list_scenarios(

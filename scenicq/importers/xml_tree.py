@@ -9,11 +9,10 @@ from xml.parsers import expat
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import InvalidError
 
-__all__ = ["attribute", "child", "number", "read_xml", "root_name"]
+__all__ = ["attribute", "child", "number", "read_xml"]
 
 _LARGEST_BYTES = 512 << 20
 _DEEPEST = 100
-_HEAD = 4096
 
 
 def read_xml(path: Path) -> Element:
@@ -56,23 +55,6 @@ def read_xml(path: Path) -> Element:
         raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror}")) from error
     except (expat.ExpatError, InvalidError, ValueError, LookupError) as error:
         raise DataError(Diagnostic("file-invalid", f"{path} is not sound XML: {error}")) from error
-
-
-def root_name(path: Path) -> str:
-    """The name of the root element, as far as the beginning of a file tells; "" if it cannot be told."""
-    found: list[str] = []
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        found.append(name)
-
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = start
-    try:
-        with path.open("rb") as file:
-            parser.Parse(file.read(_HEAD), False)
-    except (OSError, expat.ExpatError, ValueError, LookupError):
-        pass
-    return found[0] if found else ""
 
 
 def child(element: Element, *names: str) -> Element:

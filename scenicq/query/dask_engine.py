@@ -16,11 +16,11 @@ import tempfile
 import threading
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
-from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import islice
 from typing import Any
 
+from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
 from scenicq.processes import processors
 from scenicq.query.partitions import Partition
@@ -111,14 +111,15 @@ def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tup
     from distributed import CancelledError, KilledWorker  # noqa: PLC0415
 
     question = Question.of(query)
-    ours = version("scenicq")
     waiting = iter(pieces)
     pending: deque[tuple[Partition, Any]] = deque()
     try:
         while True:
             room = 3 * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) - len(pending)
             for piece in islice(waiting, max(0, room)):
-                pending.append((piece, client.submit(_work, question, piece, ours, pure=False, retries=_RETRIES)))
+                pending.append(
+                    (piece, client.submit(_work, question, piece, __version__, pure=False, retries=_RETRIES))
+                )
             if not pending:
                 return
             piece, future = pending.popleft()
@@ -141,8 +142,8 @@ _known = threading.local()
 
 def _work(question: Question, piece: Partition, client_version: str) -> Done:
     """Run a piece in a worker, which keeps what it has compiled."""
-    if version("scenicq") != client_version:
-        message = f"a worker has version {version('scenicq')} of scenicq, the client {client_version}"
+    if __version__ != client_version:
+        message = f"a worker has version {__version__} of scenicq, the client {client_version}"
         raise DataError(Diagnostic("engine-failed", message, hints=("install the same version on both",)))
     if getattr(_known, "fingerprint", None) != question.fingerprint:
         _known.query, _known.fingerprint = question.query(), question.fingerprint

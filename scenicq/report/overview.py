@@ -10,6 +10,7 @@ from dataclasses import fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, cast
 
+from scenicq import __version__
 from scenicq.query.results import Funnel
 from scenicq.query.run import Query
 from scenicq.report.frames import table
@@ -18,7 +19,7 @@ from scenicq.report.svg import element, escape
 
 __all__ = ["funnel_section", "how_section", "program_section", "versions"]
 
-_PACKAGES = ("scenicq", "duckdb", "numpy", "pyarrow", "shapely", "highspy", "dreal")
+_PACKAGES = ("duckdb", "numpy", "pyarrow", "shapely", "highspy", "dreal")
 
 
 _NAMES = {"version": "scenic", "every": "all", "timeout_s": "timeout"}
@@ -114,7 +115,7 @@ def funnel_section(funnel: Funnel, total: int) -> str:
 
 def versions() -> dict[str, str]:
     """The versions of what a result depends on."""
-    found = {"python": sys.version.split()[0]}
+    found = {"python": sys.version.split()[0], "scenicq": __version__}
     for name in _PACKAGES:
         try:
             found[name] = version(name)

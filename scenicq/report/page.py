@@ -6,8 +6,8 @@ import base64
 import hashlib
 from collections.abc import Sequence
 from importlib import resources
-from importlib.metadata import version
 
+from scenicq import __version__
 from scenicq.report.hatching import hatching
 from scenicq.report.legend import legend
 from scenicq.report.picture import stylesheet
@@ -53,7 +53,7 @@ def page(title: str, body: Sequence[str], *, script: bool = True) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="color-scheme" content="light dark">'
-        f'<meta name="generator" content="{GENERATOR} {escape(version("scenicq"))}">'
+        f'<meta name="generator" content="{GENERATOR} {escape(__version__)}">'
         f"{element('title', escape(title))}<style>{style}</style>"
     )
     patterns = element("svg", hatching(), class_="patterns", width=0, height=0, aria_hidden="true")

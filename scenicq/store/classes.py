@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
 
@@ -37,8 +37,8 @@ _COARSE = {"Vehicle": "Car", "Pedestrian": "Pedestrian"}
 
 
 def _load(name: str) -> dict[str, str | None]:
-    text = resources.files("scenicq.store").joinpath("taxonomies", f"{name}.json").read_text(encoding="utf-8")
-    return json.loads(text)
+    # importlib.resources would take as long to load as the whole of a small source to read
+    return json.loads(Path(__file__).with_name("taxonomies").joinpath(f"{name}.json").read_bytes())
 
 
 @cache

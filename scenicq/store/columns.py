@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenicq.store.labels import LabelObject, Recording
 
-__all__ = ["MemberColumns", "RecordingColumns", "columns_of", "to_json"]
+__all__ = ["MemberColumns", "Memberships", "RecordingColumns", "columns_of", "to_json"]
 
 _encode = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode
 
@@ -67,6 +67,21 @@ class RecordingColumns:
     sensor_counts: NDArray[np.int64]
     channels: Sequence[str]
     paths: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Memberships:
+    """Pairs of a position and a region near it, by position, then in the order of the map.
+
+    Attributes:
+        point: Number of the position, shape (n,).
+        feature: Number of the map element, shape (n,).
+        distance: Metres; 0 inside and on the boundary, shape (n,).
+    """
+
+    point: NDArray[np.int64]
+    feature: NDArray[np.int64]
+    distance: NDArray[np.float64]
 
 
 def columns_of(recording: Recording) -> RecordingColumns:

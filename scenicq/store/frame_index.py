@@ -16,6 +16,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from scenicq.store.arrays import number_array
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowTable
 
@@ -31,14 +32,18 @@ def frame_hashes(frames: Iterable[str]) -> NDArray[np.uint64]:
 def index_rows(hashes: NDArray[np.uint64]) -> ArrowTable:
     """The table for frames whose hashes are given in the order of the labels."""
     order = np.argsort(hashes, kind="stable")
-    return pa.table({"hash": hashes[order], "row": order.astype(np.int64)}, schema=SCHEMAS["frame_index"])
+    schema = SCHEMAS["frame_index"]
+    columns = [number_array(hashes[order], pa.uint64()), number_array(order, pa.int64())]
+    return pa.Table.from_arrays(columns, schema=schema)
 
 
 def repeated_rows(hashes: NDArray[np.uint64]) -> NDArray[np.int64]:
     """Rows whose hash occurs more than once, in order; almost always none."""
     order = np.argsort(hashes, kind="stable")
     same = hashes[order][1:] == hashes[order][:-1]
-    return np.unique(np.concatenate((order[1:][same], order[:-1][same])))
+    repeated = np.zeros(len(hashes), dtype=bool)
+    repeated[order[1:][same]] = repeated[order[:-1][same]] = True
+    return np.flatnonzero(repeated)
 
 
 def find_rows(files: Sequence[StoreFile], frames: Collection[str]) -> NDArray[np.int64]:

@@ -14,8 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from scenicq.store.manifest import Part
-from scenicq.store.regions import GEO_METADATA
-from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS, ArrowTable
+from scenicq.store.schema import GEO_METADATA, SCHEMA_VERSION, SCHEMAS, ArrowTable
 from scenicq.store.whole_files import sync_folder
 
 __all__ = ["TableWriter", "part_path"]
@@ -100,7 +99,7 @@ class TableWriter:
 
     def _flush(self, rows: int) -> None:
         table = pa.concat_tables(self._pending).combine_chunks()
-        self._writer.write_table(table.slice(0, rows).cast(self._schema), row_group_size=_ROW_GROUP)
+        self._writer.write_table(table.slice(0, rows), row_group_size=_ROW_GROUP)
         rest = table.slice(rows)
         self._pending = [rest] if len(rest) else []
         self._pending_rows = len(rest)

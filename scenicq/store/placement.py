@@ -1,40 +1,24 @@
 """What a map says about positions: regions around them, lane, direction of the road. Computed once, at ingest."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# shapely does not say what its arrays hold.
 # pyright: reportUnknownArgumentType=false
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import shapely
 from numpy.typing import NDArray
 
 from scenicq.geometry.centerlines import centerlines, road_direction
 from scenicq.geometry.features import MapFeature
-from scenicq.store.schema import MEMBERSHIP_RADIUS_M, ArrowArray
+from scenicq.store.arrays import Texts
+from scenicq.store.columns import Memberships
+from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
-__all__ = ["MapIndex", "Memberships"]
-
-
-@dataclass(frozen=True, slots=True)
-class Memberships:
-    """Pairs of a position and a region near it, by position, then in the order of the map.
-
-    Attributes:
-        point: Number of the position, shape (n,).
-        feature: Number of the map element, shape (n,).
-        distance: Metres; 0 inside and on the boundary, shape (n,).
-    """
-
-    point: NDArray[np.int64]
-    feature: NDArray[np.int64]
-    distance: NDArray[np.float64]
+__all__ = ["MapIndex"]
 
 
 class MapIndex:
@@ -42,13 +26,13 @@ class MapIndex:
 
     def __init__(self, features: Sequence[MapFeature]) -> None:
         """Index a map; without elements every answer is empty."""
-        self.ids: list[str] = [feature.id for feature in features]
-        self.kinds: list[str] = [feature.kind for feature in features]
+        self.ids = Texts([feature.id for feature in features])
+        self.kinds = Texts([feature.kind for feature in features])
         self._direction = road_direction(features)
         self._shapes = np.array([feature.shape for feature in features], dtype=object)
         self._tree = shapely.STRtree(self._shapes)
         shapely.prepare(self._shapes)
-        self._is_lane = np.array([kind == "lane" for kind in self.kinds], dtype=bool)
+        self._is_lane = np.array([feature.kind == "lane" for feature in features], dtype=bool)
         self._features = features
 
     def memberships(self, xy: NDArray[np.float64]) -> Memberships:
@@ -66,9 +50,12 @@ class MapIndex:
         near = distance <= reach
         return Memberships(point[near], feature[near], distance[near])
 
-    def lanes(self, xy: NDArray[np.float64], near: Memberships) -> ArrowArray:
-        """The lane that contains each position; of several, as in intersections, that with the nearest centreline."""
-        chosen = (near.distance == 0) & self._is_lane[near.feature] if len(self.ids) else np.zeros(0, dtype=bool)
+    def lanes(self, xy: NDArray[np.float64], near: Memberships) -> NDArray[np.int64]:
+        """The number of the lane that contains each position, -1 for none, shape (n,).
+
+        Of several, as in intersections, it is that with the nearest centreline.
+        """
+        chosen = (near.distance == 0) & self._is_lane[near.feature] if len(self._features) else np.zeros(0, dtype=bool)
         point, feature = near.point[chosen], near.feature[chosen]
         lane = np.full(len(xy), -1, dtype=np.int64)
         if len(point):
@@ -83,11 +70,11 @@ class MapIndex:
             # Written from the farthest to the nearest, so that the nearest stays; of equals the first in the map.
             order = np.lexsort((-feature, -offset))
             lane[point[order]] = feature[order]
-        return pa.array(self.ids, pa.string()).take(pa.array(lane, mask=lane < 0))
+        return lane
 
-    def road_directions(self, xy: NDArray[np.float64]) -> ArrowArray:
-        """The headings that the road has at positions of shape (n, 2), as lists; none where it has none."""
-        return pa.array(self._direction.values_many(xy), pa.list_(pa.float64()))
+    def road_directions(self, xy: NDArray[np.float64]) -> list[tuple[float, ...]]:
+        """The headings that the road has at positions of shape (n, 2); none where it has none."""
+        return self._direction.values_many(xy)
 
 
 def _distance(points: NDArray[Any], shapes: NDArray[Any]) -> NDArray[np.float64]:

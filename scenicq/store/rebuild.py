@@ -59,9 +59,9 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
                 try:
                     part.open()
                     for columns in _recordings(*files):
-                        if columns.map not in indexes:
-                            indexes[columns.map] = MapIndex(maps.get(columns.map, ()))
-                        part.add(columns, indexes[columns.map])
+                        if columns.map not in indexes and maps.get(columns.map):
+                            indexes[columns.map] = MapIndex(maps[columns.map])
+                        part.add(columns, indexes.get(columns.map))
                         if progress is not None:
                             progress(len(columns.frames))
                     writer.adopt(number, part.finish(old.fingerprint, old.counts, old.told))

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import shapely
 from numpy.typing import NDArray
 
@@ -21,20 +20,9 @@ from scenicq.geometry.features import MapFeature, names
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowTable
 
-__all__ = ["GEO_METADATA", "lane_rows", "read_features", "region_rows"]
+__all__ = ["lane_rows", "read_features", "region_rows"]
 
 _encode = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
-
-GEO_METADATA = json.dumps(
-    {
-        "version": "1.1.0",
-        "primary_column": "geometry",
-        # The frame is the map's own, in metres: no coordinate reference system describes it.
-        "columns": {"geometry": {"encoding": "WKB", "geometry_types": [], "crs": None, "edges": "planar"}},
-    },
-    separators=(",", ":"),
-)
-"""Value of the `geo` key by which GeoParquet readers recognise the geometry column of `regions`."""
 
 
 def region_rows(maps: Mapping[str, Sequence[MapFeature]]) -> ArrowTable:
@@ -74,7 +62,11 @@ def read_features(files: Iterable[StoreFile], map_name: str) -> tuple[MapFeature
     features: list[MapFeature] = []
     for file in files:
         with open_parquet(file) as parquet:
-            table = parquet.read().filter(pc.field("map") == map_name)
+            table = parquet.read()
+        # those of a map are together
+        maps = table["map"].to_pylist()
+        first = maps.index(map_name) if map_name in maps else 0
+        table = table.slice(first, maps.count(map_name))
         shapes = shapely.from_wkb(table["geometry"].to_pylist())
         columns = (table[name].to_pylist() for name in ("id", "kind", "properties"))
         features += [

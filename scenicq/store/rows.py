@@ -8,57 +8,56 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
-from scenicq.store.columns import MemberColumns, RecordingColumns
-from scenicq.store.placement import MapIndex, Memberships
+from scenicq.store.arrays import lists_at, number_array, repeated_texts
+from scenicq.store.columns import MemberColumns, Memberships, RecordingColumns
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
+
+if TYPE_CHECKING:  # slow to load, and not every source has maps
+    from scenicq.store.placement import MapIndex
 
 __all__ = ["recording_rows"]
 
 
 def recording_rows(
-    columns: RecordingColumns, index: MapIndex, *, first_object: int = 0, first_sensor: int = 0
+    columns: RecordingColumns, index: MapIndex | None, *, first_object: int = 0, first_sensor: int = 0
 ) -> dict[str, ArrowTable]:
     """Rows of `labels`, `objects`, `memberships` and `sensors`.
 
     Args:
         columns: The recording.
-        index: Its map.
+        index: Its map; None where it has none.
         first_object: Number of objects before it in its part of the table `objects`.
         first_sensor: Number of rows before it in its part of the table `sensors`.
     """
     egos, objects, counts = columns.egos, columns.objects, columns.object_counts
     # Everybody, label by label, the ego first.
     ends = np.cumsum(counts)
-    ego_at = ends - counts + np.arange(len(counts))
     label_of = np.repeat(np.arange(len(counts)), counts)
-    object_at = np.arange(len(objects.x)) + label_of + 1
+    ego_at, object_at = ends - counts + np.arange(len(counts)), np.arange(len(objects.x)) + label_of + 1
     xy = np.empty((len(ego_at) + len(object_at), 2))
     xy[ego_at] = np.column_stack((egos.x, egos.y))
     xy[object_at] = np.column_stack((objects.x, objects.y))
-    near, lanes, directions = _placed(index, xy)
-    frames, labels = pa.array(columns.frames, pa.string()), pa.array(label_of)
-    everyone = np.repeat(np.arange(len(counts)), counts + 1)
-    ids = np.empty(len(xy), dtype=object)
-    ids[ego_at] = "ego"
-    ids[object_at] = objects.id
+    placed = _placed(index, xy)
+    times = np.array(columns.times_us, dtype=np.int64)
     return {
         "labels": _table(
             "labels",
             {
-                "frame": frames,
-                "recording": pa.repeat(columns.name, len(frames)),
-                "timestamp_us": columns.times_us,
-                "map": pa.repeat(columns.map, len(frames)),
+                "frame": columns.frames,
+                "recording": _everywhere(columns.name, len(counts)),
+                "timestamp_us": times,
+                "map": _everywhere(columns.map, len(counts)),
                 **{f"ego_{name}": values for name, values in _properties(egos).items()},
-                "ego_road_directions": directions.take(pa.array(ego_at)),
-                "ego_lane": lanes.take(pa.array(ego_at)),
+                "ego_road_directions": lists_at(placed.directions, placed.place[ego_at]),
+                "ego_lane": _names(index, placed.lane[ego_at]),
                 "params": columns.params,
                 "object_count": counts,
                 "first_object": first_object + ends - counts,
@@ -70,31 +69,22 @@ def recording_rows(
         "objects": _table(
             "objects",
             {
-                "frame": frames.take(labels),
-                "recording": pa.repeat(columns.name, len(label_of)),
-                "timestamp_us": pa.array(columns.times_us, pa.int64()).take(labels),
+                "frame": repeated_texts(columns.frames, counts),
+                "recording": _everywhere(columns.name, len(label_of)),
+                "timestamp_us": times[label_of],
                 "ordinal": np.arange(len(label_of)) - (ends - counts)[label_of],
                 "id": objects.id,
                 **_properties(objects),
                 **_relative(egos, objects, label_of),
-                "road_directions": directions.take(pa.array(object_at)),
-                "lane": lanes.take(pa.array(object_at)),
+                "road_directions": lists_at(placed.directions, placed.place[object_at]),
+                "lane": _names(index, placed.lane[object_at]),
             },
         ),
-        "memberships": _table(
-            "memberships",
-            {
-                "frame": frames.take(pa.array(everyone[near.point])),
-                "object": pa.array(ids, pa.string()).take(pa.array(near.point)),
-                "kind": pa.array(index.kinds, pa.string()).take(pa.array(near.feature)),
-                "region": pa.array(index.ids, pa.string()).take(pa.array(near.feature)),
-                "distance": near.distance,
-            },
-        ),
+        "memberships": _table("memberships", _memberships(columns, index, placed, ego_at, object_at)),
         "sensors": _table(
             "sensors",
             {
-                "frame": frames.take(pa.array(np.repeat(np.arange(len(counts)), columns.sensor_counts))),
+                "frame": repeated_texts(columns.frames, columns.sensor_counts),
                 "channel": columns.channels,
                 "path": columns.paths,
             },
@@ -102,21 +92,79 @@ def recording_rows(
     }
 
 
-def _placed(index: MapIndex, xy: NDArray[np.float64]) -> tuple[Memberships, ArrowArray, ArrowArray]:
-    """Regions near positions (n, 2), lanes and directions of the road: once for all who stand at the same place."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Placed:
+    """Where everybody is.
+
+    Attributes:
+        near: Regions near each.
+        lane: Number of the lane of each; -1 for none, shape (n,).
+        place: Number of the place of each; who stands at the same place has the same, shape (n,).
+        directions: Of the road at each place.
+    """
+
+    near: Memberships
+    lane: NDArray[np.int64]
+    place: NDArray[np.intp]
+    directions: Sequence[tuple[float, ...]]
+
+
+def _placed(index: MapIndex | None, xy: NDArray[np.float64]) -> _Placed:
+    """What a map says of positions (n, 2): asked once for all who stand at the same place."""
+    n = len(xy)
+    if index is None:
+        nobody = np.empty(0, dtype=np.int64)
+        return _Placed(Memberships(nobody, nobody, np.empty(0)), np.full(n, -1), np.zeros(n, dtype=np.intp), [()])
     _, first, at = np.unique(xy.view(np.complex128)[:, 0], return_index=True, return_inverse=True)
     places = xy[first]
-    near, take = index.memberships(places), pa.array(at)
-    lanes, directions = index.lanes(places, near).take(take), index.road_directions(places).take(take)
+    near = index.memberships(places)
     counts = np.bincount(near.point, minlength=len(places))
     many = counts[at]
-    point = np.repeat(np.arange(len(xy)), many)
+    point = np.repeat(np.arange(n), many)
     pair = np.arange(len(point)) + np.repeat((np.cumsum(counts) - counts)[at] - (np.cumsum(many) - many), many)
-    return Memberships(point, near.feature[pair], near.distance[pair]), lanes, directions
+    everywhere = Memberships(point, near.feature[pair], near.distance[pair])
+    return _Placed(everywhere, index.lanes(places, near)[at], at, index.road_directions(places))
+
+
+def _memberships(
+    columns: RecordingColumns,
+    index: MapIndex | None,
+    placed: _Placed,
+    ego_at: NDArray[np.int64],
+    object_at: NDArray[np.int64],
+) -> dict[str, Any]:
+    near = placed.near
+    many = np.bincount(near.point, minlength=len(placed.lane))
+    ids = np.empty(len(many), dtype=object)
+    ids[ego_at] = "ego"
+    ids[object_at] = columns.objects.id
+    # those of a label are together
+    before = np.append(0, np.cumsum(many))
+    ends = before[np.append(ego_at[1:], len(many))] if len(ego_at) else ego_at
+    return {
+        "frame": repeated_texts(columns.frames, np.diff(ends, prepend=0)),
+        "object": repeated_texts(ids.tolist(), many),
+        "kind": pa.nulls(0, pa.string()) if index is None else index.kinds.at(near.feature),
+        "region": _names(index, near.feature),
+        "distance": near.distance,
+    }
+
+
+def _names(index: MapIndex | None, features: NDArray[np.int64]) -> ArrowArray:
+    return pa.nulls(len(features), pa.string()) if index is None else index.ids.at(features)
+
+
+def _everywhere(text: str, rows: int) -> ArrowArray:
+    return repeated_texts([text], np.array([rows]))
 
 
 def _table(name: str, columns: Mapping[str, Any]) -> ArrowTable:
-    return pa.table(dict(columns), schema=SCHEMAS[name])
+    schema = SCHEMAS[name]
+    arrays = [
+        number_array(values, field.type) if isinstance(values, np.ndarray) else pa.array(values, field.type)
+        for field, values in ((field, columns[field.name]) for field in schema)
+    ]
+    return pa.Table.from_arrays(arrays, schema=schema)
 
 
 def _class_counts(categories: Sequence[str], counts: NDArray[np.int64]) -> Iterator[list[tuple[str, int]]]:
@@ -130,7 +178,7 @@ def _properties(members: MemberColumns) -> dict[str, Any]:
     reals = ("x", "y", "heading", "width", "length", "height", "vx", "vy")
     texts = {"class": members.category, "source_class": members.source_class}
     texts |= {"track": members.track, "attributes": members.attributes}
-    return texts | {name: pa.array(getattr(members, name), from_pandas=True) for name in reals}
+    return texts | {name: getattr(members, name) for name in reals}
 
 
 def _relative(egos: MemberColumns, objects: MemberColumns, ego: NDArray[np.int64]) -> dict[str, Any]:
@@ -139,8 +187,8 @@ def _relative(egos: MemberColumns, objects: MemberColumns, ego: NDArray[np.int64
     heading = egos.heading[ego]
     cos, sin = np.cos(heading), np.sin(heading)
     return {
-        "ego_right": pa.array(dx * cos + dy * sin, from_pandas=True),
-        "ego_ahead": pa.array(dy * cos - dx * sin, from_pandas=True),
-        "ego_distance": pa.array(np.hypot(dx, dy)),
-        "relative_heading": pa.array(normalize_array(objects.heading - heading), from_pandas=True),
+        "ego_right": dx * cos + dy * sin,
+        "ego_ahead": dy * cos - dx * sin,
+        "ego_distance": np.hypot(dx, dy),
+        "relative_heading": normalize_array(objects.heading - heading),
     }

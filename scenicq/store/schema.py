@@ -13,11 +13,20 @@ These four tables are split into parts of whole recordings; parts of one number 
 
 from __future__ import annotations
 
+import json
 from typing import Any, TypeAlias
 
 import pyarrow as pa
 
-__all__ = ["MEMBERSHIP_RADIUS_M", "SCHEMAS", "SCHEMA_VERSION", "SEGMENT_TABLES", "ArrowArray", "ArrowTable"]
+__all__ = [
+    "GEO_METADATA",
+    "MEMBERSHIP_RADIUS_M",
+    "SCHEMAS",
+    "SCHEMA_VERSION",
+    "SEGMENT_TABLES",
+    "ArrowArray",
+    "ArrowTable",
+]
 
 ArrowTable: TypeAlias = Any
 """A `pyarrow.Table`; pyarrow has no type stubs, so checkers know nothing of it."""
@@ -136,3 +145,14 @@ SCHEMAS: dict[str, Any] = {
     "frame_index": pa.schema([_required("hash", pa.uint64()), _required("row", pa.int64())]),
 }
 """Name of each table, which is also its folder and its SQL view, with its columns as a `pyarrow.Schema`."""
+
+GEO_METADATA = json.dumps(
+    {
+        "version": "1.1.0",
+        "primary_column": "geometry",
+        # The frame is the map's own, in metres: no coordinate reference system describes it.
+        "columns": {"geometry": {"encoding": "WKB", "geometry_types": [], "crs": None, "edges": "planar"}},
+    },
+    separators=(",", ":"),
+)
+"""Value of the `geo` key by which GeoParquet readers recognise the geometry column of `regions`."""

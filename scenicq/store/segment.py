@@ -16,15 +16,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.manifest import Counts, Part
 from scenicq.store.parquet import TableWriter, part_path
-from scenicq.store.placement import MapIndex
 from scenicq.store.rows import recording_rows
 from scenicq.store.schema import SEGMENT_TABLES
 from scenicq.store.whole_files import write_whole
+
+if TYPE_CHECKING:  # slow to load, and not every source has maps
+    from scenicq.store.placement import MapIndex
 
 __all__ = ["SEGMENT_OBJECTS", "Problem", "Segment", "SegmentWriter", "read_segments", "segments_of", "take_over"]
 
@@ -142,8 +144,8 @@ class SegmentWriter:
         for table in SEGMENT_TABLES:
             self._tables[table] = TableWriter(self.folder, table, self.number)
 
-    def add(self, columns: RecordingColumns, index: MapIndex) -> None:
-        """Append a recording; they come in order of their names.
+    def add(self, columns: RecordingColumns, index: MapIndex | None) -> None:
+        """Append a recording with its map, if it has one; they come in order of their names.
 
         Raises:
             OSError: The folder cannot be written.

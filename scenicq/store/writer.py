@@ -12,24 +12,26 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.geometry.features import MapFeature
 from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.frame_index import frame_hashes, index_rows, repeated_rows
 from scenicq.store.labels import Recording
 from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest
 from scenicq.store.parquet import TableWriter
 from scenicq.store.partial import Partial, check_target
-from scenicq.store.placement import MapIndex
-from scenicq.store.regions import lane_rows, region_rows
 from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import SEGMENT_OBJECTS, Segment, SegmentWriter, read_segments, take_over
 from scenicq.store.whole_files import write_whole
+
+if TYPE_CHECKING:
+    from scenicq.geometry.features import MapFeature
+    from scenicq.store.placement import MapIndex
 
 __all__ = ["DatasetWriter", "write_dataset"]
 
@@ -76,6 +78,7 @@ class DatasetWriter:
         self._indexes: dict[str, MapIndex] = {}
         self._open: SegmentWriter | None = None
         self._last = ""
+        self._hashed: tuple[list[Segment], NDArray[np.uint64]] = [], np.empty(0, np.uint64)
         self.left: dict[int, Segment] = {}
         check_target(self._target, force=force, update=update)
 
@@ -199,11 +202,7 @@ class DatasetWriter:
                 self._close_segment()
             segments = self.segments
             tables = {table: tuple(s.part(table, n) for n, s in enumerate(segments)) for table in SEGMENT_TABLES}
-            for table, rows in (
-                ("regions", region_rows(self.maps)),
-                ("lanes", lane_rows(self.maps)),
-                ("frame_index", index_rows(self._hashes())),
-            ):
+            for table, rows in {**self._map_rows(), "frame_index": index_rows(self._hashes())}.items():
                 writer = TableWriter(self.folder, table)
                 writer.add(rows)
                 tables[table] = (writer.finish(),)
@@ -232,23 +231,38 @@ class DatasetWriter:
             Diagnostic("target-unwritable", f"{self._target} cannot be written: {error.strerror or error}")
         )
 
-    def _index(self, map_name: str) -> MapIndex:
-        if map_name not in self._indexes:
-            self._indexes[map_name] = MapIndex(self.maps.get(map_name, ()))
-        return self._indexes[map_name]
+    def _index(self, map_name: str) -> MapIndex | None:
+        if map_name not in self._indexes and self.maps.get(map_name):
+            from scenicq.store.placement import MapIndex  # noqa: PLC0415 - slow to load, and for maps
+
+            self._indexes[map_name] = MapIndex(self.maps[map_name])
+        return self._indexes.get(map_name)
+
+    def _map_rows(self) -> dict[str, ArrowTable]:
+        """The rows of the tables of maps."""
+        if not any(self.maps.values()):
+            return {table: SCHEMAS[table].empty_table() for table in ("regions", "lanes")}
+        from scenicq.store.regions import lane_rows, region_rows  # noqa: PLC0415 - slow to load, and for maps
+
+        return {"regions": region_rows(self.maps), "lanes": lane_rows(self.maps)}
 
     def _close_segment(self) -> None:
         assert self._open is not None
         self._segments[len(self._segments)] = self._open.finish()
         self._open = None
 
-    def _hashes(self) -> Any:
-        hashes = [frame_hashes(self._read(n, ["frame"])["frame"].to_pylist()) for n in sorted(self._segments)]
-        return np.concatenate([np.empty(0, np.uint64), *hashes])
+    def _hashes(self) -> NDArray[np.uint64]:
+        """Of the frames of all segments, in order; kept, as most datasets are asked for them twice."""
+        segments = self.segments
+        if self._hashed[0] != segments:
+            numbers = sorted(self._segments)
+            hashes = [frame_hashes(self._read(number, ["frame"])["frame"].to_pylist()) for number in numbers]
+            self._hashed = segments, np.concatenate([np.empty(0, np.uint64), *hashes])
+        return self._hashed[1]
 
     def _read(self, number: int, columns: list[str]) -> ArrowTable:
         with pq.ParquetFile(self.folder / self._segments[number].part("labels", number).path) as file:
-            return file.read(columns=columns)
+            return file.read(columns=columns, use_threads=False)
 
 
 def write_dataset(

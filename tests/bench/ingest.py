@@ -4,7 +4,7 @@
 `fleet.py` and kept in DIR if that is given. Prints, for each source and number of processes, label objects, CPU seconds
 of the importing alone and of the whole command, objects a CPU second of both, and the peak memory of its largest
 process; then each bar with pass or fail. The numbers go to bench-results/. A CPU second is one of one core, however
-many work and whoever else uses the machine.
+many work and whoever else uses the machine; as others slow down its caches, the least of several short runs counts.
 """
 
 from __future__ import annotations
@@ -22,13 +22,16 @@ from pathlib import Path
 from clock import Used, cpu_s, run
 from fleet import Fleet, write_interchange
 
-from scenicq.importers.ingest import ingest
+from scenicq.importers.ingest import IngestSummary, ingest
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "bench-results"
 COMMAND = str(Path(sys.executable).with_name("scenicq"))
 NUSCENES = ROOT.parent / "shared" / "data" / "nuscenes-mini"
 LEAST_RATE, MOST_GROWTH = 50_000, 1.25
+SHORT_S, ROUNDS = 2.0, 10
+GENERATED, IMPORTING = "fleet-", "importing"
+WHOLE_FROM = 1_000_000
 BARS_FROM = 10_000
 """Objects from which a rate says something, and frames from which memory may no longer grow."""
 
@@ -54,9 +57,9 @@ class Measured:
     peak_mib: float
 
     @property
-    def rate(self) -> float:
-        """Objects a CPU second of the importing."""
-        return self.objects / self.import_s
+    def rates(self) -> dict[str, float]:
+        """Objects a CPU second of the importing and of the whole command."""
+        return {IMPORTING: self.objects / self.import_s, "the command": self.objects / self.command_s}
 
 
 def command(source: Path, target: Path, jobs: int) -> Used:
@@ -66,26 +69,36 @@ def command(source: Path, target: Path, jobs: int) -> Used:
 
 def measure(source: Path, jobs: int, folder: Path) -> Measured:
     """Ingest a source as a command, then in this process, where start-up is not counted."""
-    used = command(source, folder / "command", jobs)
-    before = cpu_s()
-    summary = ingest(source, folder / "here", jobs=jobs, force=True)
-    import_s = cpu_s() - before
+    runs: list[tuple[Used, float, IngestSummary]] = []
+    while not runs or (runs[0][0].cpu_s < SHORT_S and len(runs) < ROUNDS):
+        used = command(source, folder / "command", jobs)
+        before = cpu_s()
+        summary = ingest(source, folder / "here", jobs=jobs, force=True)
+        runs.append((used, cpu_s() - before, summary))
+    used = min((used for used, _, _ in runs), key=lambda used: used.cpu_s)
+    import_s, summary = min(import_s for _, import_s, _ in runs), runs[0][2]
     one = Measured(source.name, summary.frames, summary.objects, jobs, import_s, used.cpu_s, used.wall_s, used.peak_mib)
     print(
         f"  {one.source:14}  {one.frames:>9,} {one.objects:>11,} {jobs:>5} {import_s:>9.2f} {one.command_s:>9.2f}"
-        f" {one.rate:>9,.0f} {one.objects / one.command_s:>9,.0f} {one.peak_mib:>7.0f}",
+        f" {' '.join(f'{rate:>9,.0f}' for rate in one.rates.values())} {one.peak_mib:>7.0f}",
         flush=True,
     )
     return one
 
 
+def is_whole(one: Measured) -> bool:
+    """Whether the start of the command counts: not for generated frames that are few, which any start outweighs."""
+    return not one.source.startswith(GENERATED) or one.frames >= WHOLE_FROM
+
+
 def bars(found: list[Measured]) -> Iterator[tuple[str, bool]]:
     """What is asked, and whether it is met."""
     for one in found:
-        if one.objects >= BARS_FROM:
-            what = f"{one.source}, --jobs {one.jobs}: {one.rate:,.0f} objects a CPU second, at least {LEAST_RATE:,}"
-            yield what, one.rate >= LEAST_RATE
-    generated = [one for one in found if one.source.startswith("fleet-") and one.frames >= BARS_FROM]
+        for what, rate in one.rates.items():
+            if one.objects >= BARS_FROM and (what == IMPORTING or is_whole(one)):
+                told = f"{rate:,.0f} objects a CPU second, at least {LEAST_RATE:,}"
+                yield f"{one.source}, --jobs {one.jobs}, {what}: {told}", rate >= LEAST_RATE
+    generated = [one for one in found if one.source.startswith(GENERATED) and one.frames >= BARS_FROM]
     for jobs in dict.fromkeys(one.jobs for one in generated):
         by_size = sorted((one for one in generated if one.jobs == jobs), key=lambda one: one.frames)
         growth = by_size[-1].peak_mib / by_size[0].peak_mib
@@ -107,7 +120,7 @@ def main() -> None:
         folder = Path(temporary)
         sources = [given.nuscenes] if given.nuscenes.is_dir() else []
         for frames in sorted(given.frames):
-            source = (given.sources or folder) / f"fleet-{frames}"
+            source = (given.sources or folder) / f"{GENERATED}{frames}"
             if not source.exists():
                 write_interchange(Fleet(frames, 0, needle=False), source)
             sources.append(source)

@@ -92,10 +92,15 @@ def test_a_closed_pipe_is_silent(command, crossroads, scenarios, tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
-def test_a_full_disk_is_told(command, crossroads, scenarios):
-    words = [command, "match", str(scenarios / "02_crossing_cars.scenic"), str(crossroads)]
+@pytest.mark.parametrize("buffered", ["", "1"])
+@pytest.mark.parametrize("words", ["match SCENARIO DATASET", "info DATASET", "--version"])
+def test_a_full_disk_is_told(command, crossroads, scenarios, words, buffered):
+    named = {"SCENARIO": str(scenarios / "02_crossing_cars.scenic"), "DATASET": str(crossroads)}
+    line = [command, *(named.get(word, word) for word in words.split())]
+    # Python writes without a buffer where this variable has a value
+    surroundings = {**os.environ, "PYTHONUNBUFFERED": buffered}
     with open("/dev/full", "w") as full:
-        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=surroundings)
     assert done.returncode == 2
     assert done.stderr.startswith("error[target-unwritable]: standard output cannot be written")
 

@@ -1,4 +1,4 @@
-"""Annotations read by column are what they are row by row, or are not read by column."""
+"""Rows that msgspec decodes become what `json` and the reader of single rows make of them, or are left to these."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import DecodeError
 
 from scenicq.importers.base import Options
-from scenicq.importers.fields import InvalidError
+from scenicq.importers.fields import InvalidError, check_characters
 from scenicq.importers.label_rows import labels_of
 from scenicq.importers.nuscenes import NuScenes
 from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, of_rows
+from scenicq.importers.nuscenes_rows import ANNOTATIONS
 from scenicq.importers.report import Report
 from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.labels import Recording
@@ -30,6 +32,19 @@ ATTRIBUTES = {
 }
 READER = ({"s0": 0, "s1": 1}, {"t0": 0, "t1": 1}, ATTRIBUTES, {"1": "v0-40", "2": "v80-100"})
 JUNK = [None, True, 0, -1, 2.5, float("nan"), 10**400, 2**63, "", "x", "ab", [], [1, None], [True, 1, 1], {}, ["a", 1]]
+
+PIECES = [
+    *'"\\{}[],:-0.e \n\t\x01ü\u2028',
+    "null",
+    "true",
+    "NaN",
+    "1e999",
+    "\\u0061",
+    "\\ud800",
+    "01",
+    "{}, ",
+    '"size": 1, ',
+]
 
 reals = st.floats(-1e6, 1e6) | st.integers(-1000, 1000)
 parts = st.floats(-0.9, 0.9)
@@ -60,22 +75,28 @@ def by_row(rows: list[dict[str, Any]]) -> Boxes | None:
         return None
 
 
+def columns(text: str) -> Boxes | None:
+    """What is made of the text of some rows at once; None where they are left to the reader of single rows."""
+    try:
+        return BoxReader(*READER).columns(ANNOTATIONS.decode(text))
+    except (DecodeError, RecursionError):
+        return None
+
+
 def same(one: Boxes, two: Boxes) -> bool:
-    return (one.tokens, one.attributes, one.samples.tolist(), one.tracks.tolist(), one.values.tobytes()) == (
-        *(two.tokens, two.attributes, two.samples.tolist(), two.tracks.tolist()),
+    return (list(one.tokens), one.attributes, one.samples.tolist(), one.tracks.tolist(), one.values.tobytes()) == (
+        *(list(two.tokens), two.attributes, two.samples.tolist(), two.tracks.tolist()),
         np.ascontiguousarray(two.values).tobytes(),
     )
 
 
 @settings(deadline=None)
-@given(rows=st.lists(annotations, min_size=1, max_size=5))
-def test_sound_rows_are_read_alike(rows: list[dict[str, Any]]) -> None:
-    columns, expected = BoxReader(*READER).columns(rows), by_row(rows)
+@given(rows=st.lists(annotations, min_size=1, max_size=5), indent=st.sampled_from([None, 0, 2]), ascii_=st.booleans())
+def test_sound_rows_are_read_alike(rows: list[dict[str, Any]], indent: int | None, ascii_: bool) -> None:
+    found, expected = columns(json.dumps(rows, indent=indent, ensure_ascii=ascii_)), by_row(rows)
     assert expected is not None
-    unusual = any("d" in (row.get("attribute_tokens") or ()) for row in rows)
-    assert unusual or columns is not None
-    if columns is not None:
-        assert same(columns, expected)
+    assert found is not None
+    assert same(found, expected)
 
 
 @settings(deadline=None, max_examples=300)
@@ -83,11 +104,64 @@ def test_sound_rows_are_read_alike(rows: list[dict[str, Any]]) -> None:
 def test_unsound_rows_are_left_to_the_other(rows: list[dict[str, Any]], data: st.DataObject) -> None:
     row = data.draw(st.sampled_from(rows))
     row[data.draw(st.sampled_from(sorted(row)))] = data.draw(st.sampled_from(JUNK))
-    columns = BoxReader(*READER).columns(rows)
-    if columns is not None:
+    agrees(json.dumps(rows))
+
+
+@settings(deadline=None, max_examples=300)
+@given(rows=st.lists(annotations, min_size=1, max_size=3), data=st.data())
+def test_changed_texts_are_read_alike_or_left_to_the_other(rows: list[dict[str, Any]], data: st.DataObject) -> None:
+    text = json.dumps(rows, ensure_ascii=False)
+    for _ in range(data.draw(st.integers(1, 2))):
+        at = data.draw(st.integers(0, len(text)))
+        text = text[:at] + data.draw(st.sampled_from(PIECES)) + text[at + data.draw(st.integers(0, 2)) :]
+    agrees(text)
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        '"translation": [-0, -0.0, 1e-400]',
+        '"translation": [123456789012345678901234567890, 9007199254740993, 1]',
+        '"translation": [1e999, 1, 1]',
+        '"translation": [NaN, 1, 1]',
+        f'"translation": [1{"0" * 400}, 1, 1]',
+        '"token": "q"',
+        '"token": ""',
+        '"token": "\\u0071\\ud83d\\ude00"',
+        '"token": "\\ud800"',
+        '"token": "\\udc00"',
+        '"unused": "\\ud800 and more"',
+        '"unused": "\x01"',
+        '"unused": 1e999',
+        '"unused": [1, {"a": [null, true]}]',
+        '"unused": tru',
+        '"unused": 01',
+        f'"unused": {"[" * 100_000}{"]" * 100_000}',
+        '"num_lidar_pts": 9223372036854775807',
+        '"num_lidar_pts": 9223372036854775808',
+        '"num_lidar_pts": -9223372036854775808',
+        '"num_lidar_pts": -0',
+        '"num_lidar_pts": 1.0',
+        '"num_lidar_pts": true',
+        '"visibility_token": ""',
+        '"size": [0, 1, 1]',
+        '"size": [5e-324, 1, 1]',
+    ],
+)
+def test_a_field_that_comes_again_is_read_alike(field: str) -> None:
+    row = {"token": "p", "sample_token": "s0", "instance_token": "t0", "translation": [1, 2.5, 3], "size": [1, 2, 3]}
+    agrees(f"[{json.dumps(row | {'rotation': [1, 0, 0, 0]})[:-1]}, {field}}}]")
+
+
+def agrees(text: str) -> None:
+    """Whatever is read at once is what single rows are."""
+    found = columns(text)
+    if found is not None:
+        rows = json.loads(text)
+        check_characters(rows)
         expected = by_row(rows)
         assert expected is not None
-        assert same(columns, expected)
+        assert same(found, expected)
 
 
 def tiny(folder: Path, table: str, change: Any) -> tuple[list[RecordingColumns | Recording], Report]:

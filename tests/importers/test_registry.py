@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +16,13 @@ from scenicq.errors import DataError
 from scenicq.importers import registry
 from scenicq.importers.base import Options, Source
 from scenicq.importers.report import Report
+
+SAMPLES = Path(__file__).parents[2] / "sample_data"
+SLOW = [
+    *("shapely", "duckdb", "pyarrow.compute", "numpy.ma", "multiprocessing"),
+    *("scenicq.geometry.shapes", "scenicq.importers.interchange", "scenicq.importers.waymo"),
+]
+"""Modules that take long to load, or read other formats."""
 
 
 class Greedy:
@@ -29,12 +40,12 @@ class Greedy:
 
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    def entry_points(*, group: str) -> list[Any]:
+    def entry_points(group: str) -> list[Any]:
         assert group == "scenicq.importers"
         built_in = SimpleNamespace(name="interchange", value="other:Thing", load=lambda: pytest.fail("not needed"))
         return [SimpleNamespace(name="greedy", value="other:Greedy", load=lambda: Greedy), built_in]
 
-    monkeypatch.setattr(registry, "entry_points", entry_points)
+    monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
 
 
 def test_built_in_importers_are_always_there() -> None:
@@ -61,3 +72,22 @@ def test_nothing_recognised_says_what_was_looked_for(tmp_path: Path) -> None:
     assert error.value.diagnostics[0].code == "dataset-unrecognised"
     assert "labels.jsonl" in str(error.value)
     assert "scene.json" in str(error.value)
+
+
+def test_a_source_without_maps_loads_little(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    shutil.copytree(SAMPLES / "nuscenes_tiny" / "v1.0-tiny", source / "v1.0-tiny")
+    program = (
+        "import sys\nfrom scenicq.importers.ingest import ingest\n"
+        f"print(ingest({str(source)!r}, {str(tmp_path / 'dataset')!r}).objects)\n"
+        f"print(*sorted(set(sys.modules) & {set(SLOW)!r}))"
+    )
+    done = subprocess.run([sys.executable, "-I", "-c", program], capture_output=True, text=True, check=True)
+    objects, loaded = done.stdout.splitlines()
+    assert int(objects) > 0
+    assert loaded == ""
+
+
+@pytest.mark.parametrize("name", list(registry.importers()))
+def test_a_built_in_importer_is_found_under_its_own_name(name: str) -> None:
+    assert registry.importers()[name].name == name

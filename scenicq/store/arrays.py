@@ -1,0 +1,94 @@
+"""Arrow arrays out of NumPy's, and texts taken from a few.
+
+pyarrow has all of this, but loads `pyarrow.compute` and `numpy.ma` for it: more time than a small ingest takes.
+"""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain, repeat
+from operator import mul
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from scenicq.store.schema import ArrowArray
+
+__all__ = ["FEW", "MOST_BYTES", "Texts", "lists_at", "number_array", "repeated_texts"]
+
+MOST_BYTES = 2**31 - 1
+"""What an array of texts can hold."""
+
+FEW = 200_000
+"""Texts that are taken one by one, which takes less time than to load `pyarrow.compute`."""
+
+
+def number_array(values: NDArray[Any], kind: Any) -> ArrowArray:
+    """Numbers of shape (n,) as an array of a numeric type; nan becomes null.
+
+    Args:
+        values: Which the type can hold.
+        kind: A `pyarrow` type of numbers.
+    """
+    values = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
+    there = ~np.isnan(values) if values.dtype.kind == "f" else None
+    valid = None if there is None or there.all() else pa.py_buffer(np.packbits(there, bitorder="little"))
+    return pa.Array.from_buffers(kind, len(values), [valid, pa.py_buffer(values)])
+
+
+def lists_at(values: Sequence[Sequence[float]], at: NDArray[np.intp]) -> ArrowArray:
+    """The lists of some numbers, shape (n,), in their order."""
+    sizes = np.fromiter(map(len, values), np.int64, len(values))
+    flat = np.fromiter(chain.from_iterable(values), np.float64, int(sizes.sum()))
+    starts, many = np.cumsum(sizes) - sizes, sizes[at]
+    ends = np.cumsum(many)
+    places = np.arange(many.sum()) + np.repeat(starts[at] - (ends - many), many)
+    return pa.Array.from_buffers(
+        pa.list_(pa.float64()),
+        len(at),
+        [None, pa.py_buffer(_offsets(ends))],
+        children=[number_array(flat[places], pa.float64())],
+    )
+
+
+class Texts:
+    """Some texts, of which many are taken by their numbers."""
+
+    def __init__(self, texts: Sequence[str]) -> None:
+        """Take the texts."""
+        self._texts = [*texts, None]
+        self._array: ArrowArray = None
+        self._taken = 0
+
+    def at(self, numbers: NDArray[np.int64]) -> ArrowArray:
+        """The texts of some numbers, shape (n,), in their order; null for -1."""
+        self._taken += len(numbers)
+        if self._taken <= FEW:
+            return pa.array(list(map(self._texts.__getitem__, numbers.tolist())), pa.string())
+        if self._array is None:
+            self._array = pa.array(self._texts[:-1], pa.string())
+        return self._array.take(pa.array(numbers, mask=numbers < 0))
+
+
+def repeated_texts(texts: Sequence[str], counts: NDArray[np.int64]) -> ArrowArray:
+    """Each text so many times, shape (len(texts),), one after the other."""
+    times = counts.tolist()
+    content = "".join(map(mul, texts, times))
+    if not content.isascii() or len(content) > MOST_BYTES:
+        return pa.array(list(chain.from_iterable(map(repeat, texts, times))), pa.string())
+    ends = np.cumsum(np.repeat(np.fromiter(map(len, texts), np.int64, len(texts)), counts))
+    buffers = [None, pa.py_buffer(_offsets(ends)), pa.py_buffer(content.encode())]
+    return pa.Array.from_buffers(pa.string(), len(ends), buffers)
+
+
+def _offsets(ends: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Where each value begins, and the end of the last."""
+    offsets = np.zeros(len(ends) + 1, dtype=np.int32)
+    offsets[1:] = ends
+    return offsets

@@ -1,0 +1,99 @@
+"""The large tables are read by msgspec as they are by `json`, with the same said of what is unsound."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from scenicq.errors import DataError
+from scenicq.importers import nuscenes_tables
+from scenicq.importers.nuscenes_tables import Tables
+from scenicq.importers.report import Report
+
+TINY = Path(__file__).parents[2] / "sample_data" / "nuscenes_tiny" / "v1.0-tiny"
+DECODERS = {"sample_annotation": "ANNOTATIONS", "sample_data": "SENSOR_FILES", "ego_pose": "EGO_POSES"}
+JUNK = [None, True, 0, -1, 2.5, float("nan"), 10**400, "", "x", "\ud800", [], [1, 0, 0], [1, 0, 0, None], {}]
+PIECES = [
+    '"',
+    "\\",
+    "{",
+    "}",
+    "[",
+    "]",
+    ",",
+    ":",
+    "-",
+    "0",
+    ".",
+    "\n",
+    "\x01",
+    "null",
+    "NaN",
+    "1e999",
+    "\\u0061",
+    "{}, ",
+]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(TINY, tmp_path / "v1.0-tiny"))
+
+
+def read(folder: Path) -> list[Any]:
+    """All that is read of the tables and said of them."""
+    report = Report()
+    try:
+        tables = Tables(folder, report)
+    except DataError as error:
+        return [error.diagnostics]
+    content = [tables.scene(token) for token in tables.scenes]
+    return [tables.poses, tables.sensors, [scene.digest() for scene in content], report.tally, report.told]
+
+
+def read_with_json(folder: Path) -> list[Any]:
+    with pytest.MonkeyPatch.context() as patch:
+        for name in DECODERS.values():
+            patch.setattr(nuscenes_tables, name, None)
+        return read(folder)
+
+
+@pytest.mark.parametrize("table", list(DECODERS))
+@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_read_as_with_json(folder: Path, table: str, data: st.DataObject) -> None:
+    rows = json.loads((TINY / f"{table}.json").read_bytes())
+    for _ in range(data.draw(st.integers(0, 2))):
+        row = data.draw(st.sampled_from(rows))
+        key = data.draw(st.sampled_from(sorted(row)))
+        if data.draw(st.booleans()):
+            row[key] = data.draw(st.sampled_from(JUNK))
+        else:
+            del row[key]
+    text = json.dumps(rows, indent=data.draw(st.sampled_from([None, 0, 2])))
+    if data.draw(st.booleans()):
+        at = data.draw(st.integers(0, len(text)))
+        text = text[:at] + data.draw(st.sampled_from(PIECES)) + text[at + data.draw(st.integers(0, 2)) :]
+    (folder / f"{table}.json").write_text(text, encoding="utf-8")
+    assert read(folder) == read_with_json(folder)
+
+
+def test_sound_tables_need_no_json(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Path] = []
+
+    def read_list(path: Path, rows: Any = None) -> Any:
+        for block in nuscenes_tables_read_list(path, rows):
+            if block.rows is None and len(block.elements) > 1:
+                asked.append(path)
+            yield block
+
+    nuscenes_tables_read_list = nuscenes_tables.read_list
+    monkeypatch.setattr(nuscenes_tables, "read_list", read_list)
+    read(folder)
+    assert not {path.stem for path in asked} & set(DECODERS)
