@@ -21,11 +21,10 @@ from scenicq.importers.report import Report
 from scenicq.store.columns import columns_of
 from scenicq.store.labels import Recording
 from scenicq.store.schema import SCHEMA_VERSION
-from scenicq.store.segment import Segment, SegmentWriter
+from scenicq.store.segment import MapIndexes, Segment, SegmentWriter
 
 if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature
-    from scenicq.store.placement import MapIndex
 
 __all__ = ["Job", "World", "fingerprint", "maps_digest", "write_segments"]
 
@@ -123,7 +122,7 @@ def write_segments(
     if many > 1:
         yield from _write_apart(world, jobs, many, on_recording)
         return
-    indexes: dict[str, MapIndex] = {}
+    indexes = MapIndexes(world.maps)
     for job in jobs:
         yield _write(world, job, indexes, on_recording)
 
@@ -151,7 +150,7 @@ def _write_apart(world: World, jobs: Sequence[Job], many: int, on_recording: OnR
             yield segment
 
 
-def _write(world: World, job: Job, indexes: dict[str, MapIndex], on_recording: OnRecording) -> Segment:
+def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecording) -> Segment:
     report = Report(strict=world.strict)
     writer = SegmentWriter(world.folder, job.number)
     try:
@@ -159,11 +158,7 @@ def _write(world: World, job: Job, indexes: dict[str, MapIndex], on_recording: O
             writer.open()
             for found in job.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
                 columns = columns_of(found) if isinstance(found, Recording) else found
-                if columns.map not in indexes and world.maps.get(columns.map):
-                    from scenicq.store.placement import MapIndex  # noqa: PLC0415 - slow to load, and for maps
-
-                    indexes[columns.map] = MapIndex(world.maps[columns.map])
-                writer.add(columns, indexes.get(columns.map))
+                writer.add(columns, indexes.of(columns.map))
                 on_recording(columns.name, len(columns.frames))
             return writer.finish(job.fingerprint, report.tally, report.told)
     finally:
@@ -171,7 +166,7 @@ def _write(world: World, job: Job, indexes: dict[str, MapIndex], on_recording: O
 
 
 def _start_worker(world: World) -> Callable[[Job, OnTold], Segment]:
-    indexes: dict[str, MapIndex] = {}
+    indexes = MapIndexes(world.maps)
 
     def work(job: Job, tell: OnTold) -> Segment:
         return _write(world, job, indexes, lambda recording, frames: tell((recording, frames)))

@@ -31,7 +31,7 @@ from scenicq.match.planning import MatchPlan, make_plan, relevant_properties
 from scenicq.match.quick import Quick
 from scenicq.match.ready import ready
 from scenicq.match.search import Exhausted, Reporter
-from scenicq.match.together import Cast, firsts, together
+from scenicq.match.together import Filled, firsts, together
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -114,14 +114,14 @@ class Matcher:
             labels: Labels, each with what is known of who may play whom.
             places: What is known of places of the map; see `look_up`.
         """
-        casts: dict[Direct, list[tuple[int, Cast]]] = {}
+        casts: dict[Direct, list[tuple[int, Filled]]] = {}
         for place, (label, among) in enumerate(labels):
             if among is None or not self._plain or not label.has_ego:
                 continue
             direct = self._direct_for(label, among)
             numbers = None if direct is None else firsts(direct, among)
             if direct is not None and numbers is not None:
-                casts.setdefault(direct, []).append((place, Cast(label, numbers, self._disc(label))))
+                casts.setdefault(direct, []).append((place, Filled(label, numbers, self._disc(label))))
         found: dict[int, Match] = {}
         for direct, mine in casts.items():
             decided = together(direct, [each for _, each in mine], self.options.tolerance, places)

@@ -229,8 +229,8 @@ def _offset(item: Comparison) -> Quick | None:
     index = item.object
     no, narrow = No(item), No(item)
 
-    def seen(get: Get) -> tuple[float, float, float]:
-        """The position in the frame of the offset, and how far that is turned."""
+    def seen(get: Get) -> tuple[XY, XY, XY, float]:
+        """The position in the frame of the offset, the offset's known part and what comes nearest; the frame's turn."""
         px, py = cast(XY, get(index, "position"))
         turn = 0.0
         for shift, exact in steps:
@@ -242,13 +242,12 @@ def _offset(item: Comparison) -> Quick | None:
                 turn = turn + angle
                 c, s = turned(angle)
                 px, py = px * c + py * s, py * c - px * s
-        return px, py, turn
+        a, b = x.known(get), y.known(get)
+        return (px, py), (a, b), (clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)), turn
 
     @_decided
     def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: Places) -> Outcome | None:
-        px, py, turn = seen(get)
-        a, b = x.known(get), y.known(get)
-        u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
+        (px, py), (a, b), (u, v), turn = seen(get)
         off = math.hypot(u - px, v - py)
         if off > tolerance.reach + _MARGIN and math.isfinite(off):
             return no
@@ -258,9 +257,7 @@ def _offset(item: Comparison) -> Quick | None:
         return Yes({**spread(x, u - a), **spread(y, v - b)})
 
     def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: Places) -> Satisfied:
-        px, py, _ = seen(get)
-        a, b = x.known(get), y.known(get)
-        u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
+        (px, py), (a, b), (u, v), _ = seen(get)
         values = {**spread(x, u - a), **spread(y, v - b)}
         return _close(u - px, v - py, tolerance), cast("Mapping[Identity, Column]", values)
 
@@ -329,13 +326,13 @@ def _heading(item: Comparison) -> Quick | None:
 
     def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: Places) -> Satisfied:
         seen = cast(Column, get(index, "heading"))
-        least = max(0.0, tolerance.heading - _MARGIN)
-        nowhere = [(0.0,)] * get.size
-        ways = nowhere if flow is None else [places.allowed(flow, place) for place in _pairs(get, where)]
+        sure = max(0.0, tolerance.heading - _MARGIN)
+        plain = [(0.0,)] * get.size
+        directions = plain if flow is None else [places.allowed(flow, place) for place in _pairs(get, where)]
         offs: list[float] = []
-        for rest, allowed in zip((seen - form.known(get) - middle).tolist(), ways, strict=True):
+        for rest, allowed in zip((seen - form.known(get) - middle).tolist(), directions, strict=True):
             turns = (math.remainder(rest - direction, math.tau) for direction in allowed)
-            offs.append(next((off for off in turns if abs(off) - half <= least), math.nan))
+            offs.append(next((off for off in turns if abs(off) - half <= sure), math.nan))
         values = spread(form, middle + clipped(cast(float, np.array(offs)), -half, half))
         return [not math.isnan(off) for off in offs], cast("Mapping[Identity, Column]", values)
 

@@ -28,13 +28,13 @@ from scenicq.match.planning import GroupPlan
 from scenicq.match.quick import Satisfied
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["Cast", "Together", "firsts", "together"]
+__all__ = ["Filled", "Together", "firsts", "together"]
 
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 
 @dataclass(frozen=True, slots=True)
-class Cast:
+class Filled:
     """A label whose roles are filled.
 
     Attributes:
@@ -78,7 +78,7 @@ def firsts(direct: Direct, among: Among) -> tuple[int, ...] | None:
     return tuple(numbers)
 
 
-def together(direct: Direct, casts: Sequence[Cast], tolerance: Tolerance, places: Places) -> Together:
+def together(direct: Direct, casts: Sequence[Filled], tolerance: Tolerance, places: Places) -> Together:
     """How labels are satisfied as they are cast.
 
     Args:

@@ -254,16 +254,15 @@ class _Reader:
             alternatives = [add(total, more) for total in alternatives for more in bounds.intervals(term)]
         spans: list[tuple[Interval, Expr]] = []
         for low, high in alternatives:
-            ((_, span),) = (difference((high, high), (low, low)),)
+            _, span = difference((high, high), (low, low))
             if (isinstance(span, float) and span + 2 * width >= math.tau) or math.inf in (high, span):
                 return ""
             spans.append((add((low, low), (-width, -width)), add((span, span), (2 * width, 2 * width))[1]))
 
         def holds(turned: str) -> str:
-            starts = [difference((turned, turned), start)[0] for start, _ in spans]
-            return _sql(
-                any_of([less(modulo_turn(number(start)), span) for start, (_, span) in zip(starts, spans, strict=True)])
-            )
+            # from where each span starts
+            angles = [(modulo_turn(number(difference((turned, turned), start)[0])), span) for start, span in spans]
+            return _sql(any_of([less(angle, span) for angle, span in angles]))
 
         if not along:
             return holds(base)

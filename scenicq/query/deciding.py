@@ -129,16 +129,20 @@ class Decider:
         while batch := list(islice(left, size)):
             labels = [(each.label, each.among) for each in batch]
             places = matcher.look_up(labels)
-            verdicts = None if self.all_matches else matcher.match_all(labels, places)
-            for label, among in labels:
-                found = self._every_match(matcher, label, among, places) if verdicts is None else [next(verdicts)]
+            verdicts: Iterator[list[Verdict]]
+            if self.all_matches:
+                verdicts = (_every_match(matcher, label, among, places) for label, among in labels)
+            else:
+                verdicts = ([verdict] for verdict in matcher.match_all(labels, places))
+            for (label, _), found in zip(labels, verdicts, strict=True):
                 yield [Result(label.frame, label.recording, label.timestamp_us, each, label.sensors) for each in found]
             size = _BATCH
 
-    def _every_match(self, matcher: Matcher, label: Label, among: Among | None, places: Places) -> list[Verdict]:
-        """Every correspondence by which a label matches, or else why none does."""
-        matches = list(matcher.matches(label, among=among, places=places))
-        return [*matches] if matches else [matcher.match(label, among=among, places=places)]
+
+def _every_match(matcher: Matcher, label: Label, among: Among | None, places: Places) -> list[Verdict]:
+    """Every correspondence by which a label matches, or else why none does."""
+    matches: list[Verdict] = [*matcher.matches(label, among=among, places=places)]
+    return matches or [matcher.match(label, among=among, places=places)]
 
 
 def every_label(dataset: Dataset, block: Block) -> Iterator[Label]:

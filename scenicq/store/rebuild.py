@@ -22,9 +22,8 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.store.columns import MemberColumns, RecordingColumns
 from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Manifest
-from scenicq.store.placement import MapIndex
 from scenicq.store.schema import ArrowTable
-from scenicq.store.segment import SegmentWriter, read_segments
+from scenicq.store.segment import MapIndexes, SegmentWriter, read_segments
 from scenicq.store.writer import DatasetWriter
 
 __all__ = ["rebuild"]
@@ -47,7 +46,7 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
         message = f"{dataset.path} lacks descriptions of its parts"
         raise DataError(Diagnostic("store-damaged", message, hints=("ingest the source again",)))
     maps = {name: dataset.features(name) for name in before.maps}
-    indexes: dict[str, MapIndex] = {}
+    indexes = MapIndexes(maps)
     with DatasetWriter(dataset.path, maps, update=True) as writer:
         try:
             for number, old in segments.items():
@@ -59,9 +58,7 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
                 try:
                     part.open()
                     for columns in _recordings(*files):
-                        if columns.map not in indexes and maps.get(columns.map):
-                            indexes[columns.map] = MapIndex(maps[columns.map])
-                        part.add(columns, indexes.get(columns.map))
+                        part.add(columns, indexes.of(columns.map))
                         if progress is not None:
                             progress(len(columns.frames))
                     writer.adopt(number, part.finish(old.fingerprint, old.counts, old.told))

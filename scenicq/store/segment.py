@@ -26,9 +26,19 @@ from scenicq.store.schema import SEGMENT_TABLES
 from scenicq.store.whole_files import write_whole
 
 if TYPE_CHECKING:  # slow to load, and not every source has maps
+    from scenicq.geometry.features import MapFeature
     from scenicq.store.placement import MapIndex
 
-__all__ = ["SEGMENT_OBJECTS", "Problem", "Segment", "SegmentWriter", "read_segments", "segments_of", "take_over"]
+__all__ = [
+    "SEGMENT_OBJECTS",
+    "MapIndexes",
+    "Problem",
+    "Segment",
+    "SegmentWriter",
+    "read_segments",
+    "segments_of",
+    "take_over",
+]
 
 SEGMENT_OBJECTS = 1 << 20
 """Upper bound of the label objects of a segment, unless a single recording has more."""
@@ -112,6 +122,23 @@ def segments_of(weights: Sequence[tuple[str, int]], largest: int = SEGMENT_OBJEC
         total += weight
     if segment:
         yield segment
+
+
+class MapIndexes:
+    """Indexes of maps, each made when it is first asked for."""
+
+    def __init__(self, maps: Mapping[str, Sequence[MapFeature]]) -> None:
+        """Take the elements of each map."""
+        self._maps = maps
+        self._made: dict[str, MapIndex] = {}
+
+    def of(self, name: str) -> MapIndex | None:
+        """The index of a map; None if it has no elements."""
+        if name not in self._made and self._maps.get(name):
+            from scenicq.store.placement import MapIndex  # noqa: PLC0415 - slow to load, and for maps
+
+            self._made[name] = MapIndex(self._maps[name])
+        return self._made.get(name)
 
 
 @dataclass(slots=True)

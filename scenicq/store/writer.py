@@ -26,12 +26,11 @@ from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest
 from scenicq.store.parquet import TableWriter
 from scenicq.store.partial import Partial, check_target
 from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowTable
-from scenicq.store.segment import SEGMENT_OBJECTS, Segment, SegmentWriter, read_segments, take_over
+from scenicq.store.segment import SEGMENT_OBJECTS, MapIndexes, Segment, SegmentWriter, read_segments, take_over
 from scenicq.store.whole_files import write_whole
 
 if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature
-    from scenicq.store.placement import MapIndex
 
 __all__ = ["DatasetWriter", "write_dataset"]
 
@@ -75,7 +74,7 @@ class DatasetWriter:
         self._segment_objects = segment_objects
         self._partial = Partial(self._target)
         self._segments: dict[int, Segment] = {}
-        self._indexes: dict[str, MapIndex] = {}
+        self._indexes = MapIndexes(maps)
         self._open: SegmentWriter | None = None
         self._last = ""
         self._hashed: tuple[list[Segment], NDArray[np.uint64]] = [], np.empty(0, np.uint64)
@@ -144,7 +143,7 @@ class DatasetWriter:
             if self._open is None:
                 self._open = SegmentWriter(self.folder, len(self._segments))
                 self._open.open()
-            self._open.add(columns, self._index(columns.map))
+            self._open.add(columns, self._indexes.of(columns.map))
         except OSError as error:
             raise self.unwritable(error) from error
 
@@ -230,13 +229,6 @@ class DatasetWriter:
         return DataError(
             Diagnostic("target-unwritable", f"{self._target} cannot be written: {error.strerror or error}")
         )
-
-    def _index(self, map_name: str) -> MapIndex | None:
-        if map_name not in self._indexes and self.maps.get(map_name):
-            from scenicq.store.placement import MapIndex  # noqa: PLC0415 - slow to load, and for maps
-
-            self._indexes[map_name] = MapIndex(self.maps[map_name])
-        return self._indexes.get(map_name)
 
     def _map_rows(self) -> dict[str, ArrowTable]:
         """The rows of the tables of maps."""
