@@ -10,17 +10,17 @@ from typing import Literal
 
 import click
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import DataError, Diagnostic, ScenarioError, ScenicqError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.show import show_forest
 from scenicq.geometry.network import Network
-from scenicq.match.constraints import build_groups, describe_constraint
 from scenicq.match.options import MatchOptions
-from scenicq.match.ready import ready
-from scenicq.query.maps import program_network, read_network
-from scenicq.query.run import beside, read_program
+from scenicq.match.problem.constraints import build_groups, describe_constraint
+from scenicq.match.problem.preprocess import ready
+from scenicq.query.execution.compiled_map import program_network, read_network
+from scenicq.query.execution.run import beside, read_program
 from scenicq.store.dataset import open_dataset
 
 from .cache import user_cache

@@ -11,9 +11,9 @@ from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenicq.query.export import Exporter
-from scenicq.query.results import Result, record
-from scenicq.query.run import Query
+from scenicq.exporters.export import Exporter
+from scenicq.query.execution.results import Result, record
+from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target, write_report
 
 from .formats import make_writer

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from scenicq.query.dask_engine import dask_engine
-from scenicq.query.pieces import Engine
+from scenicq.query.execution.dask_engine import dask_engine
+from scenicq.query.execution.shards import Engine
 
 __all__ = ["parse_engine"]
 

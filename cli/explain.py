@@ -10,10 +10,10 @@ import click
 from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match
-from scenicq.query.explain import explain as explain_label
-from scenicq.query.explain import show_explanation
-from scenicq.query.run import Query, read_program
-from scenicq.query.solving import LazySolver
+from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.run import Query, read_program
+from scenicq.query.explain.frame_explanation import explain as explain_label
+from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label
 

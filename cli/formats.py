@@ -39,7 +39,7 @@ class Writer(Protocol):
     """Writes results one by one."""
 
     def write(self, record: Mapping[str, Any]) -> None:
-        """Write one result as `scenicq.query.results.record` gives it."""
+        """Write one result as `scenicq.query.execution.results.record` gives it."""
         ...
 
     def finish(self) -> None:

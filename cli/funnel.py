@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 from scenicq.forest.scenario import BuiltIn
-from scenicq.query.results import Funnel
-from scenicq.query.run import Query
+from scenicq.query.execution.results import Funnel
+from scenicq.query.execution.run import Query
 
 from .report import columns, count, show
 

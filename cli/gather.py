@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from scenicq.query.export import EXPORTS
-from scenicq.query.partitions import Gathered
-from scenicq.query.partitions import gather as find_pieces
-from scenicq.query.restore import noted_question, restore
+from scenicq.exporters.export import EXPORTS
+from scenicq.query.execution.partitions import Gathered
+from scenicq.query.execution.partitions import gather as find_pieces
+from scenicq.query.execution.record_reader import noted_question, read_record
 
 from .deliver import Wanted, deliver
 from .formats import FORMATS, make_writer
@@ -54,7 +54,7 @@ def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Pat
     else:
         query = noted_question(folder, gathered.question)
         query.funnel = gathered.funnel
-        results = (restore(each, query.source) for each in gathered.records())
+        results = (read_record(each, query.source) for each in gathered.records())
         deliver(query, results, (), Wanted(file, form, export, report, sensors=sensors), ProgressBar(quiet=True))
     if gathered.funnel.matches == 0 and not exit_zero:
         ctx.exit(NOTHING)

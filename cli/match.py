@@ -14,11 +14,11 @@ from typing import Any
 
 import click
 
-from scenicq.query.export import EXPORTS
-from scenicq.query.near import near_results
-from scenicq.query.pieces import Engine, in_order, kept, pieces_of, run_here
-from scenicq.query.results import Result
-from scenicq.query.run import Query, read_program
+from scenicq.exporters.export import EXPORTS
+from scenicq.query.execution.results import Result
+from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
+from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.store.dataset import open_dataset
 
 from .deliver import Wanted, deliver
@@ -39,7 +39,7 @@ __all__ = ["match"]
 def _near(query: Query, count: int | None) -> Iterator[Result]:
     """The frames that come closest, looked for once the matches are there."""
     if count is not None:
-        yield from near_results(query, count)
+        yield from nearest_misses(query, count)
 
 
 # fmt: off
@@ -145,7 +145,7 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
         pieces = real.with_name(f".{real.name}.pieces")
         engine = kept(engine or run_here, pieces)
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
-    results = in_order(query, engine, pieces_of(query, 16), bar.advance) if engine else query.results(bar.advance)
+    results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
     try:
         deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
     except BaseException:

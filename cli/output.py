@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NoReturn, Self
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.whole_files import WholeFile
+from scenicq.store.atomic_files import WholeFile
 
 if TYPE_CHECKING:
     from tqdm import tqdm

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from scenicq.query.partitions import fingerprint, gather, is_done, partitions, write_partition
-from scenicq.query.restore import note_question
-from scenicq.query.results import Funnel, record
-from scenicq.query.run import Query
+from scenicq.query.execution.partitions import fingerprint, gather, is_done, partitions, write_partition
+from scenicq.query.execution.record_reader import note_question
+from scenicq.query.execution.results import Funnel, record
+from scenicq.query.execution.run import Query
 
 from .output import ProgressBar
 

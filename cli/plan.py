@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from scenicq.query.run import Query
-from scenicq.query.survey import survey
+from scenicq.query.execution.run import Query
+from scenicq.query.prefilter.prefilter_counts import prefilter_counts
 
 from .report import columns
 
@@ -17,7 +17,7 @@ def show_plan(query: Query) -> None:
 
     The estimate is that of a sample; every step is then counted.
     """
-    for found in survey(query):
+    for found in prefilter_counts(query):
         plan, left = found.plan, found.left
         rows = [
             (f"{estimated:,}", f"{frames:,}", step.what, step.span.place if step.span else "")

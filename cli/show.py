@@ -11,9 +11,9 @@ import click
 from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
-from scenicq.query.explain import explain
-from scenicq.query.run import Query, read_program
-from scenicq.query.solving import LazySolver
+from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.run import Query, read_program
+from scenicq.query.explain.frame_explanation import explain
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.frames import frame_page
 from scenicq.report.picture import Shot, Style, draw

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from scenicq.importers.ingest import ingest
     from scenicq.match.matcher import Matcher
     from scenicq.match.options import MatchOptions
-    from scenicq.query.run import Query, QueryOptions, read_program
+    from scenicq.query.execution.run import Query, QueryOptions, read_program
     from scenicq.store.dataset import open_dataset
 
 __version__ = "0.1.0"
@@ -42,14 +42,14 @@ __all__ = [
 _HOMES = {
     "MatchOptions": "scenicq.match.options",
     "Matcher": "scenicq.match.matcher",
-    "Query": "scenicq.query.run",
-    "QueryOptions": "scenicq.query.run",
+    "Query": "scenicq.query.execution.run",
+    "QueryOptions": "scenicq.query.execution.run",
     "ScenicqError": "scenicq.errors",
     "Source": "scenicq.errors",
     "compile_scenario": "scenicq.compiler.program",
     "ingest": "scenicq.importers.ingest",
     "open_dataset": "scenicq.store.dataset",
-    "read_program": "scenicq.query.run",
+    "read_program": "scenicq.query.execution.run",
     "render": "scenicq.errors",
 }
 

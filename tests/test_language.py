@@ -18,8 +18,8 @@ from pathlib import Path
 
 import pytest
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import CODES, ScenarioError, Source
 from scenicq.forest.improvise import draw_scene
 from scenicq.forest.scenario import Scenario

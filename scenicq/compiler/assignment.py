@@ -12,8 +12,8 @@ from typing import Any, cast
 from scenicq.compiler.arithmetic import hashed
 from scenicq.compiler.environment import Environment, Runner
 from scenicq.compiler.items import items_of
+from scenicq.compiler.known_properties import decided
 from scenicq.compiler.logic import condition
-from scenicq.compiler.settled import decided
 from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.syntax import ast

@@ -24,9 +24,9 @@ from scenicq.compiler.unavailable import unavailable_attribute
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
+from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import ArithmeticOp, Constant, Node, PointIn
-from scenicq.forest.turns import one_turn
 from scenicq.geometry.angles import heading_of
 from scenicq.geometry.elements import Maneuver, NetworkElement
 from scenicq.geometry.network import Network

@@ -12,10 +12,10 @@ from typing import cast
 
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
+from scenicq.forest.angle_wrap import any_turn
 from scenicq.forest.build import compare, constant, vector
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import CompareOp, Constant, Feature, Kind, Node, Select, Undefined
-from scenicq.forest.turns import any_turn
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
 

@@ -12,9 +12,9 @@ from typing import Any, cast
 from scenicq.compiler import operators
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.environment import Runner
+from scenicq.compiler.known_properties import settled
 from scenicq.compiler.lookups import among
 from scenicq.compiler.road_attributes import worked_out
-from scenicq.compiler.settled import settled
 from scenicq.compiler.values import Builtin, ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build

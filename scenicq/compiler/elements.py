@@ -10,10 +10,10 @@ from typing import Any
 
 import shapely
 
+from scenicq.compiler.element_lookups import LOOKUPS
 from scenicq.compiler.element_methods import METHODS, find_among, method_of, nominal_directions
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.lookups import look_up
-from scenicq.compiler.places import LOOKUPS
 from scenicq.compiler.road_attributes import names_worked_out, worked_out
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
 from scenicq.errors import Span

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Protocol
 
-from scenicq.compiler.places import Lookups
+from scenicq.compiler.element_lookups import Lookups
 from scenicq.compiler.unavailable import unavailable_name
 from scenicq.compiler.values import Function, Instance, ModelValue, fail
 from scenicq.errors import Span

@@ -22,8 +22,8 @@ from scenicq.compiler.constructs import construct
 from scenicq.compiler.distributions import interval
 from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
 from scenicq.compiler.items import items_of, length_of, subscript
+from scenicq.compiler.known_properties import decided, settled
 from scenicq.compiler.logic import condition, connected, inverted
-from scenicq.compiler.settled import decided, settled
 from scenicq.compiler.texts import formatted
 from scenicq.compiler.values import (
     Builtin,

@@ -18,17 +18,17 @@ from scenicq.compiler.classes import bind_arguments, define_class, refuse_decora
 from scenicq.compiler.coerce import to_region, to_scalar
 from scenicq.compiler.comparisons import binary, iterate
 from scenicq.compiler.deviations import deviation, leaves_the_plane
+from scenicq.compiler.element_lookups import Lookups
 from scenicq.compiler.environment import Budget, Environment
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.imports import import_into
 from scenicq.compiler.items import items_of
+from scenicq.compiler.known_properties import decided
 from scenicq.compiler.logic import condition
-from scenicq.compiler.places import Lookups
 from scenicq.compiler.placing import Surroundings, bind
 from scenicq.compiler.requirements import Requirement, requirement
 from scenicq.compiler.scoping import own_names
-from scenicq.compiler.settled import decided
 from scenicq.compiler.specifiers import construct
 from scenicq.compiler.values import (
     Choice,

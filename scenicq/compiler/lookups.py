@@ -16,9 +16,9 @@ from collections.abc import Callable, Sequence
 from typing import cast
 
 from scenicq.compiler.coerce import to_vector
+from scenicq.compiler.element_lookups import LOOKUPS, Table, own
 from scenicq.compiler.environment import Runner
-from scenicq.compiler.places import LOOKUPS, Table, own
-from scenicq.compiler.settled import settled
+from scenicq.compiler.known_properties import settled
 from scenicq.compiler.values import Choice, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant, Vector

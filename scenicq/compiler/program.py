@@ -26,8 +26,8 @@ from scenicq.compiler.models import (
 )
 from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
-from scenicq.compiler.spelling import decide_version
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, fail, is_node
+from scenicq.compiler.version_detection import decide_version
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import Constant, Encloses, Intersects, Node, Undefined

@@ -18,7 +18,7 @@ from scenicq.compiler.comparisons import iterate
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector
-from scenicq.compiler.settled import decided, settled
+from scenicq.compiler.known_properties import decided, settled
 from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant

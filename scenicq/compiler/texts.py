@@ -10,7 +10,7 @@ import re
 
 from scenicq.compiler.arithmetic import LARGEST
 from scenicq.compiler.environment import Environment, Runner
-from scenicq.compiler.settled import settled
+from scenicq.compiler.known_properties import settled
 from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant

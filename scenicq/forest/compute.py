@@ -47,7 +47,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children, is_leaf
 from scenicq.geometry.angles import heading_of, normalize, rotate
 from scenicq.geometry.boxes import box_polygon
-from scenicq.geometry.covering import covers, overlaps
+from scenicq.geometry.containment import covers, overlaps
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import contains, distance
 from scenicq.geometry.regions import (

@@ -13,13 +13,13 @@ from collections import Counter
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 
-from scenicq.forest.assemble import Check, assemble
 from scenicq.forest.compute import CannotEvaluate
-from scenicq.forest.containers import shrink_regions
+from scenicq.forest.containment_pruning import shrink_regions
+from scenicq.forest.draw_schedule import Tape, lay_out
+from scenicq.forest.inline import Check, assemble
 from scenicq.forest.nodes import Constant, Encloses, Identity, Undefined, Value
+from scenicq.forest.proximity_pruning import Window, close_points
 from scenicq.forest.scenario import BuiltIn, Scenario
-from scenicq.forest.tape import Tape, lay_out
-from scenicq.forest.windows import Window, close_points
 
 __all__ = ["Improviser", "Scene", "draw_scene"]
 

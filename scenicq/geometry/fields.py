@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.geometry.guards import Guard, narrowed
+from scenicq.geometry.cell_guards import Guard, narrowed
 from scenicq.geometry.shapes import Bounds
 
 __all__ = ["FieldCell", "VectorField"]

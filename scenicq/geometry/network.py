@@ -33,7 +33,7 @@ from scenicq.geometry.elements import (
 )
 from scenicq.geometry.features import MapFeature, dangling, read_geojson
 from scenicq.geometry.fields import VectorField
-from scenicq.geometry.linking import link
+from scenicq.geometry.network_builder import link
 from scenicq.geometry.regions import SLACK, PolygonSet, PolylineSet, Region
 from scenicq.geometry.road_direction import along_lines
 

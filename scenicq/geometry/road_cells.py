@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.geometry import shapes
+from scenicq.geometry.cell_guards import Guard, Nearer, segment_distances
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
-from scenicq.geometry.guards import Guard, Nearer, segment_distances
 from scenicq.geometry.shapes import Shape
 
 __all__ = ["Contest", "Outline", "convex_outlines", "segment_cells"]

@@ -18,9 +18,9 @@ from shapely import LineString, STRtree
 
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import heading_of_array
+from scenicq.geometry.cell_guards import Guard, Nearer, Off, Within, segment_distances
 from scenicq.geometry.cells import joined_boxes
 from scenicq.geometry.fields import FieldCell
-from scenicq.geometry.guards import Guard, Nearer, Off, Within, segment_distances
 from scenicq.geometry.road_cells import Contest, Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.report import Report
-from scenicq.store.whole_files import whole_file
+from scenicq.store.atomic_files import whole_file
 
 __all__ = ["SUFFIX", "convert_maps", "convert_xodr"]
 

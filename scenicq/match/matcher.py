@@ -18,20 +18,20 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Leaf
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.match.asking import ask
-from scenicq.match.attempt import Attempt, Failure, Solution
-from scenicq.match.casting import Among, candidates_of, cast_roles, egos
-from scenicq.match.constraints import Signature, describe_constraint
-from scenicq.match.direct import Casting, Direct, direct_of, signature_of
-from scenicq.match.items import Item
-from scenicq.match.ladder import No, Outcome
+from scenicq.match.decide.cascade import Outcome, Refuted
+from scenicq.match.decide.closed_form import ClosedForm
+from scenicq.match.decide.solver_step import ask
 from scenicq.match.options import MatchOptions
-from scenicq.match.places import Disc, Places
-from scenicq.match.planning import MatchPlan, make_plan, relevant_properties
-from scenicq.match.quick import Quick
-from scenicq.match.ready import ready
-from scenicq.match.search import Exhausted, Reporter
-from scenicq.match.together import Filled, firsts, together
+from scenicq.match.problem.candidates import Candidates, candidates_of, egos, find_candidates
+from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.constraints import Signature, describe_constraint
+from scenicq.match.problem.map_lookups import Disc, MapLookups
+from scenicq.match.problem.preprocess import ready
+from scenicq.match.search.backtracking import Exhausted, Reporter
+from scenicq.match.search.columnar_first_fit import Assignment, firsts, together
+from scenicq.match.search.first_fit import Casting, FirstFit, first_fit_of, signature_of
+from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
+from scenicq.match.search.label_search import Failure, LabelSearch, Solution
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -51,7 +51,7 @@ class Finding:
     """
 
     verdict: Verdict
-    attempt: Attempt | None = None
+    attempt: LabelSearch | None = None
     plan: MatchPlan | None = None
     assignment: Mapping[int, int] = field(default_factory=dict[int, int])
 
@@ -71,7 +71,7 @@ class Matcher:
     solver: Solver | None = None
     _plans: dict[Signature, MatchPlan] = field(default_factory=dict["Signature", "MatchPlan"], repr=False)
     _kinds: dict[Hashable, int] = field(default_factory=dict["Hashable", int], repr=False)
-    _directs: dict[MatchPlan, Direct | None] = field(default_factory=dict["MatchPlan", "Direct | None"], repr=False)
+    _directs: dict[MatchPlan, FirstFit | None] = field(default_factory=dict["MatchPlan", "FirstFit | None"], repr=False)
     _places: dict[Leaf, str] = field(default_factory=dict["Leaf", "str"], repr=False)
     _relevant: tuple[frozenset[str], ...] = field(init=False, repr=False)
     _plain: bool = field(init=False, repr=False)
@@ -89,8 +89,8 @@ class Matcher:
         reporter: Reporter | None = None,
         *,
         given: Mapping[str, str] | None = None,
-        among: Among | None = None,
-        places: Places | None = None,
+        among: Candidates | None = None,
+        places: MapLookups | None = None,
     ) -> Verdict:
         """Decide one label.
 
@@ -102,26 +102,26 @@ class Matcher:
             places: What is known of places of the map; see `look_up`.
         """
         if reporter is None and not given:
-            found = self._direct(label, among, places or Places())
+            found = self._direct(label, among, places or MapLookups())
             if found is not None:
                 return found
         return next(self._findings(label, reporter, given or {}, among, places)).verdict
 
-    def match_all(self, labels: Sequence[tuple[Label, Among | None]], places: Places) -> Iterator[Verdict]:
+    def match_all(self, labels: Sequence[tuple[Label, Candidates | None]], places: MapLookups) -> Iterator[Verdict]:
         """Decide labels, each as `match` does; those that match in the first way that is tried are found together.
 
         Args:
             labels: Labels, each with what is known of who may play whom.
             places: What is known of places of the map; see `look_up`.
         """
-        casts: dict[Direct, list[tuple[int, Filled]]] = {}
+        casts: dict[FirstFit, list[tuple[int, Assignment]]] = {}
         for place, (label, among) in enumerate(labels):
             if among is None or not self._plain or not label.has_ego:
                 continue
             direct = self._direct_for(label, among)
             numbers = None if direct is None else firsts(direct, among)
             if direct is not None and numbers is not None:
-                casts.setdefault(direct, []).append((place, Filled(label, numbers, self._disc(label))))
+                casts.setdefault(direct, []).append((place, Assignment(label, numbers, self._disc(label))))
         found: dict[int, Match] = {}
         for direct, mine in casts.items():
             decided = together(direct, [each for _, each in mine], self.options.tolerance, places)
@@ -134,21 +134,21 @@ class Matcher:
         for place, (label, among) in enumerate(labels):
             yield found.get(place) or self.match(label, among=among, places=places)
 
-    def _direct_for(self, label: Label, among: Among) -> Direct | None:
+    def _direct_for(self, label: Label, among: Candidates) -> FirstFit | None:
         """How a label of a plain query can be decided without a search, if it can."""
         signature = signature_of(label, self.scenario.ego, among, self._relevant)
         if signature is None:
             return None
         plan = self.plan(signature)
         if plan not in self._directs:
-            self._directs[plan] = direct_of(plan, self.scenario)
+            self._directs[plan] = first_fit_of(plan, self.scenario)
         return self._directs[plan]
 
     def _disc(self, label: Label) -> Disc | None:
         radius = self.options.radius
         return None if radius is None else ((label.ego.x, label.ego.y), radius)
 
-    def _direct(self, label: Label, among: Among | None, places: Places) -> Match | NoMatch | None:
+    def _direct(self, label: Label, among: Candidates | None, places: MapLookups) -> Match | NoMatch | None:
         """What is found without a search, if it is clear."""
         if not self._plain or not label.has_ego:
             return None
@@ -174,13 +174,13 @@ class Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared."""
         return Matcher(self.scenario, options, self.solver, self._plans, self._kinds)
 
-    def look_up(self, labels: Iterable[tuple[Label, Among | None]]) -> Places:
+    def look_up(self, labels: Iterable[tuple[Label, Candidates | None]]) -> MapLookups:
         """What the map says of the places of labels, as far as earlier labels have shown that it matters.
 
         Args:
             labels: Labels, each with what is known of who may play whom.
         """
-        asked: dict[int, list[Quick]] = {}
+        asked: dict[int, list[ClosedForm]] = {}
         for plan in self._plans.values():
             for group in plan.groups:
                 if group.quick is not None and group.quick.index >= 0:
@@ -193,7 +193,7 @@ class Matcher:
                 else:
                     numbers = range(1, len(label.objects) + 1) if among is None else among.get(index, ())
                     found += [(label.objects[number - 1].x, label.objects[number - 1].y) for number in numbers]
-        places = Places()
+        places = MapLookups()
         fields: dict[RoadDirection, list[tuple[float, float]]] = {}
         for index, quicks in asked.items():
             for quick in quicks:
@@ -210,8 +210,8 @@ class Matcher:
         label: Label,
         *,
         given: Mapping[str, str] | None = None,
-        among: Among | None = None,
-        places: Places | None = None,
+        among: Candidates | None = None,
+        places: MapLookups | None = None,
     ) -> Iterator[Match]:
         """Every correspondence by which a label matches; of interchangeable objects, one order only.
 
@@ -241,18 +241,18 @@ class Matcher:
         label: Label,
         reporter: Reporter | None,
         given: Mapping[str, str],
-        among: Among | None = None,
-        places: Places | None = None,
+        among: Candidates | None = None,
+        places: MapLookups | None = None,
     ) -> Iterator[Finding]:
         """Matches, or else the one verdict that there is."""
         matched = False
         rest: list[tuple[int, Finding]] = []
         for ego in egos(self.scenario, label, self.options):
-            cast_ = cast_roles(self.scenario, label, ego, self.options, given, among)
+            cast_ = find_candidates(self.scenario, label, ego, self.options, given, among)
             if isinstance(cast_, Cause):
                 rest.append((0, Finding(NoMatch(cast_, self._names(label, ego, {})))))
                 continue
-            attempt = Attempt(self.scenario, self.options, cast_, self.ask, reporter, places or Places())
+            attempt = LabelSearch(self.scenario, self.options, cast_, self.ask, reporter, places or MapLookups())
             exhausted = False
             try:
                 for signature, candidates in cast_.signatures(self._relevant):
@@ -273,12 +273,12 @@ class Matcher:
         detail = "the source has no ego" if self.options.ego == "label" else f"no {thing.category}"
         return Cause(f"{thing.name}.class", detail, thing.span, (thing.index,))
 
-    def _rest(self, label: Label, attempt: Attempt, *, exhausted: bool) -> tuple[int, Verdict]:
+    def _rest(self, label: Label, attempt: LabelSearch, *, exhausted: bool) -> tuple[int, Verdict]:
         """The verdict of an attempt without a match, and its weight."""
         ego, failure = attempt.cast.ego, attempt.failure
         if attempt.undecided is not None:
             found = attempt.undecided
-            reason = "" if isinstance(found.outcome, No) else found.outcome.reason
+            reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
             return 2_000_000, Unknown(reason, self._cause(found), self._names(label, ego, found.assignment))
         if exhausted:
             cause = Cause("correspondence search", f"more than {self.options.budget:,} steps")
@@ -291,7 +291,7 @@ class Matcher:
     def _cause(self, failure: Failure) -> Cause:
         constraint = failure.constraint
         about = (constraint.object,) if isinstance(constraint, Comparison) else constraint.requirement.objects
-        detail = failure.outcome.detail if isinstance(failure.outcome, No) else ""
+        detail = failure.outcome.detail if isinstance(failure.outcome, Refuted) else ""
         return Cause(describe_constraint(self.scenario, constraint), detail, constraint.span, about)
 
     def _names(self, label: Label, ego: int, assignment: Mapping[int, int]) -> dict[str, str]:

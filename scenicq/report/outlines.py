@@ -57,7 +57,7 @@ from scenicq.geometry.regions import (
 )
 from scenicq.geometry.shapes import Bounds, Shape
 from scenicq.geometry.terms import rectangle_shape
-from scenicq.query.allowed import choices
+from scenicq.query.explain.violations import choices
 
 __all__ = ["Place", "allowed_headings", "allowed_place", "outline", "views"]
 

@@ -11,8 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, cast
 
 from scenicq import __version__
-from scenicq.query.results import Funnel
-from scenicq.query.run import Query
+from scenicq.query.execution.results import Funnel
+from scenicq.query.execution.run import Query
 from scenicq.report.frames import table
 from scenicq.report.shares import Line
 from scenicq.report.svg import element, escape

@@ -14,7 +14,7 @@ from typing import Literal
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.shapes import XY, Bounds
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
-from scenicq.query.explain import Explanation
+from scenicq.query.explain.frame_explanation import Explanation
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.hatching import hatching
 from scenicq.report.overlay import Blame, blames, draw_blame, draw_overlay, draw_witness

@@ -21,7 +21,7 @@ from scenicq.errors import DataError, Diagnostic
 __all__ = ["Record", "read_results"]
 
 Record = Mapping[str, Any]
-"""One result: frame, recording, verdict, and what else `scenicq.query.results.record` gives."""
+"""One result: frame, recording, verdict, and what else `scenicq.query.execution.results.record` gives."""
 
 _TEXTS = ("frame", "recording", "verdict")
 _NEEDED = (*_TEXTS, "timestamp_us", "correspondence", "cause")

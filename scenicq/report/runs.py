@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from scenicq.match.verdict import Match, NoMatch, Unknown
-from scenicq.query.results import Result
+from scenicq.query.execution.results import Result
 from scenicq.store.dataset import Dataset
 
 __all__ = ["Run", "find_runs", "frame_numbers"]

@@ -13,10 +13,10 @@ from scenicq.errors import DataError, Diagnostic, ScenarioError
 from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown
-from scenicq.query.explain import explain
-from scenicq.query.results import Result
-from scenicq.query.run import Query
-from scenicq.query.solving import LazySolver
+from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.results import Result
+from scenicq.query.execution.run import Query
+from scenicq.query.explain.frame_explanation import explain
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.cards import Card, draw_card
 from scenicq.report.frames import variable_texts

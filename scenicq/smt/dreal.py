@@ -30,7 +30,7 @@ from scenicq.smt.formula import (
     conjunction,
     postorder,
 )
-from scenicq.smt.relational import without_inverses
+from scenicq.smt.inverse_elimination import without_inverses
 
 __all__ = ["VERSION", "check"]
 

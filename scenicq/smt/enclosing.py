@@ -15,9 +15,9 @@ from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, Everywhere, IntersectionOf, Nowhere, PolygonSet, Rectangle, Region, UnionOf
 from scenicq.geometry.shapes import Shape
 from scenicq.geometry.terms import overlap, rectangle_shape
+from scenicq.smt.distance_terms import Frame, dot, minus
 from scenicq.smt.formula import FALSE, TRUE, Formula, Num, Operator, apply, compare, conjunction, disjunction
-from scenicq.smt.inside import UnsupportedError, convex_cell, disc
-from scenicq.smt.measure import Frame, dot, minus
+from scenicq.smt.region_membership import UnsupportedError, convex_cell, disc
 
 __all__ = ["box_holds"]
 

@@ -18,11 +18,6 @@ from scenicq.forest.nodes import (
     Undefined,
     Value,
 )
-from scenicq.smt.codes import (
-    between,
-    same,
-    truth,
-)
 from scenicq.smt.expressions import Expressions
 from scenicq.smt.formula import (
     FALSE,
@@ -35,8 +30,13 @@ from scenicq.smt.formula import (
     conjunction,
     disjunction,
 )
-from scenicq.smt.inside import UnsupportedError, Vector, disc
+from scenicq.smt.region_membership import UnsupportedError, Vector, disc
 from scenicq.smt.unknowns import Unknowns
+from scenicq.smt.value_codes import (
+    between,
+    same,
+    truth,
+)
 
 __all__ = ["Encoding", "Item", "Target", "UnsupportedError", "encode"]
 

@@ -51,17 +51,7 @@ from scenicq.forest.walk import children, postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Rectangle
-from scenicq.smt.codes import (
-    Choice,
-    cases,
-    compare_codes,
-    connect,
-    constant_code,
-    equal,
-    is_box,
-    known_region,
-    rotated,
-)
+from scenicq.smt.distance_terms import Frame, box_meets, boxes_meet, disc_meets, distance_term, length, minus
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.field import field_cells
 from scenicq.smt.formula import (
@@ -77,9 +67,19 @@ from scenicq.smt.formula import (
     disjunction,
     negation,
 )
-from scenicq.smt.inside import UnsupportedError, Vector, inside_region, picked
-from scenicq.smt.measure import Frame, box_meets, boxes_meet, disc_meets, distance_term, length, minus
+from scenicq.smt.region_membership import UnsupportedError, Vector, inside_region, picked
 from scenicq.smt.unknowns import Unknowns
+from scenicq.smt.value_codes import (
+    Choice,
+    cases,
+    compare_codes,
+    connect,
+    constant_code,
+    equal,
+    is_box,
+    known_region,
+    rotated,
+)
 
 __all__ = ["Expressions"]
 

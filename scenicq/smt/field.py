@@ -7,14 +7,14 @@ from typing import assert_never
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.geometry.cell_guards import Guard, Nearer, Off, Segments, Within
 from scenicq.geometry.cells import convex_parts, joined_boxes
 from scenicq.geometry.fields import VectorField
-from scenicq.geometry.guards import Guard, Nearer, Off, Segments, Within
 from scenicq.geometry.shapes import Bounds, Shape, polygonal_part
 from scenicq.geometry.terms import overlap
+from scenicq.smt.distance_terms import squared_distance
 from scenicq.smt.formula import Formula, Operator, Term, apply, compare, conjunction, disjunction, negation
-from scenicq.smt.inside import Vector, convex_cell
-from scenicq.smt.measure import squared_distance
+from scenicq.smt.region_membership import Vector, convex_cell
 
 __all__ = ["field_cells"]
 

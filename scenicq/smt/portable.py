@@ -20,8 +20,8 @@ from scenicq.smt.affine import EMPTY, ENTAILED
 from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Atom, Problem, Relation, postorder
-from scenicq.smt.isolate import Recipe, recipes
 from scenicq.smt.system import Alternative, System, TooDeepError, compile_system, contract_choice
+from scenicq.smt.variable_isolation import Recipe, recipes
 
 __all__ = ["check"]
 

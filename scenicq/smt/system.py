@@ -14,7 +14,7 @@ from functools import cached_property
 from scenicq.smt.affine import EMPTY, ENTAILED, MAYBE, AffineAtom, Forms, affine_atoms, contract_affine
 from scenicq.smt.evaluation import Evaluator
 from scenicq.smt.formula import And, Atom, Formula, Or, Relation, free_variables, postorder
-from scenicq.smt.tape import Tape
+from scenicq.smt.hc4 import Tape
 
 __all__ = ["Alternative", "System", "TooDeepError", "compile_system", "contract_choice"]
 

@@ -7,7 +7,7 @@ import math
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import DiscreteRange, Identity, Index, Normal, Range, TruncatedNormal
 from scenicq.smt.formula import Formula, Num, Operator, Term, Var, Variable, apply, compare, disjunction
-from scenicq.smt.inside import UnsupportedError
+from scenicq.smt.region_membership import UnsupportedError
 
 __all__ = ["ScalarLeaf", "Unknowns"]
 

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import IO
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.store.atomic_files import sync_folder
 from scenicq.store.manifest import is_dataset
-from scenicq.store.reading import nobody_reads
-from scenicq.store.whole_files import sync_folder
+from scenicq.store.read_lock import nobody_reads
 
 try:
     import fcntl

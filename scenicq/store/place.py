@@ -20,7 +20,7 @@ import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.manifest import MANIFEST, Part
-from scenicq.store.reading import Reading
+from scenicq.store.read_lock import Reading
 from scenicq.store.remote import RemoteFile, RemoteFolder
 
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which is slow to load

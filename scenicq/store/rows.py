@@ -21,7 +21,7 @@ from scenicq.store.columns import MemberColumns, Memberships, RecordingColumns
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
 
 if TYPE_CHECKING:  # slow to load, and not every source has maps
-    from scenicq.store.placement import MapIndex
+    from scenicq.store.map_index import MapIndex
 
 __all__ = ["recording_rows"]
 

@@ -18,16 +18,16 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.manifest import Counts, Part
 from scenicq.store.parquet import TableWriter, part_path
 from scenicq.store.rows import recording_rows
 from scenicq.store.schema import SEGMENT_TABLES
-from scenicq.store.whole_files import write_whole
 
 if TYPE_CHECKING:  # slow to load, and not every source has maps
     from scenicq.geometry.features import MapFeature
-    from scenicq.store.placement import MapIndex
+    from scenicq.store.map_index import MapIndex
 
 __all__ = [
     "SEGMENT_OBJECTS",
@@ -135,7 +135,7 @@ class MapIndexes:
     def of(self, name: str) -> MapIndex | None:
         """The index of a map; None if it has no elements."""
         if name not in self._made and self._maps.get(name):
-            from scenicq.store.placement import MapIndex  # noqa: PLC0415 - slow to load, and for maps
+            from scenicq.store.map_index import MapIndex  # noqa: PLC0415 - slow to load, and for maps
 
             self._made[name] = MapIndex(self._maps[name])
         return self._made.get(name)

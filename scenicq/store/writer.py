@@ -19,6 +19,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.frame_index import frame_hashes, index_rows, repeated_rows
 from scenicq.store.labels import Recording
@@ -27,7 +28,6 @@ from scenicq.store.parquet import TableWriter
 from scenicq.store.partial import Partial, check_target
 from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import SEGMENT_OBJECTS, MapIndexes, Segment, SegmentWriter, read_segments, take_over
-from scenicq.store.whole_files import write_whole
 
 if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature

@@ -24,13 +24,13 @@ from scenicq.forest.groups import Group
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.cells import triangles
 from scenicq.geometry.regions import Region
-from scenicq.match.asking import ask
-from scenicq.match.constraints import build_groups
-from scenicq.match.items import condition_group
-from scenicq.match.ladder import Yes
-from scenicq.match.observe import observe
+from scenicq.match.decide.cascade import Satisfied
+from scenicq.match.decide.solver_step import ask
 from scenicq.match.options import MatchOptions
-from scenicq.smt import inside
+from scenicq.match.problem.conditioned import condition_group
+from scenicq.match.problem.constraints import build_groups
+from scenicq.match.problem.observation import observe
+from scenicq.smt import region_membership
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 
@@ -105,7 +105,7 @@ def _permute(
             continue
         for group in groups:
             observed = {(i, name): value for i in group.objects for name, value in seen[cast[i]].items()}
-            if not isinstance(ask([condition_group(group, observed)], options, solver), Yes):
+            if not isinstance(ask([condition_group(group, observed)], options, solver), Satisfied):
                 if variant.remembers:
                     last = max((roles.index(i) for i in group.objects if i in roles), default=-1)
                     bad.add(chosen[: last + 1])
@@ -124,5 +124,5 @@ def _whole_map(label: Label) -> Iterator[None]:
     def in_sight(region: Region, _: object) -> list[np.ndarray]:
         return triangles(region, around)
 
-    with patch.object(inside, "convex_cells", in_sight):
+    with patch.object(region_membership, "convex_cells", in_sight):
         yield

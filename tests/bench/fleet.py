@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from shapely.affinity import translate
 from shapely.geometry import mapping
 
-from scenicq.compiler.standin import street
+from scenicq.compiler.default_street import street
 from scenicq.geometry.features import REFERENCES, MapFeature, names
 from scenicq.importers.base import Entry, Labels
 from scenicq.importers.report import Report
-from scenicq.importers.segments import Job, World, fingerprint, write_segments
+from scenicq.importers.segments import CompiledMap, Job, fingerprint, write_segments
 from scenicq.store.columns import MemberColumns, RecordingColumns
 from scenicq.store.manifest import Manifest
 from scenicq.store.segment import SEGMENT_OBJECTS, segments_of
@@ -52,7 +52,7 @@ KINDS: tuple[tuple[str, str, float, tuple[float, float, float]], ...] = (
 
 
 def fleet_map() -> tuple[MapFeature, ...]:
-    """The crossing of `scenicq.compiler.standin`, repeated in a grid."""
+    """The crossing of `scenicq.compiler.default_street`, repeated in a grid."""
     features = street().features
     return tuple(
         _moved(feature, f"{column}{row}-", column * PITCH_M, row * PITCH_M)
@@ -233,7 +233,7 @@ def write_store(fleet: Fleet, target: Path, jobs: int) -> Manifest:
             mark = fingerprint([repr(fleet)], [Entry(name, 0, "") for name in group], frozenset())
             waiting.append(Job(number, FleetReader(fleet, tuple(range(first, first + len(group)))), mark))
             first += len(group)
-        written = write_segments(World(writer.folder, maps), waiting, jobs, lambda recording, frames: None)
+        written = write_segments(CompiledMap(writer.folder, maps), waiting, jobs, lambda recording, frames: None)
         for job, segment in zip(waiting, written, strict=True):
             writer.adopt(job.number, segment)
         return writer.finish(name="fleet", importer="fleet")

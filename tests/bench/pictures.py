@@ -18,7 +18,7 @@ from pathlib import Path
 from scenicq.errors import Source
 from scenicq.importers.ingest import ingest
 from scenicq.match.matcher import Matcher
-from scenicq.query.run import Query, QueryOptions
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import Shot, draw
 from scenicq.report.write import write_report

@@ -37,7 +37,7 @@ from scenicq.forest.scenario import Scenario  # noqa: E402
 from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
-from scenicq.match.places import Places  # noqa: E402
+from scenicq.match.problem.map_lookups import MapLookups  # noqa: E402
 from scenicq.match.verdict import Match  # noqa: E402
 from scenicq.smt.answer import Answer, SolverSession, Unknown  # noqa: E402
 from scenicq.smt.formula import Problem  # noqa: E402
@@ -111,7 +111,7 @@ class Patient:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class HeadingAssignment:
     """A way to decide labels.
 
     Attributes:
@@ -147,7 +147,7 @@ def labels(scenario: Scenario, size: int) -> Iterator[tuple[Label, Label]]:
         yield Label("frame", "recording", 0, "street", shuffled.ego, tuple(ordered)), shuffled
 
 
-def measured(way: Way, given: list[Label], solver: Patient) -> tuple[float, bool]:
+def measured(way: HeadingAssignment, given: list[Label], solver: Patient) -> tuple[float, bool]:
     """Mean seconds a label, and whether one was cut off; no label is begun once the patience is used up."""
     solver.apart = way.apart
     started = cpu_s()
@@ -169,27 +169,29 @@ def measured(way: Way, given: list[Label], solver: Patient) -> tuple[float, bool
     return (cpu_s() - started) / len(given), False
 
 
-def ways(scenario: Scenario, solver: Patient) -> list[Way]:
+def ways(scenario: Scenario, solver: Patient) -> list[HeadingAssignment]:
     """All the ways to decide labels of a scenario."""
     given = {thing.name: f"object-{thing.index}" for thing in scenario.objects if thing.index != scenario.ego}
 
     def matcher(method: Method) -> Matcher:
         return Matcher(scenario, MatchOptions(method=method, timeout_s=solver.patience_s), solver)
 
-    def ours(method: Method) -> Way:
+    def ours(method: Method) -> HeadingAssignment:
         made = matcher(method)
-        return Way(f"{method}, shuffled", lambda label: isinstance(made.match(label), Match))
+        return HeadingAssignment(f"{method}, shuffled", lambda label: isinstance(made.match(label), Match))
 
-    def published(variant: Variant) -> Way:
+    def published(variant: Variant) -> HeadingAssignment:
         options = MatchOptions(timeout_s=solver.patience_s)
 
         def decide(label: Label) -> bool:
             return matches(scenario, label, variant, solver, options, solver.tick)
 
-        return Way(variant.name, decide, apart=solver.apart_from[variant.whole] if variant.process else None)
+        return HeadingAssignment(
+            variant.name, decide, apart=solver.apart_from[variant.whole] if variant.process else None
+        )
 
     auto = matcher("auto")
-    places = Places()
+    places = MapLookups()
 
     def look_up(labels: list[Label]) -> None:
         # as a query does it: places on the map are looked up for many labels together
@@ -200,8 +202,8 @@ def ways(scenario: Scenario, solver: Patient) -> list[Way]:
         return lambda label: isinstance(auto.match(label, given=known, places=places), Match)
 
     own = [
-        Way(KNOWN, by_auto(given), known=True, rounds=ROUNDS, prepare=look_up),
-        Way(SHUFFLED, by_auto({}), rounds=ROUNDS, prepare=look_up),
+        HeadingAssignment(KNOWN, by_auto(given), known=True, rounds=ROUNDS, prepare=look_up),
+        HeadingAssignment(SHUFFLED, by_auto({}), rounds=ROUNDS, prepare=look_up),
     ]
     return own if solver.alone else [*own, ours("smt"), ours("monolithic"), *map(published, VARIANTS)]
 

@@ -27,9 +27,9 @@ from clock import Used, run
 from fleet import NEEDLE, Fleet, write_store
 
 from scenicq.match.options import MatchOptions, parse_tolerance
-from scenicq.query.plan import LABELS, MEMBERSHIPS, OBJECTS
-from scenicq.query.prefilter import sift
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.prefilter.executor import run_prefilter
+from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS
 from scenicq.store.dataset import Dataset, open_dataset
 
 ROOT = Path(__file__).parents[2]
@@ -89,7 +89,7 @@ def prefilter(dataset: Dataset, scenario: Path, options: MatchOptions) -> tuple[
             columns = dict(scanned(plan.sql))
             for block in query.blocks(plan.map):
                 started = time.process_time()
-                sift(dataset, connection, plan, block)
+                run_prefilter(dataset, connection, plan, block)
                 sifted_s += time.process_time() - started
                 started = time.process_time()
                 for view, names in columns.items():

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from scenicq.match.options import MatchOptions
-from scenicq.query.restore import restore
-from scenicq.query.results import record
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.record_reader import read_record
+from scenicq.query.execution.results import record
+from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.store.dataset import open_dataset
 
 TOLERANCE = ("--tolerance", "x=0.25,y=0.25,heading=5deg", "--classes", "coarse")
@@ -129,7 +129,7 @@ def test_records_come_back_as_they_were(run, scenarios, crossroads):
     ):
         records = [record(result) for result in Query(open_dataset(crossroads), source, options).results()]
         assert records
-        assert [record(restore(json.loads(json.dumps(each)), source)) for each in records] == records
+        assert [record(read_record(json.loads(json.dumps(each)), source)) for each in records] == records
 
 
 def test_an_engine_that_is_unknown_is_a_usage_error(run, program, crossroads, tmp_path):

@@ -6,8 +6,8 @@ import math
 import random
 from functools import cache
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.improvise import Scene, draw_scene
 from scenicq.forest.scenario import Scenario

@@ -12,15 +12,15 @@ import shapely
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
+from scenicq.exporters.sample import sample_labels
 from scenicq.forest.nodes import DirectionAt
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.forest.simplify import roots_of
 from scenicq.forest.walk import postorder
 from scenicq.geometry.elements import NetworkElement
 from scenicq.match.matcher import Matcher
-from scenicq.match.ready import ready
+from scenicq.match.problem.preprocess import ready
 from scenicq.match.verdict import Match
-from scenicq.query.sample import sample_labels
 from scenicq.store.labels import Label, LabelObject
 
 from .scenes import network

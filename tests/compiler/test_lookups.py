@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import shapely
 
+from scenicq.compiler.element_lookups import LOOKUPS, Lookups
 from scenicq.compiler.occupancy import Ranked
-from scenicq.compiler.places import LOOKUPS, Lookups
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.improvise import draw_scene

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import Source
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import DirectionAt, Node, Range

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.exporters.sample import sample_labels
 from scenicq.forest.scenario import Scenario
-from scenicq.query.sample import sample_labels
 from scenicq.store.labels import Label
 
 Sample = NDArray[np.float64]

@@ -49,7 +49,7 @@ class Spot:
     on_field: str | None = None
 
 
-class Places(Terms):
+class MapLookups(Terms):
     """Writes regions and specifiers."""
 
     # --- regions

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import random
 
-from random_places import Places, Spot
+from random_places import MapLookups, Spot
 from random_terms import ANY, Thing
 from wrong_lines import WRONG, WRONG_ON_ROADS
 
@@ -23,7 +23,7 @@ def compose(seed: str) -> str:
     return _Program(rng, driving=rng.random() < 0.4).write()
 
 
-class _Program(Places):
+class _Program(MapLookups):
     made: int = 0
     mutated: bool = False
 

@@ -12,8 +12,8 @@ from comparing import compiled, label_of
 
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions, Tolerance
-from scenicq.query.plan import make_plan
-from scenicq.query.prefilter import blocks, candidates, extents, sift
+from scenicq.query.prefilter.executor import blocks, candidates, extents, run_prefilter
+from scenicq.query.prefilter.plan import make_plan
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Recording
 from scenicq.store.writer import write_dataset
@@ -93,7 +93,7 @@ def _sifted(dataset: Dataset, name: str, drawing: Drawing) -> Sifted:
     frames = 0
     with closing(dataset.connect()) as connection:
         for block in blocks(extents(dataset, connection), plan.map):
-            frames += len(sift(dataset, connection, plan, block))
+            frames += len(run_prefilter(dataset, connection, plan, block))
             kept += [each.label.frame for each in candidates(connection, plan)]
     own = {f"{name}-{number}" for number in range(len(drawing.scenes))}
     return Sifted(tuple(sorted(own.difference(kept))), len(kept), frames)

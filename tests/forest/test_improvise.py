@@ -10,13 +10,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import Source
-from scenicq.forest.assemble import assemble
 from scenicq.forest.draws import draw_leaf
 from scenicq.forest.evaluate import evaluate_all
 from scenicq.forest.improvise import Improviser
+from scenicq.forest.inline import assemble
 from scenicq.forest.nodes import Constant, Identity, Leaf, TruncatedNormal, Undefined, Value
 from scenicq.forest.scenario import BuiltIn, Scenario
 

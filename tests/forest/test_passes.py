@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).parent))
 from expressions import expressions, near
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import Source
 from scenicq.forest import build
 from scenicq.forest.bounds import divide, point_boxes, vector_bounds
@@ -42,7 +42,7 @@ from scenicq.forest.show import show
 from scenicq.forest.simplify import simplify
 from scenicq.forest.walk import features, leaves, postorder, transform
 from scenicq.geometry.regions import PolygonSet
-from scenicq.match.affine import affine_vector
+from scenicq.match.decide.affine_forms import affine_vector
 
 STREET = street()
 

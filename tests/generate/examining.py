@@ -11,11 +11,11 @@ from examples import Example
 from outside import TooManyError, outside
 
 from scenicq.errors import ScenarioError
+from scenicq.exporters.sample import sample_labels
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.query.sample import sample_labels
 from scenicq.smt.solver import Solver
 from scenicq.store.labels import Label, LabelObject
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.features import read_geojson

@@ -11,10 +11,10 @@ import pytest
 from shapely.geometry import Point
 
 from scenicq.geometry.angles import distance
-from scenicq.geometry.meeting import meets, witness_point
 from scenicq.geometry.membership import bounds, contains, contains_many
 from scenicq.geometry.membership import distance as distance_to
 from scenicq.geometry.network import Network, read_geojson
+from scenicq.geometry.proximity import meets, witness_point
 from scenicq.geometry.regions import Sector, intersection
 from scenicq.geometry.sampling import sample
 

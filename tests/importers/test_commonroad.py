@@ -19,7 +19,7 @@ from scenicq.importers.report import Report
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.query.run import Query, QueryOptions
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label
 

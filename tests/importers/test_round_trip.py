@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from scenicq.exporters.interchange import write_interchange
 from scenicq.importers.ingest import ingest
-from scenicq.query.export_interchange import write_interchange
 from scenicq.store.dataset import open_dataset
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"

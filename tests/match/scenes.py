@@ -5,8 +5,8 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import Source
 from scenicq.forest.improvise import Scene, draw_scene
 from scenicq.forest.scenario import Scenario

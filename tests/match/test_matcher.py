@@ -13,16 +13,17 @@ from scenes import compiled, drawn, label_of
 
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
-from scenicq.match import decisions, planning, program
-from scenicq.match.casting import cast_roles
-from scenicq.match.ladder import Maybe
+from scenicq.match.decide import linear_program
+from scenicq.match.decide.cascade import Undecided
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions, Tolerance
-from scenicq.match.planning import relevant_properties
-from scenicq.match.thinning import thinned
+from scenicq.match.problem.candidates import find_candidates
+from scenicq.match.search import group_cache, group_plan
+from scenicq.match.search.arc_consistency import thinned
+from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.answer import Sat, Unsat
-from scenicq.smt.answer import Unknown as Undecided
+from scenicq.smt.answer import Unknown as NoAnswer
 from scenicq.smt.pool import WorkerSolver
 from scenicq.store.labels import Label, LabelObject
 
@@ -186,7 +187,7 @@ def test_a_requirement_that_is_only_probable_excludes_nothing():
 @pytest.mark.parametrize("method", ["auto", "smt", "monolithic"])
 @pytest.mark.parametrize("reason", ["timeout", "crash", "memory", "garbage"])
 def test_what_the_solver_does_not_decide_is_unknown_with_its_reason(method, reason):
-    solver = Fixed(Undecided(reason))
+    solver = Fixed(NoAnswer(reason))
     found = verdict(NONLINEAR, frame(THERE), solver, method=method)
     assert isinstance(found, Unknown)
     assert found.reason == reason
@@ -218,16 +219,18 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
     label = frame(car("a", 2.0, 57.0), car("b", 1.5, 58.0))
 
     def decide(items, tolerance):
-        return Maybe(items[0][0], "nonlinear") if (2.0, 57.0) in [item[2] for item in items] else real(items, tolerance)
-
-    real = decisions.decide_apart
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(planning, "quick_of", lambda _: None)
-        patch.setattr(decisions, "decide_apart", decide)
-        assert (
-            Matcher(scenario, MatchOptions(), Fixed(Undecided("timeout"))).match(label).correspondence["other"] == "b"
+        return (
+            Undecided(items[0][0], "nonlinear")
+            if (2.0, 57.0) in [item[2] for item in items]
+            else real(items, tolerance)
         )
-        lone = Matcher(scenario, MatchOptions(), Fixed(Undecided("timeout"))).match(frame(label.objects[0]))
+
+    real = group_cache.decide_decomposed
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(group_plan, "closed_form_of", lambda _: None)
+        patch.setattr(group_cache, "decide_decomposed", decide)
+        assert Matcher(scenario, MatchOptions(), Fixed(NoAnswer("timeout"))).match(label).correspondence["other"] == "b"
+        lone = Matcher(scenario, MatchOptions(), Fixed(NoAnswer("timeout"))).match(frame(label.objects[0]))
         assert isinstance(lone, Unknown)
         assert lone.correspondence == {"ego": "ego", "other": "a"}
         assert lone.cause.what == "other.position"
@@ -239,7 +242,7 @@ def test_what_geometry_cannot_tell_is_unknown(monkeypatch):
     def fails(*_):
         raise CannotEvaluate("whether moons meet")
 
-    monkeypatch.setattr(decisions, "condition_group", fails)
+    monkeypatch.setattr(group_cache, "condition_group", fails)
     for method in ("auto", "smt", "monolithic"):
         found = verdict(NONLINEAR, frame(THERE), Fixed(Unsat()), method=method)
         assert isinstance(found, Unknown)
@@ -248,9 +251,9 @@ def test_what_geometry_cannot_tell_is_unknown(monkeypatch):
 
 def test_a_linear_program_without_an_answer_is_no_proof(monkeypatch):
     def fails(*_):
-        raise program.NotSolved
+        raise linear_program.NotSolved
 
-    monkeypatch.setattr(program, "_solve", fails)
+    monkeypatch.setattr(linear_program, "_solve", fails)
     scenario = compiled(HEADER + PROGRAMS["shared"])
     label = label_of(scenario, drawn(scenario, 1), random.Random(1))
     assert isinstance(Matcher(scenario).match(label), Unknown)
@@ -306,7 +309,7 @@ def test_thinning_never_removes_a_right_candidate(name):
     removed = 0
     for seed in range(8):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=4)
-        cast = cast_roles(scenario, label, 0, matcher.options, {})
+        cast = find_candidates(scenario, label, 0, matcher.options, {})
         ((signature, candidates),) = cast.signatures(relevant_properties(scenario, matcher.options))
         wanted = {index: numbers for index, numbers in candidates.items() if index != scenario.ego}
         left, failed = thinned(matcher.plan(signature), wanted, cast, scenario.ego, Tolerance())

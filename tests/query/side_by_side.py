@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from scenicq.errors import ScenicqError
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown
-from scenicq.query.deciding import World, every_label
-from scenicq.query.prefilter import Block, Candidate, blocks, candidates, extents, sift
-from scenicq.query.results import Result, record
-from scenicq.query.run import Query
+from scenicq.query.execution.block_matcher import CompiledMap, every_label
+from scenicq.query.execution.results import Result, record
+from scenicq.query.execution.run import Query
+from scenicq.query.prefilter.executor import Block, Candidate, blocks, candidates, extents, run_prefilter
 from scenicq.smt import portable
 from scenicq.smt.answer import Answer
+from scenicq.smt.answer_cache import RememberingSolver
 from scenicq.smt.formula import Problem
-from scenicq.smt.remembering import RememberingSolver
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 
@@ -131,7 +131,7 @@ class SideBySide:
     def _compare(self, name: str, narrowed: Query, whole: Query) -> None:
         for map_name in self.dataset.maps:
             worlds = [_world(query, map_name) for query in (narrowed, whole)]
-            if not all(isinstance(world, World) for world in worlds):
+            if not all(isinstance(world, CompiledMap) for world in worlds):
                 self.found.refused += 1
                 if worlds[0] != worlds[1]:
                     self.found.disagreements.append(f"{name}: {worlds[0]} is not {worlds[1]}")
@@ -147,12 +147,12 @@ class SideBySide:
             self._labels[block] = list(every_label(self.dataset, block))
         return self._labels[block]
 
-    def _prefiltered(self, world: World, block: Block) -> tuple[NDArray[np.int16], dict[str, Candidate]]:
+    def _prefiltered(self, world: CompiledMap, block: Block) -> tuple[NDArray[np.int16], dict[str, Candidate]]:
         """The step that excludes each frame, -1 for none; and what is left, by frame."""
         if not world.plan.stages:
             labels = self._of(block)
             return np.full(len(labels), -1, np.int16), {label.frame: Candidate(label, None) for label in labels}
-        missed = sift(self.dataset, self._connection, world.plan, block)
+        missed = run_prefilter(self.dataset, self._connection, world.plan, block)
         left = candidates(self._connection, world.plan) if (missed < 0).any() else ()
         return missed, {each.label.frame: each for each in left}
 
@@ -194,7 +194,7 @@ class SideBySide:
             self.found.disagreements.append(f"{name}, {frame}: {told} is not {record(without)}")
 
 
-def _world(query: Query, map_name: str) -> World | str:
+def _world(query: Query, map_name: str) -> CompiledMap | str:
     try:
         return query.world(map_name)
     except ScenicqError as error:

@@ -12,7 +12,7 @@ import pytest
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions, parse_tolerance
 from scenicq.match.verdict import Match, Unknown
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.store.dataset import Dataset, open_dataset
 
 ROOT = Path(__file__).parents[2]

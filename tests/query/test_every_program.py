@@ -15,8 +15,8 @@ import pytest
 from scenicq.errors import ScenicqError, Source
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions, Tolerance
-from scenicq.query.results import record
-from scenicq.query.run import Query, QueryOptions
+from scenicq.query.execution.results import record
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 
 sys.path.insert(0, str(Path(__file__).parent))

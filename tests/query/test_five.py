@@ -11,8 +11,8 @@ from scenicq.importers.ingest import ingest
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.query.explain import explain, show_explanation
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.store.dataset import Dataset, open_dataset
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"

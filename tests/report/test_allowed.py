@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import shapely
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.standin import street
 from scenicq.errors import Source
+from scenicq.exporters.sample import sample_labels
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match
-from scenicq.query.sample import sample_labels
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import Shot, draw
 

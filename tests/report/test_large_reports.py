@@ -9,8 +9,8 @@ import pytest
 
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions, parse_tolerance
-from scenicq.query.near import near_results
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.report.write import write_report
 from scenicq.store.dataset import open_dataset
 
@@ -54,7 +54,7 @@ def boston(tmp_path_factory):
     program = read_program(ROOT / "sample_data" / "scenarios" / "01_pedestrian_facing_ego.scenic")
     query = Query(open_dataset(folder / "dataset"), program, QueryOptions(match=match))
     results = list(query.results())
-    return write_report(query, results, folder / "pages", near=near_results(query, 3), command=COMMAND), len(results)
+    return write_report(query, results, folder / "pages", near=nearest_misses(query, 3), command=COMMAND), len(results)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from scenicq.match.options import MatchOptions, parse_tolerance
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.report import write
 from scenicq.report.write import write_report
 from scenicq.store.dataset import open_dataset

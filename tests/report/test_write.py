@@ -14,9 +14,9 @@ from scenicq.errors import DataError, ScenicqError
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions, parse_tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
-from scenicq.query.near import near_results
-from scenicq.query.results import Result
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.results import Result
+from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.report import write
 from scenicq.report.runs import find_runs, frame_numbers
 from scenicq.report.shares import program_lines
@@ -153,7 +153,7 @@ def test_what_is_left_out_is_told(query, tmp_path, monkeypatch):
 
 def test_near_misses_say_what_they_lack(query, tmp_path):
     found, results = query
-    near = near_results(found, 1)
+    near = nearest_misses(found, 1)
     text = write_report(found, results, tmp_path / "r", near=near).read_text(encoding="utf-8")
     assert "near miss" in text
     assert 'id="kind"' in text

@@ -24,12 +24,12 @@ from scenicq.geometry.regions import (
     UnionOf,
 )
 from scenicq.smt.answer import Sat, Unsat
+from scenicq.smt.distance_terms import Frame
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.evaluation import evaluate
 from scenicq.smt.formula import Num, Problem, Var, Variable, negation
-from scenicq.smt.inside import UnsupportedError
-from scenicq.smt.measure import Frame
 from scenicq.smt.portable import check
+from scenicq.smt.region_membership import UnsupportedError
 
 ELL = Polygon([(0, 0), (12, 0), (12, 5), (5, 5), (5, 12), (0, 12)])
 YARD = Polygon([(-9, -9), (9, -9), (9, 9), (-9, 9)], [[(-1, -1), (-1, 1), (1, 1), (1, -1)]])

@@ -13,9 +13,9 @@ from scenicq.smt.affine import EMPTY, ENTAILED, affine_atoms, contract_affine
 from scenicq.smt.backward import BACKWARD, root
 from scenicq.smt.evaluation import evaluate
 from scenicq.smt.formula import Atom, Num, Op, Operator, Term, Var, apply, compare
+from scenicq.smt.hc4 import Tape
 from scenicq.smt.interval import FORWARD, EmptyError, Interval, power
 from scenicq.smt.operators import operate
-from scenicq.smt.tape import Tape
 
 BINARY = {Operator.ADD, Operator.SUB, Operator.MUL, Operator.DIV, Operator.MIN, Operator.MAX, Operator.ATAN2}
 SPECIAL = (0.0, 1.0, -1.0, math.pi, -math.pi, math.pi / 2, 2.0, -2.0)

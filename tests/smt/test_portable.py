@@ -25,8 +25,8 @@ from scenicq.smt.formula import (
     conjunction,
     disjunction,
 )
-from scenicq.smt.isolate import recipes
 from scenicq.smt.portable import check
+from scenicq.smt.variable_isolation import recipes
 
 Fn = Operator
 X, Y = Var("x"), Var("y")

@@ -15,7 +15,7 @@ from shapely.geometry import LineString, box
 
 from scenicq.errors import DataError, Source
 from scenicq.geometry.features import MapFeature
-from scenicq.query.run import Query
+from scenicq.query.execution.run import Query
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.manifest import MANIFEST, Counts

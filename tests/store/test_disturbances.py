@@ -27,7 +27,7 @@ READER = """
 import json, sys, time
 from pathlib import Path
 from scenicq.match.options import MatchOptions, parse_tolerance
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.store.dataset import open_dataset
 
 dataset, program, stop = sys.argv[1:]

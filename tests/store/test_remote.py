@@ -14,8 +14,8 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.match.options import MatchOptions, parse_tolerance
-from scenicq.query.results import record
-from scenicq.query.run import Query, QueryOptions, read_program
+from scenicq.query.execution.results import record
+from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.store import remote
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording

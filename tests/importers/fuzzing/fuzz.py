@@ -32,9 +32,9 @@ from source_mutations import mutate_source
 
 from scenicq import read_program
 from scenicq.errors import DataError, ScenicqError
+from scenicq.exporters.export import Exporter
 from scenicq.importers.ingest import ingest
-from scenicq.query.export import Exporter
-from scenicq.query.run import Query
+from scenicq.query.execution.run import Query
 from scenicq.store.dataset import open_dataset
 
 REPOSITORY = Path(__file__).resolve().parents[3]

@@ -1,0 +1,1 @@
+"""Matches handed on to other tools."""

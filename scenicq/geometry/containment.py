@@ -1,0 +1,93 @@
+"""Whether a region holds all of a box, and whether two regions share a point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeAlias
+
+from shapely.geometry import Polygon
+
+from scenicq.geometry import shapes
+from scenicq.geometry.membership import bounds
+from scenicq.geometry.proximity import meets
+from scenicq.geometry.regions import (
+    Disc,
+    Everywhere,
+    IntersectionOf,
+    PolygonSet,
+    Rectangle,
+    Region,
+    UnionOf,
+    difference,
+    intersection,
+)
+from scenicq.geometry.terms import overlap, rectangle_shape
+
+__all__ = ["covers", "overlaps"]
+
+Answer: TypeAlias = bool | None
+"""None where it cannot be told: a region removes too many separate discs, or has no end."""
+
+_SLIVER = 1e-9
+"""Share of a box's area that polygons side by side may leave open between them."""
+_EDGE_M = 1e-6
+"""How far the edge of a box may stick out of other regions."""
+_FAR_M = 1e6
+"""Where regions without bounds are looked at for a common point."""
+
+
+def covers(outer: Region, box: Polygon) -> Answer:
+    """Whether a region holds all of a convex polygon, up to slivers: what has no area is not missed.
+
+    Args:
+        outer: Any region.
+        box: The polygon.
+    """
+    match outer:
+        case Everywhere():
+            return True
+        case PolygonSet():
+            return _together(outer.near(shapes.bounds_of(box)), box)
+        case Disc():
+            return all(math.dist(outer.center, corner) <= outer.radius for corner in box.exterior.coords)
+        case Rectangle():
+            return _together([rectangle_shape(outer)], box)
+        case IntersectionOf():
+            answers = [covers(part, box) for part in outer.parts]
+            return False if False in answers else None if None in answers else True
+        case UnionOf() if all(isinstance(part, PolygonSet) for part in outer.parts):
+            sets = (part for part in outer.parts if isinstance(part, PolygonSet))
+            return _together([piece for part in sets for piece in part.near(shapes.bounds_of(box))], box)
+        case _:
+            inner = box.buffer(-_EDGE_M)
+            outside = meets(difference(Everywhere(), outer), box if inner.is_empty else inner)
+            return None if outside is None else not outside
+
+
+def _together(pieces: Sequence[shapes.Shape], box: Polygon) -> bool:
+    return shapes.difference(box, shapes.union_all(pieces)).area <= _SLIVER * box.area
+
+
+def overlaps(left: Region, right: Region) -> Answer:
+    """Whether two regions share a point; touching is enough."""
+    for one, other in ((left, right), (right, left)):
+        match one:
+            case Rectangle():
+                answers = [meets(other, rectangle_shape(one))]
+            case Disc():
+                answers = [meets(other, shapes.point(*one.center), one.radius)]
+            case PolygonSet():
+                answers = [meets(other, polygon) for polygon in one.polygons]
+            case _:
+                continue
+        answer = True if True in answers else None if None in answers else False
+        if answer is not None:
+            return answer
+    west, south, east, north = overlap(bounds(left), bounds(right))
+    if west > east + _EDGE_M or south > north + _EDGE_M:
+        return False
+    both = intersection(left, right)
+    if not math.isfinite(east - west + north - south):
+        return meets(both, shapes.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)) or None
+    return meets(both, shapes.box(west - 1.0, south - 1.0, east + 1.0, north + 1.0))

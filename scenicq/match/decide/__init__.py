@@ -1,0 +1,1 @@
+"""Is one group of constraints satisfiable? The steps of the cascade."""

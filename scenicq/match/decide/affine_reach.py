@@ -1,0 +1,269 @@
+"""Single affine features: inverted in closed form, the cheap second step of the decision ladder.
+
+A feature whose random variables occur nowhere else is reachable exactly if the label's value, grown by its tolerance,
+meets the set of values that its expression takes: an interval for a number, an arc for a heading, a polygon or a region
+for a position.
+"""
+
+# pyright: reportUnknownMemberType=false
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import shapely
+
+from scenicq.forest.nodes import Constant, Identity, Leaf, Normal, PointIn, Range, TruncatedNormal, Value
+from scenicq.geometry.proximity import meets, witness_point
+from scenicq.geometry.regions import Region
+from scenicq.match.decide.affine_forms import Affine, AffineVector, Variable
+from scenicq.match.decide.evaluation import ROUNDING
+from scenicq.match.options import Tolerance
+
+__all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position", "tolerance_shape"]
+
+_MOST_CORNERS = 6
+"""Random offsets of one position whose box is taken corner by corner."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """Whether a value is reached.
+
+    Attributes:
+        possible: Yes, no, or not decided here.
+        values: Of the random variables, if yes.
+    """
+
+    possible: bool | None
+    values: Mapping[Identity, Value]
+
+
+_NO = Reach(False, {})
+_OPEN = Reach(None, {})
+
+
+def ends(leaf: Leaf) -> tuple[float, float] | None:
+    """The interval that a scalar random variable ranges over; None if its ends are random themselves."""
+    match leaf:
+        case Range():
+            parameters = (leaf.low, leaf.high)
+        case TruncatedNormal():
+            parameters = (leaf.low, leaf.high)
+        case Normal():
+            return (-math.inf, math.inf)
+        case _:
+            return None
+    values = [cast(float, part.value) for part in parameters if isinstance(part, Constant)]
+    if len(values) != 2 or not all(isinstance(value, float) for value in values):
+        return None
+    return (min(values), max(values)) if isinstance(leaf, Range) else (values[0], values[1])
+
+
+def _center(leaf: Leaf) -> float:
+    if isinstance(leaf, Normal) and isinstance(leaf.mean, Constant):
+        return cast(float, leaf.mean.value)
+    return 0.0
+
+
+def _between(form: Affine, leaves: Mapping[Identity, Leaf]) -> tuple[float, float] | None:
+    low = high = form.constant
+    for (identity, _), coefficient in form.terms.items():
+        limits = ends(leaves[identity])
+        if limits is None or limits[0] > limits[1]:
+            return None
+        products = sorted((coefficient * limits[0], coefficient * limits[1]))
+        low, high = low + products[0], high + products[1]
+    return low, high
+
+
+def _reaching(form: Affine, leaves: Mapping[Identity, Leaf], value: float) -> dict[Identity, Value]:
+    """Values of the variables for which the form takes a value between its bounds."""
+    unbounded = [(v, c) for v, c in form.terms.items() if isinstance(leaves[v[0]], Normal)]
+    if unbounded:
+        fixed: dict[Identity, Value] = {}
+        total = form.constant
+        (first, coefficient), *_ = unbounded
+        for (identity, axis), factor in form.terms.items():
+            if (identity, axis) != first:
+                limits = cast("tuple[float, float]", ends(leaves[identity]))
+                chosen = _center(leaves[identity]) if math.isinf(limits[0]) else (limits[0] + limits[1]) / 2
+                fixed[identity] = chosen
+                total += factor * chosen
+        return fixed | {first[0]: (value - total) / coefficient}
+    low, high = cast("tuple[float, float]", _between(form, leaves))
+    share = 0.5 if high == low else min(1.0, max(0.0, (value - low) / (high - low)))
+    found: dict[Identity, Value] = {}
+    for (identity, _), coefficient in form.terms.items():
+        a, b = cast("tuple[float, float]", ends(leaves[identity]))
+        found[identity] = a + share * (b - a) if coefficient > 0 else b - share * (b - a)
+    return found
+
+
+def reach_number(form: Affine, leaves: Mapping[Identity, Leaf], observed: float, tolerance: float) -> Reach:
+    """Whether a number within a tolerance of the observed one is reached."""
+    limits = _between(form, leaves)
+    if limits is None:
+        return _OPEN
+    low, high = limits
+    value = min(max(observed, low), high)
+    if abs(value - observed) > tolerance + ROUNDING:
+        return _NO
+    return Reach(True, _reaching(form, leaves, value))
+
+
+def reach_heading(form: Affine, leaves: Mapping[Identity, Leaf], observed: float, tolerance: float) -> Reach:
+    """The same for a heading, modulo 2 pi."""
+    limits = _between(form, leaves)
+    if limits is None:
+        return _OPEN
+    low, high = limits
+    if math.isinf(low) or math.isinf(high):
+        return reach_number(form, leaves, observed, tolerance)
+    first = math.floor((low - observed - tolerance) / math.tau)
+    last = math.ceil((high - observed + tolerance) / math.tau)
+    for turns in sorted(range(first, last + 1), key=lambda k: abs((low + high) / 2 - observed - math.tau * k)):
+        found = reach_number(form, leaves, observed + math.tau * turns, tolerance)
+        if found.possible:
+            return found
+    return _NO
+
+
+def tolerance_shape(observed: tuple[float, float], tolerance: Tolerance) -> tuple[shapely.Geometry, float]:
+    """The label's position grown by its tolerance: a shape and a radius around it."""
+    x, y = observed
+    if tolerance.x is None or tolerance.y is None:
+        return shapely.Point(x, y), tolerance.position
+    if tolerance.x == 0 or tolerance.y == 0:
+        ends_ = (x - tolerance.x, y - tolerance.y), (x + tolerance.x, y + tolerance.y)
+        return (shapely.Point(x, y) if ends_[0] == ends_[1] else shapely.LineString(ends_)), 0.0
+    return shapely.box(x - tolerance.x, y - tolerance.y, x + tolerance.x, y + tolerance.y), 0.0
+
+
+def reach_position(
+    form: AffineVector, leaves: Mapping[Identity, Leaf], observed: tuple[float, float], tolerance: Tolerance
+) -> Reach:
+    """Whether a position within tolerance of the observed one is reached."""
+    variables = dict.fromkeys((*form[0].terms, *form[1].terms))
+    points = {identity for identity, _ in variables if isinstance(leaves[identity], PointIn)}
+    scalars = [variable for variable in variables if variable[0] not in points]
+    limits = [ends(leaves[identity]) for identity, _ in scalars]
+    if not points:
+        limits = _cut(form, scalars, limits, observed, tolerance)
+    bounded = [pair for pair in limits if pair is not None and all(map(math.isfinite, pair)) and pair[0] <= pair[1]]
+    if len(points) > 1 or len(bounded) != len(limits) or len(bounded) > _MOST_CORNERS:
+        return _OPEN
+    corners = list(itertools.product(*bounded))
+    if points:
+        (point,) = points
+        return _from_region(form, cast(PointIn, leaves[point]), scalars, corners, observed, tolerance)
+    places = np.array([_offset(form, scalars, corner) for corner in corners])
+    shape, radius = tolerance_shape(observed, tolerance)
+    hull = shapely.MultiPoint(places).convex_hull
+    if shapely.distance(hull, shape) > radius + ROUNDING:
+        return _NO
+    target = shapely.shortest_line(hull, shape).coords[0]
+    return Reach(True, _solve(form, scalars, bounded, target))
+
+
+def _cut(
+    form: AffineVector,
+    scalars: list[Variable],
+    limits: list[tuple[float, float] | None],
+    observed: tuple[float, float],
+    tolerance: Tolerance,
+) -> list[tuple[float, float] | None]:
+    """The limits, a single infinite one cut to where it can lead to the observed position."""
+    free = [number for number, pair in enumerate(limits) if pair is not None and not all(map(math.isfinite, pair))]
+    if len(free) != 1 or None in limits:
+        return limits
+    reach = math.hypot(form[0].constant - observed[0], form[1].constant - observed[1]) + tolerance.reach + 1.0
+    steps = [math.hypot(*(part.terms.get(variable, 0.0) for part in form)) for variable in scalars]
+    for number, pair in enumerate(limits):
+        if number not in free and pair is not None:
+            reach += steps[number] * max(map(abs, pair))
+    size = reach / steps[free[0]]
+    low, high = cast("tuple[float, float]", limits[free[0]])
+    return [*limits[: free[0]], (max(low, -size), min(high, size)), *limits[free[0] + 1 :]]
+
+
+def _offset(form: AffineVector, variables: list[Variable], values: tuple[float, ...]) -> tuple[float, float]:
+    given = dict(zip(variables, values, strict=True))
+    x, y = (part.constant + sum(part.terms.get(v, 0.0) * value for v, value in given.items()) for part in form)
+    return x, y
+
+
+def _from_region(
+    form: AffineVector,
+    leaf: PointIn,
+    scalars: list[Variable],
+    corners: list[tuple[float, ...]],
+    observed: tuple[float, float],
+    tolerance: Tolerance,
+) -> Reach:
+    """A point of a region, moved by a similarity and random offsets: bring the label back into the region's frame."""
+    if not isinstance(leaf.region, Constant):
+        return _OPEN
+    x, y = (leaf.identity, 0), (leaf.identity, 1)
+    matrix = np.array([[part.terms.get(v, 0.0) for v in (x, y)] for part in form])
+    size = math.sqrt(abs(float(np.linalg.det(matrix))))
+    if size == 0 or not np.allclose(matrix @ matrix.T, size * size * np.eye(2), rtol=1e-12, atol=1e-12):
+        return _OPEN
+    shape, radius = tolerance_shape(observed, tolerance)
+    around = np.array(shapely.get_coordinates(shape))
+    back = np.linalg.inv(matrix)
+    offsets = np.array([_offset(form, scalars, corner) for corner in corners])
+    places = ((around[:, None, :] - offsets[None, :, :]).reshape(-1, 2)) @ back.T
+    exact = len(places) == 1 and np.allclose(matrix, np.eye(2)) and not scalars
+    wanted = shapely.Point(places[0]) if exact else shapely.MultiPoint(places).convex_hull
+    region = cast(Region, leaf.region.value)
+    answer = meets(region, wanted, radius / size)
+    if not answer:
+        return Reach(answer, {})
+    point = witness_point(region, wanted, radius / size)
+    if point is None:
+        return _OPEN
+    if not scalars:
+        return Reach(True, {leaf.identity: point})
+    moved = matrix @ np.array(point)
+    reached = [(float(px + moved[0]), float(py + moved[1])) for px, py in offsets]
+    hull = shapely.MultiPoint(reached).convex_hull
+    target = shapely.shortest_line(hull, shape).coords[0]
+    limits = [(min(c[i] for c in corners), max(c[i] for c in corners)) for i in range(len(scalars))]
+    values = _solve(form, scalars, limits, target, (leaf.identity, point))
+    return Reach(True, values)
+
+
+def _solve(
+    form: AffineVector,
+    scalars: list[Variable],
+    limits: list[tuple[float, float]],
+    target: tuple[float, ...],
+    point: tuple[Identity, tuple[float, float]] | None = None,
+) -> dict[Identity, Value]:
+    """Values of the offsets that lead to a target inside the hull of the places of their corners."""
+    fixed: dict[Identity, Value] = {} if point is None else {point[0]: point[1]}
+    base = np.array([part.constant for part in form])
+    if point is not None:
+        for axis in (0, 1):
+            base += np.array([part.terms.get((point[0], axis), 0.0) for part in form]) * point[1][axis]
+    columns = np.array([[part.terms.get(v, 0.0) for v in scalars] for part in form])
+    low, high = (np.array([pair[i] for pair in limits]) for i in (0, 1))
+    values = (low + high) / 2
+    wanted = np.array(target[:2]) - base
+    # Bounded least squares by coordinate descent: few variables, and the target is reachable.
+    for _ in range(200):
+        for i in range(len(scalars)):
+            column = columns[:, i]
+            weight = float(column @ column)
+            if weight:
+                rest = wanted - columns @ values + column * values[i]
+                values[i] = min(max(float(column @ rest) / weight, low[i]), high[i])
+        if np.allclose(columns @ values, wanted, atol=1e-10):
+            break
+    return fixed | {identity: float(value) for (identity, _), value in zip(scalars, values, strict=True)}

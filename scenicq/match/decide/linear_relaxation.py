@@ -1,0 +1,380 @@
+"""Groups that are affine: linear programs, one per combination of map cells and whole turns.
+
+A random point in a region becomes one alternative per convex cell near where the point can be; on a curb one per
+segment, in a list of points one per point. Discs are taken between two polygons: what the outer one excludes is out,
+what the inner one allows is in, and the rest is left to a solver.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import cast
+
+import numpy as np
+import shapely
+
+from scenicq.forest.bounds import Box, leaf_boxes, scalar_bounds
+from scenicq.forest.groups import Comparison
+from scenicq.forest.nodes import (
+    Compare,
+    CompareOp,
+    Constant,
+    Contains,
+    Identity,
+    Leaf,
+    Logic,
+    LogicOp,
+    Node,
+    Norm,
+    PointIn,
+    Value,
+)
+from scenicq.forest.proximity_pruning import close_boxes
+from scenicq.forest.walk import leaves
+from scenicq.geometry.cells import convex_cells
+from scenicq.geometry.membership import bounds as region_bounds
+from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
+from scenicq.match.decide.affine_forms import Affine, AffineVector, Variable, affine_scalar, affine_vector
+from scenicq.match.decide.affine_reach import ends
+from scenicq.match.decide.linear_program import LinearSystem, NotSolved, Row
+from scenicq.match.options import Tolerance
+from scenicq.match.problem.conditioned import Item
+
+__all__ = ["Alternative", "NotLinear", "extent_affine", "inside", "position_boxes", "solve_affine"]
+
+_SIDES = 32
+"""Corners of the polygons around and inside a disc."""
+_MOST_CELLS = 2000
+_MOST_EXTENTS = 16
+"""Combinations of alternatives of which the ends of a number are looked for."""
+_CULLING = 1e-6
+"""Metres by which boxes are grown so that rounding loses nothing."""
+
+Alternative = list[list[Row]]
+"""Sets of linear facts, one of which holds."""
+
+
+class NotLinear(Exception):
+    """The constraints are not affine, or the linear programs do not tell."""
+
+
+def position_boxes(items: Sequence[Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> dict[Identity, Box]:
+    """Where each random point can lie, from the positions that it leads to and what it must be close to.
+
+    A little too much, never too little.
+
+    Args:
+        items: The constraints after conditioning.
+        tolerance: Per feature.
+        rows: Linear facts that hold besides: those about one coordinate alone count.
+    """
+    reach = tolerance.reach + _CULLING
+    targets: list[tuple[Node, Box]] = []
+    for constraint, node, observed in items:
+        if isinstance(constraint, Comparison) and constraint.property == "position":
+            x, y = cast("tuple[float, float]", observed)
+            targets.append((node, ((x - reach, x + reach), (y - reach, y + reach))))
+        elif not isinstance(constraint, Comparison):
+            targets += close_boxes(node)
+    boxes = leaf_boxes(targets)
+    for row in rows:
+        if len(row.form.terms) == 1:
+            _narrow(boxes, row)
+    return boxes
+
+
+def _narrow(boxes: dict[Identity, Box], row: Row) -> None:
+    """Keep a point within what a row says of one of its coordinates."""
+    (((identity, axis), factor),) = row.form.terms.items()
+    if factor == 0:
+        return
+    ends = sorted(((limit - row.form.constant) / factor) for limit in (row.low, row.high))
+    limits = list(boxes.get(identity, ((-math.inf, math.inf), (-math.inf, math.inf))))
+    low, high = limits[axis]
+    limits[axis] = (max(low, ends[0] - _CULLING), min(high, ends[1] + _CULLING))
+    boxes[identity] = (limits[0], limits[1])
+
+
+def inside(place: AffineVector, polygon: np.ndarray) -> list[Row]:
+    """Rows that keep a point in a convex polygon whose corners run counter-clockwise."""
+    rows: list[Row] = []
+    x, y = place
+    for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        length = math.hypot(bx - ax, by - ay)
+        if length > 0:
+            nx, ny = (by - ay) / length, (ax - bx) / length
+            side = x.times(nx).plus(y, ny).plus(Affine(float(nx * ax + ny * ay), {}), -1.0)
+            rows.append(Row(side, -math.inf, 0.0))
+    return rows
+
+
+def solve_affine(
+    items: Sequence[Item],
+    rows: Sequence[Row],
+    tolerance: Tolerance,
+    places: Sequence[Node] = (),
+    alternatives: Sequence[Alternative] = (),
+) -> dict[Identity, Value] | None:
+    """Values of the random variables that satisfy affine constraints, or None if there are none.
+
+    Args:
+        items: The constraints after conditioning.
+        rows: Linear facts that hold besides.
+        tolerance: Per feature.
+        places: Points that need values, too.
+        alternatives: Of each, one set of facts holds.
+
+    Raises:
+        NotLinear: Something is not affine, or lies between the inner and the outer polygons.
+    """
+    problem, variables = _problem(items, rows, tolerance, places, alternatives)
+    found = problem.solve()
+    if found is None:
+        return None
+    return {
+        identity: (found.get((identity, 0), 0.0), found.get((identity, 1), 0.0))
+        if isinstance(leaf, PointIn)
+        else found.get((identity, 0), 0.0)
+        for identity, leaf in variables.items()
+    }
+
+
+def extent_affine(
+    items: Sequence[Item],
+    rows: Sequence[Row],
+    tolerance: Tolerance,
+    places: Sequence[Node],
+    alternatives: Sequence[Alternative],
+    number: Identity,
+) -> tuple[float, float] | None:
+    """Between which values a random number lies where affine constraints are satisfied; None if they never are.
+
+    A little too much, never too little. Arguments and errors as of `solve_affine`.
+    """
+    problem, _ = _problem(items, rows, tolerance, places, alternatives)
+    return problem.extent((number, 0))
+
+
+def _problem(
+    items: Sequence[Item],
+    rows: Sequence[Row],
+    tolerance: Tolerance,
+    places: Sequence[Node],
+    alternatives: Sequence[Alternative],
+) -> tuple[_Problem, dict[Identity, Leaf]]:
+    problem = _Problem(tolerance, position_boxes(items, tolerance, rows), LinearSystem(list(rows)), list(alternatives))
+    for item in items:
+        problem.add(item)
+    variables = {leaf.identity: leaf for leaf in leaves(*(node for _, node, _ in items), *places)}
+    for leaf in variables.values():
+        problem.add_leaf(leaf)
+    return problem, variables
+
+
+@dataclass(slots=True)
+class _Problem:
+    """Rows that all hold, alternatives of which one row set each holds, and vectors that stay in discs."""
+
+    tolerance: Tolerance
+    boxes: Mapping[Identity, Box]
+    system: LinearSystem
+    alternatives: list[Alternative] = field(default_factory=list["Alternative"])
+    discs: list[tuple[Affine, Affine, float]] = field(default_factory=list[tuple[Affine, Affine, float]])
+
+    def add(self, item: Item) -> None:
+        """Add a constraint."""
+        constraint, node, observed = item
+        if not isinstance(constraint, Comparison):
+            self._add_condition(node)
+        elif isinstance(observed, tuple):
+            self._add_vector(constraint, node, observed)
+        else:
+            self._add_number(constraint, node, observed)
+
+    def _add_vector(self, constraint: Comparison, node: Node, observed: tuple[float, float]) -> None:
+        form = affine_vector(node)
+        if form is None:
+            raise NotLinear
+        x, y = (part.plus(Affine(value, {}), -1.0) for part, value in zip(form, observed, strict=True))
+        tolerance = self.tolerance
+        if constraint.property == "position" and tolerance.x is not None and tolerance.y is not None:
+            self.system.rows += [Row(x, -tolerance.x, tolerance.x), Row(y, -tolerance.y, tolerance.y)]
+        else:
+            self.discs.append((x, y, tolerance.position if constraint.property == "position" else tolerance.other))
+
+    def _add_number(self, constraint: Comparison, node: Node, observed: Value) -> None:
+        form = affine_scalar(node)
+        if form is None or not isinstance(observed, float):
+            raise NotLinear
+        off = form.plus(Affine(observed, {}), -1.0)
+        if constraint.property != "heading":
+            self.system.rows.append(Row(off, -self.tolerance.other, self.tolerance.other))
+            return
+        low, high = scalar_bounds(node)
+        allowed = self.tolerance.heading
+        if not (math.isfinite(low) and math.isfinite(high)):
+            raise NotLinear
+        first = math.ceil((low - observed - allowed) / math.tau - 1e-9)
+        last = math.floor((high - observed + allowed) / math.tau + 1e-9)
+        turns = range(first, last + 1)
+        self.alternatives.append([[Row(off, math.tau * k - allowed, math.tau * k + allowed)] for k in turns])
+
+    def _add_condition(self, node: Node) -> None:
+        match node:
+            case Logic() if node.op is LogicOp.AND:
+                for part in node.args:
+                    self._add_condition(part)
+            case Contains() if isinstance(node.region, Constant):
+                place = affine_vector(node.point)
+                if place is None:
+                    raise NotLinear
+                self._add_place(cast(Region, node.region.value), place, None)
+            case Compare(CompareOp.LT | CompareOp.LE, Norm() as norm, Constant(value=float() as radius)) | Compare(
+                CompareOp.GT | CompareOp.GE, Constant(value=float() as radius), Norm() as norm
+            ) if radius > 0 and (line := affine_vector(norm.vector)) is not None:
+                self.discs.append((*line, radius))
+            case Compare() if node.op not in (CompareOp.EQ, CompareOp.NE):
+                left, right = affine_scalar(node.left), affine_scalar(node.right)
+                if left is None or right is None:
+                    raise NotLinear
+                below = node.op in (CompareOp.LT, CompareOp.LE)
+                limits = (-math.inf, 0.0) if below else (0.0, math.inf)
+                strict = node.op in (CompareOp.LT, CompareOp.GT)
+                self.system.rows.append(Row(left.plus(right, -1.0), *limits, strict))
+            case Constant() if node.value is True:
+                pass
+            case _:
+                raise NotLinear
+
+    def add_leaf(self, leaf: Leaf) -> None:
+        """Keep a random variable in its support."""
+        if isinstance(leaf, PointIn):
+            if not isinstance(leaf.region, Constant):
+                raise NotLinear
+            x, y = (Affine(0.0, {(leaf.identity, axis): 1.0}) for axis in (0, 1))
+            self._add_place(cast(Region, leaf.region.value), (x, y), self.boxes.get(leaf.identity))
+            return
+        limits = ends(leaf)
+        if limits is None:
+            raise NotLinear
+        self.system.rows.append(Row(Affine(0.0, {(leaf.identity, 0): 1.0}), *limits))
+
+    def _add_place(self, region: Region, place: AffineVector, box: Box | None) -> None:
+        """Keep a point in a region: cells, segments or points, possibly cut to discs."""
+        met = region.parts if isinstance(region, IntersectionOf) else (region,)
+        others = [part for part in met if not isinstance(part, Disc)]
+        if len(others) > 1:
+            raise NotLinear
+        x, y = place
+        for part in met:
+            if isinstance(part, Disc):
+                cx, cy = part.center
+                self.discs.append((x.plus(Affine(-cx, {})), y.plus(Affine(-cy, {})), part.radius))
+        if others:
+            west, south, east, north = region_bounds(region)
+            (x0, x1), (y0, y1) = box or ((west, east), (south, north))
+            limits = (max(x0, west), max(y0, south), min(x1, east), min(y1, north))
+            empty = limits[0] > limits[2] or limits[1] > limits[3]
+            self.alternatives.append([] if empty else _places(others[0], limits, place))
+
+    def solve(self) -> Mapping[tuple[Identity, int], float] | None:
+        """A solution, or None if there is none."""
+        ordered = sorted(self.alternatives, key=len)
+        try:
+            found = _search(self.system, ordered, [*_polygons(self.discs, outer=True)])
+            if found is not None and self.discs:
+                found = _search(self.system, ordered, [*_polygons(self.discs, outer=False)])
+                if found is None:
+                    raise NotLinear
+        except NotSolved:
+            raise NotLinear from None
+        return found
+
+    def extent(self, variable: Variable) -> tuple[float, float] | None:
+        """The ends of a variable over all solutions, discs taken too large."""
+        around = [*_polygons(self.discs, outer=True)]
+        if math.prod(map(len, self.alternatives)) > _MOST_EXTENTS:
+            raise NotLinear
+        found: tuple[float, float] | None = None
+        try:
+            for chosen in itertools.product(*self.alternatives):
+                own = self.system.extent([*around, *itertools.chain.from_iterable(chosen)], variable)
+                if own is not None:
+                    found = own if found is None else (min(found[0], own[0]), max(found[1], own[1]))
+        except NotSolved:
+            raise NotLinear from None
+        return found
+
+
+def _places(region: Region, limits: tuple[float, float, float, float], place: AffineVector) -> Alternative:
+    """One set of rows for each convex piece of a region near a box."""
+    x, y = place
+    found: Alternative = []
+    for part in region.parts if isinstance(region, UnionOf) else (region,):
+        match part:
+            case PolygonSet() | Rectangle():
+                cells = [cell for cell in convex_cells(part, limits) if _near(cell, limits)]
+                found += [inside(place, cell) for cell in cells]
+            case PolylineSet():
+                for start, end in _segments(part, limits):
+                    found.append(_on_segment(place, start, end))
+            case PointSet():
+                for px, py in shapely.get_coordinates(part.near(limits)).tolist():
+                    found.append([Row(x, px, px), Row(y, py, py)])
+            case _:
+                raise NotLinear
+        if len(found) > _MOST_CELLS:
+            raise NotLinear
+    return found
+
+
+def _near(corners: np.ndarray, limits: tuple[float, float, float, float]) -> bool:
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    west, south, east, north = limits
+    return bool(low[0] <= east and high[0] >= west and low[1] <= north and high[1] >= south)
+
+
+def _segments(lines: PolylineSet, limits: tuple[float, float, float, float]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    for piece in lines.near(limits):
+        corners = shapely.get_coordinates(piece)
+        for start, end in itertools.pairwise(corners):
+            if _near(np.array((start, end)), limits):
+                yield start, end
+
+
+def _on_segment(place: AffineVector, start: np.ndarray, end: np.ndarray) -> list[Row]:
+    x, y = place
+    length = float(np.hypot(*(end - start)))
+    if length == 0:
+        return [Row(x, float(start[0]), float(start[0])), Row(y, float(start[1]), float(start[1]))]
+    ux, uy = (float(part) for part in (end - start) / length)
+    across = float(start[0] * -uy + start[1] * ux)
+    along = float(start[0] * ux + start[1] * uy)
+    return [Row(x.times(-uy).plus(y, ux), across, across), Row(x.times(ux).plus(y, uy), along, along + length)]
+
+
+def _polygons(discs: Sequence[tuple[Affine, Affine, float]], *, outer: bool) -> Iterator[Row]:
+    """Rows that keep vectors in a regular polygon around (outer) or inside their disc."""
+    for x, y, radius in discs:
+        reach = radius if outer else radius * math.cos(math.pi / _SIDES)
+        for side in range(_SIDES):
+            angle = math.tau * side / _SIDES
+            yield Row(x.times(math.cos(angle)).plus(y, math.sin(angle)), -math.inf, reach)
+
+
+def _search(
+    system: LinearSystem, alternatives: list[Alternative], rows: list[Row]
+) -> Mapping[tuple[Identity, int], float] | None:
+    """A solution under one choice of each alternative, depth first with early failure."""
+    if not alternatives:
+        return system.solve(rows)
+    if len(alternatives) > 1 and system.solve(rows) is None:
+        return None
+    for choice in alternatives[0]:
+        found = _search(system, alternatives[1:], [*rows, *choice])
+        if found is not None:
+            return found
+    return None

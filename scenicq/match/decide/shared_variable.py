@@ -1,0 +1,158 @@
+"""Parts that have one random number in common: a value of it that suits all of them.
+
+Each part has ways to be solved, and each way an interval that the number can be in. A value out of all parts is tried
+in each of them by itself; where it fails, what is known of that part is sharpened. So the work is that of the parts
+one after the other, not of all combinations of their ways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from scenicq.forest.bounds import Interval
+from scenicq.forest.nodes import Identity, Value
+from scenicq.match.decide.cascade import LINEAR_SLACK, Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.decide.evaluation import replay
+from scenicq.match.fields.cell_assignment import HeadingAssignment, extent, solved
+from scenicq.match.options import Tolerance
+
+__all__ = ["find_shared_value", "joined"]
+
+_MOST_VALUES = 256
+"""Values that are tried."""
+_ROUNDING = 1e-9
+_FINEST = 1e-7
+"""Width of an interval that is not divided any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """An interval of the number in which a way may have a solution; whether its ends are those of the way's."""
+
+    way: HeadingAssignment
+    low: float
+    high: float
+    tight: bool = False
+
+    def holds(self, value: float) -> bool:
+        return self.low - _ROUNDING <= value <= self.high + _ROUNDING
+
+
+def find_shared_value(
+    parts: Sequence[Sequence[HeadingAssignment]],
+    shared: Identity,
+    tolerance: Tolerance,
+    divided: Callable[[HeadingAssignment], list[HeadingAssignment] | None],
+) -> Outcome:
+    """Decide parts that share a random number; `Maybe` where that takes too long or cannot be told.
+
+    Args:
+        parts: Of each part the ways.
+        shared: The number.
+        tolerance: Per feature.
+        divided: Makes ways of one over smaller ranges that have all of its solutions; None where that is no use.
+    """
+    first = parts[0][0].case.tape.items[0][0]
+    stretches = [[_Stretch(way, *way.limits) for way in ways] for ways in parts]
+    sure = True
+    tried: dict[int, tuple[float, Satisfied, HeadingAssignment]] = {}
+    order = list(range(len(parts)))
+    for _ in range(_MOST_VALUES):
+        common = _common(stretches)
+        if not common:
+            return Refuted(first) if sure else Undecided(first, "nonlinear")
+        low, high = max(common, key=lambda ends: ends[1] - ends[0])
+        value = (low + high) / 2
+        for part in order:
+            if part in tried and tried[part][0] == value:
+                continue
+            fitting = [stretch for stretch in stretches[part] if stretch.holds(value)]
+            found = _first(fitting, shared, value, tolerance)
+            if found is not None:
+                tried[part] = (value, *found)
+                continue
+            for stretch in fitting:
+                less, complete = _sharper(stretch, shared, value, tolerance, divided)
+                at = stretches[part].index(stretch)
+                stretches[part][at : at + 1] = less
+                sure = sure and complete
+            # what was hard is asked first from now on
+            order.remove(part)
+            order.insert(0, part)
+            break
+        else:
+            return _all([tried[part][1:] for part in range(len(parts))], shared, value, tolerance)
+    return Undecided(first, "nonlinear")
+
+
+def joined(ends: Sequence[Interval]) -> list[Interval]:
+    """Intervals in order, those that meet as one."""
+    found: list[Interval] = []
+    for low, high in sorted(ends):
+        if found and low <= found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], high))
+        else:
+            found.append((low, high))
+    return found
+
+
+def _common(parts: Sequence[Sequence[_Stretch]]) -> list[Interval]:
+    """Where every part has a stretch."""
+    common: list[Interval] | None = None
+    for stretches in parts:
+        own = joined([(stretch.low, stretch.high) for stretch in stretches])
+        if common is not None:
+            pairs = [(max(a, c), min(b, d)) for a, b in common for c, d in own]
+            own = [(min(low, high), max(low, high)) for low, high in pairs if low <= high + _ROUNDING]
+        common = own
+    return common or []
+
+
+def _first(
+    stretches: Sequence[_Stretch], shared: Identity, value: float, tolerance: Tolerance
+) -> tuple[Satisfied, HeadingAssignment] | None:
+    for stretch in stretches:
+        found = solved(stretch.way, tolerance, {shared: value})
+        if isinstance(found, Satisfied):
+            return found, stretch.way
+    return None
+
+
+def _sharper(
+    stretch: _Stretch,
+    shared: Identity,
+    value: float,
+    tolerance: Tolerance,
+    divided: Callable[[HeadingAssignment], list[HeadingAssignment] | None],
+) -> tuple[list[_Stretch], bool]:
+    """What is left of a stretch in which a value fails, and whether that is all for sure."""
+    way = stretch.way
+    if not stretch.tight:
+        ends = extent(way, tolerance, shared, (stretch.low, stretch.high))
+        if ends is None:
+            return [], way.exact
+        less = replace(stretch, low=ends[0], high=ends[1], tight=True)
+        if not less.holds(value) or ends[1] - ends[0] < stretch.high - stretch.low - _FINEST:
+            return [less], way.exact
+    ways = None if way.sharp else divided(way)
+    if ways is not None:
+        return [_Stretch(each, *each.limits) for each in ways], True
+    if stretch.high - stretch.low <= _FINEST:
+        return [], False
+    sides = [(stretch.low, value), (value, stretch.high)]
+    return [_Stretch(way, low, high) for low, high in sides if high - low > _FINEST], False
+
+
+def _all(
+    found: Sequence[tuple[Satisfied, HeadingAssignment]], shared: Identity, value: float, tolerance: Tolerance
+) -> Outcome:
+    values: dict[Identity, Value] = {}
+    headings: dict[int, float] = {}
+    for outcome, way in found:
+        values |= outcome.values
+        headings |= way.headings
+    values[shared] = value
+    items = [item for _, way in found for item in way.case.tape.items]
+    good = replay(items, values, tolerance, LINEAR_SLACK, headings)
+    return Satisfied(values) if good else Undecided(items[0][0], "nonlinear")

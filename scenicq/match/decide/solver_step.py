@@ -1,0 +1,89 @@
+"""Groups put to a solver, and its answer checked: the last step of the decision ladder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from scenicq.forest.groups import Comparison, Constraint
+from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.decide.evaluation import replay
+from scenicq.match.fields.field_solver import repaired
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.conditioned import Item
+from scenicq.smt.answer import Sat, Solver, Unknown, Unsat
+from scenicq.smt.case_split import check_by_cases
+from scenicq.smt.encode import Encoding, Target, UnsupportedError, encode
+
+__all__ = ["ask", "encoded", "target_of"]
+
+_ATTEMPTS = 3
+_REFINED = 100.0
+
+
+def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: bool = True) -> Encoding:
+    """Groups as one problem for a solver.
+
+    Args:
+        items: The groups after conditioning.
+        options: The options.
+        borders: As of `encode`.
+
+    Raises:
+        UnsupportedError: A construct has no formula.
+    """
+    targets = [[(target_of(c, options), node, value) for c, node, value in group] for group in items]
+    return encode(targets, borders=borders)
+
+
+def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None) -> Outcome:
+    """Decide groups together by a solver; a witness that does not replay is repaired, refined, then given up.
+
+    Args:
+        items: The groups after conditioning.
+        options: The options.
+        solver: The solver, if there is one.
+    """
+    flat = [item for group in items for item in group]
+    blame = flat[0][0]
+    try:
+        encoding = encoded(items, options, borders=False)
+    except UnsupportedError as error:
+        return Undecided(blame, f"unsupported: {error}")
+    if solver is None:
+        return Undecided(blame, "no solver")
+    precision = options.precision
+    for attempt in range(_ATTEMPTS):
+        if attempt == 1:
+            # what was left out to keep the question small may be what the witness breaks
+            encoding = encoded(items, options)
+        answer = check_by_cases(solver, encoding.problem, precision=precision, timeout_s=options.timeout_s)
+        match answer:
+            case Unsat():
+                return Refuted(blame)
+            case Unknown():
+                return Undecided(blame, answer.reason)
+            case Sat():
+                values = encoding.values(answer.witness)
+                if replay(flat, values, options.tolerance, options.precision):
+                    return Satisfied(values)
+                close = repaired(flat, values, options.tolerance)
+                if close is not None:
+                    return close
+        precision /= _REFINED
+    return Undecided(blame, "precision")
+
+
+def target_of(constraint: Constraint, options: MatchOptions) -> Target:
+    """How a constraint's expression is compared with the label."""
+    if not isinstance(constraint, Comparison):
+        return Target(None, 0.0, 0.0)
+    tolerance = options.tolerance
+    match constraint.property:
+        case "position" if tolerance.x is not None and tolerance.y is not None:
+            return Target("box", tolerance.x, tolerance.y)
+        case "position":
+            return Target("disc", tolerance.position, 0.0)
+        case "heading":
+            return Target("angle", tolerance.heading, 0.0)
+        case _:
+            return Target("disc", tolerance.other, 0.0)

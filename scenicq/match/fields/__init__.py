@@ -1,0 +1,1 @@
+"""Groups whose vector fields hang on hidden points."""

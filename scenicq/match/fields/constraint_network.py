@@ -1,0 +1,63 @@
+"""Constraints of a group laid out for passes over all of their nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from scenicq.forest.groups import Comparison
+from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node
+from scenicq.forest.walk import is_leaf, postorder
+from scenicq.match.fields.interval_domain import Enclosure
+from scenicq.match.options import Tolerance
+from scenicq.match.problem.conditioned import Item
+
+__all__ = ["SLACK", "Tape"]
+
+SLACK = 1e-6
+"""Metres or radians by which bounds are grown, so that rounding loses nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tape:
+    """Constraints that are narrowed together.
+
+    Attributes:
+        items: The constraints, conditioned; what they share is shared.
+        tolerance: Per feature.
+    """
+
+    items: Sequence[Item]
+    tolerance: Tolerance
+
+    @cached_property
+    def nodes(self) -> list[Node]:
+        """All nodes, children first."""
+        return list(postorder([node for _, node, _ in self.items]))
+
+    @cached_property
+    def leaves(self) -> dict[Identity, Leaf]:
+        """The random variables."""
+        return {node.identity: node for node in self.nodes if is_leaf(node)}  # type: ignore[union-attr]
+
+    @cached_property
+    def headings(self) -> dict[int, Enclosure]:
+        """Where headings are that the label observes, up to whole turns; by the id of the node."""
+        allowed = self.tolerance.heading + SLACK
+        return {
+            id(node): np.array([[seen - allowed], [seen + allowed]])
+            for constraint, node, seen in self.items
+            if isinstance(constraint, Comparison) and constraint.property == "heading" and isinstance(seen, float)
+        }
+
+    @cached_property
+    def choices(self) -> list[Index | DirectionAt]:
+        """What has to be chosen before the rest is a matter of numbers."""
+        return [
+            node
+            for node in self.nodes
+            if isinstance(node, Index) or (isinstance(node, DirectionAt) and isinstance(node.field, Constant))
+        ]

@@ -1,0 +1,388 @@
+"""Many cases of one group at once: which way each field points in each, and where the random numbers can then be.
+
+A case is a column. What a label observes bounds the roots of the expressions, and the bounds of what is random follow,
+whatever the expressions are made of; sums in which a random number occurs many times are solved for it as a whole. The
+bounds are never too narrow: a case of which nothing is left has no solution.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.forest.bounds import Interval, scalar_bounds, vector_bounds
+from scenicq.forest.groups import Comparison
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Bearing,
+    Compare,
+    CompareOp,
+    Constant,
+    Coordinate,
+    DirectionAt,
+    Identity,
+    Leaf,
+    Logic,
+    LogicOp,
+    Node,
+    Norm,
+    PointIn,
+    Rotate,
+    Scale,
+    Select,
+    Value,
+    VectorOf,
+    VectorSum,
+)
+from scenicq.forest.walk import is_leaf
+from scenicq.match.fields.constraint_network import SLACK, Tape
+from scenicq.match.fields.interval_affine import Multiples, interval_affine_of, solved
+from scenicq.match.fields.interval_domain import (
+    Enclosure,
+    angle_of,
+    common,
+    divide,
+    everything,
+    lengths,
+    negative,
+    nothing_left,
+    rotate,
+    subtract,
+    times,
+    turning,
+    turns_near,
+)
+from scenicq.match.problem.conditioned import Item
+
+__all__ = ["BoxSet"]
+
+_PASSES = 6
+_WORTH = 0.8
+"""A pass that leaves more than this share of every range in every case is the last."""
+
+
+@dataclass(eq=False)
+class BoxSet:
+    """Cases.
+
+    Attributes:
+        tape: What they are cases of.
+        size: How many there are.
+        ranges: Where each random number or point can be.
+        chosen: For each choice that was made, by the node's id, the number of the option (n,), or of a field the range
+            of headings (2, n).
+        asked: By the id of a field's use, how large the box of its point was when its headings were last looked up.
+    """
+
+    tape: Tape
+    size: int
+    ranges: dict[Identity, Enclosure]
+    chosen: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
+    asked: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
+    _bounds: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
+    _turns: dict[int, tuple[Enclosure, Enclosure]] = field(default_factory=dict[int, "tuple[Enclosure, Enclosure]"])
+    _forms: dict[int, Multiples] = field(default_factory=dict[int, Multiples])
+
+    @classmethod
+    def start(cls, tape: Tape, ranges: Mapping[Identity, Sequence[Interval]]) -> BoxSet:
+        """One case for each of the intervals that some numbers are kept in, in order; else a single one."""
+        size = len(next(iter(ranges.values()))) if ranges else 1
+        known: dict[Identity, Enclosure] = {}
+        for identity, leaf in tape.leaves.items():
+            if identity in ranges:
+                known[identity] = np.array(ranges[identity], dtype=float).T.copy()
+            elif isinstance(leaf, PointIn):
+                known[identity] = np.repeat(np.array(vector_bounds(leaf))[..., None], size, axis=2)
+            else:
+                known[identity] = np.repeat(np.array(scalar_bounds(leaf))[:, None], size, axis=1)
+        return cls(tape, size, known)
+
+    @classmethod
+    def around(cls, tape: Tape, near: Mapping[Identity, Value], reach: float) -> BoxSet:
+        """One case, in which no random number or coordinate is farther than a reach from a value, if it has one."""
+        found = cls.start(tape, {})
+        for identity, own in found.ranges.items():
+            if identity not in near:
+                continue
+            value = np.array(near[identity], dtype=float).reshape(own.shape[:-2])[..., None, None]
+            found.ranges[identity] = common(own, value + np.array([[-reach], [reach]]))
+        return found
+
+    def take(self, cases: NDArray[np.intp]) -> BoxSet:
+        """Some of the cases, possibly several times."""
+        return BoxSet(
+            self.tape,
+            len(cases),
+            {key: value[..., cases] for key, value in self.ranges.items()},
+            {key: value[..., cases] for key, value in self.chosen.items()},
+            {key: value[cases] for key, value in self.asked.items()},
+            {key: value[..., cases] for key, value in self._bounds.items()},
+            {key: (sine[:, cases], cosine[:, cases]) for key, (sine, cosine) in self._turns.items()},
+        )
+
+    def place(self, node: DirectionAt) -> Enclosure:
+        """Where the point of a field can be, (2, 2, n), after narrowing."""
+        return self._vector(node.point)
+
+    def value(self, node: Node) -> Enclosure:
+        """The bounds of a number, (2, n), after narrowing."""
+        return self._scalar(node)
+
+    def keep(self, node: Node, limits: Enclosure) -> None:
+        """Leave of the bounds of a node what some others have in common with them."""
+        self._meet(node, limits)
+
+    def those(self, wanted: NDArray[np.bool_]) -> BoxSet:
+        """The cases that a mask (n,) names."""
+        return self if wanted.all() else self.take(np.nonzero(wanted)[0])
+
+    def narrowed(self) -> BoxSet:
+        """The cases of which something is left, over narrower ranges."""
+        branches = self
+        for _ in range(_PASSES):
+            # most cases that are none miss what the label observes from the start
+            branches._upward()
+            branches = branches.those(~branches._lost())
+            if not branches.size:
+                break
+            before = dict(branches.ranges)
+            branches._downward()
+            left = ~branches._lost()
+            small = all(
+                bool((_width(after)[..., left] > _WORTH * _width(before[key])[..., left] - SLACK).all())
+                for key, after in branches.ranges.items()
+            )
+            branches = branches.those(left)
+            if small or not branches.size:
+                break
+        return branches
+
+    def _upward(self) -> None:
+        # overlaps of ends and of nothing are settled where they are met
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            for node in self.tape.nodes:
+                self._forward(node)
+            for item in self.tape.items:
+                self._compare(item)
+
+    def _downward(self) -> None:
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            self._forms = {}
+            for node in self.tape.nodes:
+                self._forms[id(node)] = interval_affine_of(node, self._forms, self._bounds, self._turns)
+            for item in self.tape.items:
+                root = item[1]
+                if isinstance(item[0], Comparison) and id(root) in self._bounds:
+                    solved(self._forms[id(root)], self._bounds[id(root)], self.ranges)
+            for node in reversed(self.tape.nodes):
+                self._backward(node)
+
+    def _lost(self) -> NDArray[np.bool_]:
+        lost = np.zeros(self.size, dtype=bool)
+        for each in (*self.ranges.values(), *self._bounds.values()):
+            lost |= nothing_left(each)
+        return lost
+
+    # --- bounds
+
+    def _scalar(self, node: Node) -> Enclosure:
+        found = self._bounds.get(id(node))
+        return everything(np.empty((2, self.size))) if found is None else found
+
+    def _vector(self, node: Node) -> Enclosure:
+        found = self._bounds.get(id(node))
+        return everything(np.empty((2, 2, self.size))) if found is None else found
+
+    def _meet(self, node: Node, more: Enclosure) -> None:
+        own = self._bounds.get(id(node))
+        if own is None:
+            self._bounds[id(node)] = np.broadcast_to(more, (*more.shape[:-1], self.size))
+        elif own.ndim == more.ndim:
+            self._bounds[id(node)] = common(own, more)
+
+    def _forward(self, node: Node) -> None:
+        found = self._value(node)
+        if found is not None:
+            self._meet(node, found)
+
+    def _value(self, node: Node) -> Enclosure | None:
+        match node:
+            case Constant(value=float() as number):
+                return None if id(node) in self._bounds else np.full((2, self.size), number)
+            case Constant(value=(float() as x, float() as y)):
+                return np.array([[[x], [x]], [[y], [y]]]) if id(node) not in self._bounds else None
+            case _ if is_leaf(node):
+                if id(node) in self.chosen:
+                    return np.stack([self.chosen[id(node)]] * 2)
+                return self.ranges[cast(Leaf, node).identity]
+            case VectorOf():
+                return np.stack([self._scalar(node.x), self._scalar(node.y)])
+            case VectorSum():
+                return self._vector(node.left) + self._vector(node.right)
+            case Scale():
+                return times(self._vector(node.vector), self._scalar(node.factor))
+            case Rotate():
+                angle = self.tape.headings.get(id(node.angle), self._scalar(node.angle))
+                turn = self._turns[id(node)] = turning(np.broadcast_to(angle, (2, self.size)))
+                return rotate(self._vector(node.vector), turn)
+            case Coordinate():
+                return self._vector(node.vector)[node.axis]
+            case Bearing():
+                return angle_of(self._vector(node.vector))
+            case Norm():
+                return lengths(self._vector(node.vector))
+            case DirectionAt():
+                return self.chosen.get(id(node), np.array([[-math.pi], [math.pi]]))
+            case Arithmetic():
+                return self._arithmetic(node)
+            case Select():
+                return self._select(node)
+            case _:
+                return None
+
+    def _select(self, node: Select) -> Enclosure | None:
+        options = [self._bounds.get(id(option)) for option in node.options]
+        known = [option for option in options if option is not None]
+        if len(known) < len(options) or len({option.ndim for option in known}) > 1:
+            return None
+        stacked = np.stack(known)
+        chosen = self.chosen.get(id(node.index))
+        if chosen is not None:
+            return np.take_along_axis(stacked, chosen.astype(int).reshape((1,) * (stacked.ndim - 1) + (-1,)), axis=0)[0]
+        return np.stack([stacked[..., 0, :].min(axis=0), stacked[..., 1, :].max(axis=0)], axis=-2)
+
+    def _arithmetic(self, node: Arithmetic) -> Enclosure:
+        args = [self._scalar(arg) for arg in node.args]
+        match node.op:
+            case ArithmeticOp.ADD:
+                return sum(args[1:], args[0])
+            case ArithmeticOp.SUB:
+                return subtract(args[0], args[1])
+            case ArithmeticOp.NEG:
+                return negative(args[0])
+            case ArithmeticOp.MUL:
+                return times(args[0], args[1])
+            case ArithmeticOp.DIV:
+                return divide(args[0], args[1])
+            case ArithmeticOp.WRAP:
+                low, high = args[0]
+                turns = math.tau * np.round(np.where(np.isfinite(low + high), (low + high) / 2 / math.tau, 0.0))
+                found, turn = args[0] - turns, np.array([[-math.pi], [math.pi]])
+                return np.where((found[0] > -math.pi) & (found[1] <= math.pi), found, turn)
+            case ArithmeticOp.ABS:
+                low, high = args[0]
+                return np.stack([np.maximum(np.maximum(low, -high), 0.0), np.maximum(-low, high)])
+            case _:
+                return np.array(scalar_bounds(node))[:, None]
+
+    # --- what is observed and what is required
+
+    def _compare(self, item: Item) -> None:
+        constraint, node, seen = item
+        if not isinstance(constraint, Comparison):
+            self._hold(node)
+        elif isinstance(seen, tuple) and constraint.property == "position":
+            tolerance = self.tape.tolerance
+            a, b = tolerance.x, tolerance.y
+            if a is None or b is None:
+                a = b = tolerance.position
+            off = np.array([[[-a - SLACK], [a + SLACK]], [[-b - SLACK], [b + SLACK]]])
+            self._meet(node, np.array(seen, dtype=float)[:, None, None] + off)
+        elif id(node) in self.tape.headings:
+            self._meet(node, turns_near(self.tape.headings[id(node)], self._scalar(node)))
+        elif isinstance(seen, float):
+            allowed = self.tape.tolerance.other + SLACK
+            self._meet(node, np.array([[seen - allowed], [seen + allowed]]))
+
+    def _hold(self, node: Node) -> None:
+        match node:
+            case Logic() if node.op is LogicOp.AND:
+                for part in node.args:
+                    self._hold(part)
+            case Compare():
+                left, right = self._scalar(node.left), self._scalar(node.right)
+                if left.ndim > 2 or right.ndim > 2:
+                    return
+                low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+                if node.op in (CompareOp.LT, CompareOp.LE, CompareOp.EQ):
+                    self._meet(node.left, np.stack([low, right[1]]))
+                    self._meet(node.right, np.stack([left[0], high]))
+                if node.op in (CompareOp.GT, CompareOp.GE, CompareOp.EQ):
+                    self._meet(node.left, np.stack([right[0], high]))
+                    self._meet(node.right, np.stack([low, left[1]]))
+            case _:
+                pass
+
+    def _backward(self, node: Node) -> None:
+        own = self._bounds.get(id(node))
+        if own is None:
+            return
+        match node:
+            case VectorOf():
+                self._meet(node.x, own[0])
+                self._meet(node.y, own[1])
+            case VectorSum():
+                left, right = self._vector(node.left), self._vector(node.right)
+                self._meet(node.left, subtract(own, right))
+                self._meet(node.right, subtract(own, left))
+            case Scale():
+                vector, factor = self._vector(node.vector), self._scalar(node.factor)
+                self._meet(node.vector, divide(own, factor))
+                for axis in (0, 1):
+                    self._meet(node.factor, divide(own[axis], vector[axis]))
+            case Rotate():
+                sine, cosine = self._turns[id(node)]
+                self._meet(node.vector, rotate(own, (negative(sine), cosine)))
+                angle = self._scalar(node.angle)
+                if (angle[0] != angle[1]).any():
+                    turn = subtract(angle_of(own), angle_of(self._vector(node.vector)))
+                    self._meet(node.angle, turns_near(turn, angle))
+            case Coordinate():
+                both = everything(np.empty((2, 2, self.size)))
+                both[node.axis] = own
+                self._meet(node.vector, both)
+            case Norm():
+                self._meet(node.vector, np.stack([[-own[1], own[1]]] * 2))
+            case Arithmetic():
+                self._arithmetic_back(node, own)
+            case _ if is_leaf(node):
+                identity = cast(Leaf, node).identity
+                self.ranges[identity] = self._bounds[id(node)] = common(own, self.ranges[identity])
+            case _:
+                pass
+
+    def _arithmetic_back(self, node: Arithmetic, own: Enclosure) -> None:
+        args = [self._scalar(arg) for arg in node.args]
+        match node.op:
+            case ArithmeticOp.ADD:
+                for number, arg in enumerate(node.args):
+                    rest = own
+                    for other in (*args[:number], *args[number + 1 :]):
+                        rest = subtract(rest, other)
+                    self._meet(arg, rest)
+            case ArithmeticOp.SUB:
+                self._meet(node.args[0], own + args[1])
+                self._meet(node.args[1], subtract(args[0], own))
+            case ArithmeticOp.NEG:
+                self._meet(node.args[0], negative(own))
+            case ArithmeticOp.MUL:
+                self._meet(node.args[0], divide(own, args[1]))
+                self._meet(node.args[1], divide(own, args[0]))
+            case ArithmeticOp.DIV:
+                self._meet(node.args[0], times(own, args[1]))
+            case ArithmeticOp.WRAP:
+                self._meet(node.args[0], turns_near(own, args[0]))
+            case ArithmeticOp.ABS:
+                self._meet(node.args[0], np.stack([-own[1], own[1]]))
+            case _:
+                pass
+
+
+def _width(limits: Enclosure) -> NDArray[np.float64]:
+    return limits[..., 1, :] - limits[..., 0, :]

@@ -1,0 +1,209 @@
+"""Groups with fields at hidden points: which way each field points is chosen, and what is left is linear.
+
+A car that follows a road through an intersection may turn at every step. All combinations are looked at together,
+choice by choice, and after each choice the random numbers are narrowed; few combinations survive that. For each of
+these the directions are known, so that the rest is a linear program with one map cell for each hidden point.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from typing import cast
+
+import numpy as np
+
+from scenicq.forest.bounds import Interval
+from scenicq.forest.groups import Constraint
+from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Node, Select, Value
+from scenicq.forest.walk import leaves, postorder
+from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.decide.evaluation import holds
+from scenicq.match.decide.shared_variable import find_shared_value, joined
+from scenicq.match.fields.cell_assignment import HeadingAssignment, solved, way_of
+from scenicq.match.fields.constraint_network import Tape
+from scenicq.match.fields.contractor import BoxSet
+from scenicq.match.fields.heading_propagation import LimitError, directed, halved, settled
+from scenicq.match.options import Tolerance
+from scenicq.match.problem.conditioned import Item, conditioned
+
+__all__ = ["decide_directions", "repaired"]
+
+_MOST_OPTIONS = 16
+"""Options of choices that are tried one by one."""
+_MOST_WAYS = 256
+"""Ways of one part that are put to the linear program."""
+_MOST_HALVES = 64
+"""Ways of one part that are divided."""
+_CLOSE = 0.05
+"""How far from the answer of a solver a solution is looked for."""
+
+
+def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance) -> Outcome:
+    """Decide a group with fields at hidden points, without a solver; `Maybe` where one is needed.
+
+    Args:
+        parts: The constraints, conditioned, in parts that share no random variable but one.
+        shared: The random number that they share, if there are several parts.
+        tolerance: Per feature.
+    """
+    if shared is None or len(parts) == 1:
+        return _whole(parts[0], tolerance)
+    first = parts[0][0][0]
+    tapes = [Tape(part, tolerance) for part in parts]
+    chosen: list[list[BoxSet]] = []
+    limits: list[Interval] = []
+    try:
+        for tape in tapes:
+            known = {shared: limits} if limits and shared in tape.leaves else {}
+            found = list(directed(BoxSet.start(tape, known)))
+            if not found:
+                return Refuted(tape.items[0][0])
+            chosen.append(found)
+            limits = _joined(found, shared)
+        # what a later part excludes of the shared number excludes ways of the earlier ones
+        chosen = [_within(found, shared, limits) for found in chosen]
+    except LimitError:
+        return Undecided(first, "nonlinear")
+    ways = [_ways(found, shared) for found in chosen]
+    if not all(ways):
+        return Refuted(first)
+    found = find_shared_value(ways, shared, tolerance, lambda way: _divided(way, shared))
+    choices = [id(node) for tape in tapes for node in tape.choices]
+    if isinstance(found, Undecided) and len(set(choices)) < len(choices):
+        # fields that several parts ask for at one point have one direction there
+        return decide_directions([[item for part in parts for item in part]], None, tolerance)
+    return found
+
+
+def _whole(items: Sequence[Item], tolerance: Tolerance) -> Outcome:
+    """Decide constraints that are one part: for each option of what decides which fields are asked at all."""
+    first = items[0][0]
+    blamed: Outcome = Refuted(first)
+    deciding = _deciding([node for _, node, _ in items])
+    for options in itertools.product(*(range(len(leaf.weights)) for leaf in deciding)):
+        given: dict[Identity, Value] = {
+            leaf.identity: float(option) for leaf, option in zip(deciding, options, strict=True)
+        }
+        fixed = conditioned(items, given) if given else items
+        known = [item for item in fixed if isinstance(item[1], Constant)]
+        if not all(holds(c, cast(Constant, node).value, seen, tolerance) for c, node, seen in known):
+            continue
+        left = [item for item in fixed if not isinstance(item[1], Constant)]
+        if not left:
+            return Satisfied(given)
+        found = _alone(_one_by_one(directed(BoxSet.start(Tape(left, tolerance), {}))), first, tolerance)
+        if isinstance(found, Satisfied):
+            return Satisfied({**given, **found.values})
+        blamed = found if isinstance(found, Undecided) else blamed
+    return blamed
+
+
+def _deciding(roots: Sequence[Node]) -> list[Index]:
+    """The choices between expressions with fields, if they have few outcomes together."""
+    found: dict[Identity, Index] = {}
+    for node in postorder(roots):
+        if not isinstance(node, Select) or not isinstance(node.index, Index):
+            continue
+        if any(isinstance(below, DirectionAt) for below in postorder(node.options)):
+            found[node.index.identity] = node.index
+    few = math.prod(len(leaf.weights) for leaf in found.values()) <= _MOST_OPTIONS
+    return list(found.values()) if few else []
+
+
+def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment]:
+    """The ways of cases, as the cases are found."""
+    for cases in found:
+        ways = (way_of(cases, number, None) for number in range(cases.size))
+        yield from (way for way in ways if way is not None)
+
+
+def _alone(ways: Iterator[HeadingAssignment], first: Constraint, tolerance: Tolerance) -> Outcome:
+    """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
+    todo: deque[HeadingAssignment] = deque()
+    doubt = Undecided(first, "nonlinear")
+    try:
+        for number, way in enumerate(ways):
+            found = solved(way, tolerance)
+            if isinstance(found, Satisfied):
+                return found
+            if number == _MOST_WAYS:
+                return doubt
+            if isinstance(found, Undecided):
+                todo.append(way)
+    except LimitError:
+        return doubt
+    for _ in range(_MOST_HALVES):
+        if not todo:
+            return Refuted(first)
+        less = None if todo[0].sharp else _divided(todo.popleft(), None)
+        if less is None:
+            break
+        for way in less:
+            found = solved(way, tolerance)
+            if isinstance(found, Satisfied):
+                return found
+            if isinstance(found, Undecided):
+                todo.append(way)
+    return doubt
+
+
+def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAssignment] | None:
+    """What is left of a way in cells that cover too much over either half of its widest range."""
+    case = way.case
+    try:
+        halves = [settled(half) for half in halved(case, tuple(case.tape.leaves.values()))]
+    except LimitError:
+        return None
+    return _ways([half for half in halves if half.size], shared)
+
+
+def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: Tolerance) -> Satisfied | None:
+    """A solution close to values that miss one by little, such as the far side of a border; None if none is found.
+
+    Args:
+        items: The constraints, conditioned.
+        near: The values; those of discrete variables are kept. What did not matter to a solver may be missing.
+        tolerance: Per feature.
+    """
+    known = leaves(*(node for _, node, _ in items))
+    discrete = [leaf.identity for leaf in known if isinstance(leaf, Index | DiscreteRange)]
+    given = {identity: near[identity] for identity in discrete if identity in near}
+    if len(given) < len(set(discrete)):
+        return None
+    tape = Tape(conditioned(items, given), tolerance)
+    ways = _one_by_one(directed(BoxSet.around(tape, near, _CLOSE)))
+    found = _alone(ways, items[0][0], tolerance)
+    return Satisfied({**given, **found.values}) if isinstance(found, Satisfied) else None
+
+
+def _joined(found: Sequence[BoxSet], shared: Identity) -> list[Interval]:
+    """Where the shared number can be, intervals that meet as one."""
+    ends = np.concatenate([cases.ranges[shared] for cases in found], axis=1).T.tolist()
+    return joined([(low, high) for low, high in ends])
+
+
+def _within(found: Sequence[BoxSet], shared: Identity, limits: Sequence[Interval]) -> list[BoxSet]:
+    """The cases in which the shared number can be within some limits."""
+    kept: list[BoxSet] = []
+    for cases in found:
+        for low, high in limits:
+            own = cases.ranges[shared]
+            near = cases.those((own[0] <= high) & (own[1] >= low))
+            if near.size:
+                near = near.take(np.arange(near.size))
+                near.ranges[shared] = np.stack(
+                    [np.maximum(near.ranges[shared][0], low), np.minimum(near.ranges[shared][1], high)]
+                )
+                near = near.narrowed()
+            if near.size:
+                kept.append(near)
+    return kept
+
+
+def _ways(found: Sequence[BoxSet], shared: Identity | None) -> list[HeadingAssignment]:
+    """The cases as constraints, those first in which a linear program tells all."""
+    ways = [way_of(cases, number, shared) for cases in found for number in range(cases.size)]
+    return sorted((way for way in ways if way is not None), key=lambda way: not way.sharp)

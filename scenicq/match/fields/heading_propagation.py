@@ -1,0 +1,284 @@
+"""Which way fields point at hidden points: ranges of headings that narrow with the places, and are parted where not.
+
+Where a point can be bounds the headings of its field, and these bound where the points are that hang on it. So on a
+bend of many short segments few directions have to be tried: mostly they follow from one another. What does not follow
+is parted, first into ranges of headings close to each other, at last into single ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.compiler.occupancy import Ranked
+from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn
+from scenicq.forest.walk import leaves
+from scenicq.geometry import shapes
+from scenicq.geometry.fields import VectorField
+from scenicq.geometry.regions import SLACK, PointSet, PolygonSet, PolylineSet
+from scenicq.match.fields.cell_assignment import MARGIN, SAME
+from scenicq.match.fields.contractor import BoxSet
+
+__all__ = ["LimitError", "directed", "halved", "settled"]
+
+_AT_ONCE = 256
+"""Cases that are narrowed together: what one of them finds may make the others needless."""
+_MOST_CASES = 100_000
+"""Cases of one part that are looked at."""
+_FAR = 60.0
+"""Metres: where a point may be farther about than this, a number that it hangs on is divided before directions are."""
+_PASSES = 12
+"""Times that places and headings narrow each other at most."""
+_WORTH = 0.8
+"""A share of the range of headings, or of the place of a point, above which nothing is gained by looking again."""
+_POINT = 1.5e-9
+"""Radians that the headings of one direction may be apart, being rounded."""
+_FEW = 4
+"""Headings that are tried one by one."""
+_GAP = 0.1
+"""Radians between two headings that are not of one bend."""
+_PIECES = 4
+"""Ranges into which the headings of a bend are parted."""
+_SOME = 64
+"""Numbers of options between which a number may be for their areas to be looked at."""
+_ALMOST = 1e-3
+"""By how much a number of an option may be off by rounding."""
+_FINEST = 1e-5
+"""Width of a range that is not divided any more."""
+_LONG = 1.0
+"""Width of a range of numbers that is divided before directions are, where these are many."""
+_PARTS = 8
+"""Parts into which it is divided at once, at most."""
+_BEND = 0.5
+"""Radians that the headings of one bend may be apart, or else it is told first which road is meant."""
+
+
+class LimitError(Exception):
+    """More cases than anyone would go through, or points that may be anywhere."""
+
+
+def directed(start: BoxSet) -> Iterator[BoxSet]:
+    """The cases in which every field has one direction and something is left, those found first at once.
+
+    Raises:
+        TooMany: There are too many cases.
+    """
+    todo, seen = [start], 0
+    while todo:
+        cases = todo.pop()
+        seen += cases.size
+        if seen > _MOST_CASES:
+            raise LimitError
+        cases = settled(cases)
+        if not cases.size:
+            continue
+        parts = _parted(cases)
+        if parts is None:
+            yield cases
+        else:
+            todo += parts
+
+
+def settled(cases: BoxSet) -> BoxSet:
+    """The cases of which something is left, narrowed until places and headings do not narrow each other any more."""
+    for _ in range(_PASSES):
+        cases = _placed(cases.narrowed())
+        gained = False
+        for node in cases.tape.choices:
+            if isinstance(node, DirectionAt) and cases.size:
+                cases, less = _turned(cases, node)
+                gained = gained or less
+        if not gained or not cases.size:
+            break
+    return cases
+
+
+def halved(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
+    """The cases with the widest range of a number, or of a coordinate of a point, halved.
+
+    Args:
+        cases: The cases.
+        below: The random variables that come into question.
+
+    Raises:
+        TooMany: There is none.
+    """
+    found = _widest(cases, below)
+    if found is None or found[0] <= _FINEST:
+        raise LimitError
+    return _divided(cases, *found[1:], 2)
+
+
+def _widest(cases: BoxSet, below: Sequence[Leaf]) -> tuple[float, Identity, int] | None:
+    """The widest finite range, the random variable and the axis."""
+    widest: tuple[float, Identity, int] | None = None
+    for leaf in below:
+        limits = cases.ranges[leaf.identity].reshape(-1, 2, cases.size)
+        for axis, (low, high) in enumerate(limits):
+            width = float((high - low).max())
+            if not isinstance(leaf, Index) and width < math.inf and (widest is None or width > widest[0]):
+                widest = width, leaf.identity, axis
+    return widest
+
+
+def _divided(cases: BoxSet, identity: Identity, axis: int, count: int) -> list[BoxSet]:
+    """The cases over each of some equal parts of a range."""
+    found: list[BoxSet] = []
+    most = max(1, _AT_ONCE // count)
+    for first in range(0, cases.size, most):
+        some = np.arange(first, min(first + most, cases.size))
+        parts = cases.take(np.tile(some, count))
+        ends = parts.ranges[identity].reshape(-1, 2, parts.size)[axis]
+        share = np.repeat(np.arange(count), len(some))
+        low, width = ends[0].copy(), (ends[1] - ends[0]) / count
+        ends[0], ends[1] = low + share * width, np.where(share == count - 1, ends[1], low + (share + 1) * width)
+        found.append(parts)
+    return found
+
+
+def _placed(cases: BoxSet) -> BoxSet:
+    """The cases in which random points can lie in their regions, of which narrowing knows the bounds alone."""
+    for identity, leaf in cases.tape.leaves.items():
+        region = leaf.region.value if isinstance(leaf, PointIn) and isinstance(leaf.region, Constant) else None
+        if not (isinstance(region, PolygonSet | PolylineSet | PointSet) and cases.size):
+            continue
+        place = cases.ranges[identity]
+        size = np.hypot(*(place[:, 1] - place[:, 0]))
+        before = cases.asked.get(id(identity), np.full(cases.size, np.inf))
+        if not np.isfinite(size).all() or (size > _WORTH * before).all():
+            continue
+        boxes = np.concatenate([place[:, 0] - MARGIN, place[:, 1] + MARGIN]).T
+        held = np.zeros(cases.size, dtype=bool)
+        held[shapes.tree_pairs_within(region.tree, shapes.boxes(boxes), SLACK)[0]] = True
+        cases = cases.take(np.nonzero(held)[0])
+        cases.asked[id(identity)] = size[held]
+    return cases
+
+
+def _turned(cases: BoxSet, node: DirectionAt) -> tuple[BoxSet, bool]:
+    """The cases in which a field has a heading, its range the least that holds them all; whether that narrowed any."""
+    field = cast(Constant, node.field).value
+    if isinstance(field, Ranked):
+        cases = _occupied(cases, node, field)
+    size = _extent(cases, node)
+    before = cases.asked.get(id(node), np.full(cases.size, np.inf))
+    if size.max() > _FAR or (size > _WORTH * before).all():
+        return cases, False
+    owner, heading = _headings(cases, node)
+    low, high = np.full(cases.size, np.inf), np.full(cases.size, -np.inf)
+    np.minimum.at(low, owner, heading)
+    np.maximum.at(high, owner, heading)
+    known = cases.chosen.get(id(node))
+    gained = True if known is None else bool((high - low < _WORTH * (known[1] - known[0]) - _POINT).any())
+    cases = cases.take(np.arange(cases.size))
+    cases.chosen[id(node)], cases.asked[id(node)] = np.stack([low, high]), size
+    return cases.those(low <= high), gained
+
+
+def _occupied(cases: BoxSet, node: DirectionAt, field: Ranked) -> BoxSet:
+    """The cases in which a point is kept near the areas that may be found at it, as far as these are few."""
+    options = field.options
+    first, last = cases.value(node) * options.scale
+    first = np.clip(np.ceil(first - _ALMOST), 0, options.nothing).astype(int)
+    last = np.clip(np.floor(last + _ALMOST), 0, options.nothing).astype(int)
+    if not cases.size or (last - first).max() > _SOME:
+        return cases
+    boxes = np.stack([_hull(options.extents[low : high + 1]) for low, high in zip(first, last, strict=True)], axis=-1)
+    cases = cases.take(np.arange(cases.size))
+    cases.keep(node.point, np.stack([boxes[[0, 2]], boxes[[1, 3]]]))
+    if id(node) not in cases.chosen and (first == last).all():
+        # what is found there is known however large the area is
+        cases.chosen[id(node)] = np.stack([first, last]) / options.scale
+    return cases
+
+
+def _hull(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The box around boxes (n, 4); of none an empty one."""
+    return np.concatenate([boxes[:, :2].min(axis=0, initial=np.inf), boxes[:, 2:].max(axis=0, initial=-np.inf)])
+
+
+def _parted(cases: BoxSet) -> list[BoxSet] | None:
+    """The cases with one more choice made; None if there is none left to make."""
+    for node in cases.tape.choices:
+        if isinstance(node, Index) and id(node) not in cases.chosen:
+            count = len(node.weights)
+            options = np.tile(np.arange(count, dtype=float), cases.size)
+            return _split(cases, node, np.repeat(np.arange(cases.size), count), options)
+    vague = [node for node in cases.tape.choices if isinstance(node, DirectionAt) and _is_vague(cases, node)]
+    if not vague:
+        return None
+    sizes = {id(node): float(_extent(cases, node).max()) for node in vague}
+    if min(sizes.values()) > _FAR:
+        return halved(cases, leaves(min(vague, key=lambda node: sizes[id(node)])))
+    # first which road is meant, where least of the map comes into question, then where on the bend
+    near = [node for node in vague if sizes[id(node)] <= _FAR]
+    turns = {id(node): float(np.ptp(cases.chosen[id(node)], axis=0).max()) for node in near}
+    node = min(near, key=lambda node: sizes[id(node)] if turns[id(node)] >= _BEND else _FAR - turns[id(node)])
+    owner, ranges = _pieces(cases, node)
+    if len(owner) > 2 * cases.size:
+        # over less of the way that random numbers allow there are fewer directions
+        found = _widest(cases, [leaf for leaf in leaves(node) if not isinstance(leaf, PointIn)])
+        if found is not None and found[0] > _LONG:
+            return _divided(cases, *found[1:], min(_PARTS, math.ceil(found[0] / _LONG)))
+    return _split(cases, node, owner, ranges)
+
+
+def _is_vague(cases: BoxSet, node: DirectionAt) -> bool:
+    known = cases.chosen.get(id(node))
+    return known is None or bool((known[1] - known[0] > _POINT).any())
+
+
+def _extent(cases: BoxSet, node: DirectionAt) -> NDArray[np.float64]:
+    """The diagonals of the boxes in which the point of a field can be, (n,)."""
+    place = cases.place(node)
+    return np.hypot(*(place[:, 1] - place[:, 0]))
+
+
+def _headings(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Pairs (case, heading): all that a field may have where its point can be, and as far as they are not excluded."""
+    place = cases.place(node)
+    boxes = np.concatenate([place[:, 0] - MARGIN, place[:, 1] + MARGIN]).T
+    owner, heading = cast(VectorField, cast(Constant, node.field).value).headings(boxes)
+    low, high = cases.value(node)
+    kept = (heading >= low[owner] - SAME) & (heading <= high[owner] + SAME)
+    return owner[kept], heading[kept]
+
+
+def _pieces(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Pairs (case, range of headings), the ranges (2, m): the directions that a field may have in parts."""
+    owner, heading = _headings(cases, node)
+    order = np.lexsort((heading, owner))
+    owner, heading = owner[order], heading[order]
+    first = np.diff(owner, prepend=-1) > 0
+    gap = np.diff(heading, prepend=-np.inf)
+    gap[first] = np.inf
+    apart = gap > _POINT
+    if not isinstance(cast(Constant, node.field).value, Ranked):
+        # a number of an option is near no other; headings are parted at gaps, or where there is none, evenly
+        wide = first | (gap > _GAP)
+        counts = np.bincount(owner[apart], minlength=cases.size)
+        ranges = np.bincount(owner[wide], minlength=cases.size)
+        low, high = np.full(cases.size, np.inf), np.full(cases.size, -np.inf)
+        np.minimum.at(low, owner, heading)
+        np.maximum.at(high, owner, heading)
+        bins = np.floor((heading - low[owner]) * (_PIECES / (high - low + SAME)[owner]))
+        even = np.diff(bins, prepend=-1.0) != 0
+        apart &= first | (counts <= _FEW)[owner] | np.where((ranges > 1)[owner], wide, even)
+    starts = np.nonzero(apart)[0]
+    ends = np.append(starts[1:], len(heading))[: len(starts)] - 1
+    return owner[starts], np.stack([heading[starts], heading[ends]])
+
+
+def _split(cases: BoxSet, choice: Node, owner: NDArray[np.intp], options: NDArray[np.float64]) -> list[BoxSet]:
+    """The cases once for each option of a choice; the last axis of the options goes with the owners."""
+    found: list[BoxSet] = []
+    for first in range(0, len(owner), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        branches = cases.take(owner[some])
+        branches.chosen[id(choice)] = options[..., some]
+        found.append(branches)
+    return found

@@ -1,0 +1,167 @@
+"""Which label objects may play which role, before anything about positions is looked at: class, radius, number."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from scenicq.forest.nodes import Value
+from scenicq.forest.scenario import Scenario
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.constraints import Signature
+from scenicq.match.problem.observation import observe, observe_params
+from scenicq.match.search.backtracking import Exhausted, Slot, matchable
+from scenicq.match.verdict import Cause
+from scenicq.store.classes import class_matches
+from scenicq.store.labels import Label
+
+__all__ = ["Candidates", "Cast", "candidates_of", "egos", "find_candidates"]
+
+Candidates = Mapping[int, tuple[int, ...]]
+"""For objects of the scenario, the numbers of the things that may play them: all others are known to be excluded."""
+
+_MOST_SIGNATURES = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Cast:
+    """A label made ready: its things by number (0 is the label's ego) and who may play whom.
+
+    Attributes:
+        things: The ego and the objects of the label.
+        ego: Number of the thing that plays the scenario's ego.
+        seen: What is observed of each thing.
+        params: What is observed of the frame.
+        candidates: For each object of the scenario but the ego, the numbers of the things of its class.
+        disc: The area that is looked at, if it is limited: centre and radius.
+    """
+
+    label: Label
+    ego: int
+    seen: tuple[Mapping[str, Value], ...]
+    params: Mapping[str, Value]
+    candidates: Mapping[int, tuple[int, ...]]
+    disc: tuple[tuple[float, float], float] | None
+
+    def signatures(
+        self, relevant: tuple[frozenset[str], ...]
+    ) -> Iterator[tuple[Signature, dict[int, tuple[int, ...]]]]:
+        """Candidates split by what is observed of them, as far as it matters; one signature in most datasets.
+
+        Raises:
+            Exhausted: There are too many combinations.
+        """
+        choices: list[list[tuple[frozenset[str], tuple[int, ...]]]] = []
+        split: dict[tuple[frozenset[str], tuple[int, ...]], list[tuple[frozenset[str], tuple[int, ...]]]] = {}
+        for index, names in enumerate(relevant):
+            key = names, self.candidates.get(index, (self.ego,))
+            if key not in split:
+                by_set: dict[frozenset[str], list[int]] = {}
+                for number in key[1]:
+                    by_set.setdefault(names.intersection(self.seen[number]), []).append(number)
+                # what is observed most completely first: the order must not depend on candidates that drop out anyway
+                ordered = sorted(by_set.items(), key=_completeness) if len(by_set) > 1 else by_set.items()
+                split[key] = [(names_, tuple(numbers)) for names_, numbers in ordered]
+            choices.append(split[key])
+        params = frozenset(self.params)
+        for count, chosen in enumerate(itertools.product(*choices)):
+            if count >= _MOST_SIGNATURES:
+                raise Exhausted
+            yield (*(names for names, _ in chosen), params), {i: numbers for i, (_, numbers) in enumerate(chosen)}
+
+
+def _completeness(entry: tuple[frozenset[str], list[int]]) -> tuple[int, list[str]]:
+    return -len(entry[0]), sorted(entry[0])
+
+
+def egos(scenario: Scenario, label: Label, options: MatchOptions) -> list[int]:
+    """Numbers of the things that may play the ego: the label's own, or any of its class; none where there is none."""
+    own = [0] if label.has_ego else []
+    if options.ego == "label":
+        return own
+    wanted = scenario.objects[scenario.ego].category
+    return own + [
+        number for number, each in enumerate(label.objects, 1) if class_matches(wanted, each.category, options.classes)
+    ]
+
+
+def find_candidates(
+    scenario: Scenario,
+    label: Label,
+    ego: int,
+    options: MatchOptions,
+    given: Mapping[str, str],
+    among: Candidates | None = None,
+) -> Cast | Cause:
+    """The cast for one choice of ego, or what is lacking.
+
+    Args:
+        scenario: The scenario.
+        label: The label.
+        ego: Number of the thing that plays the ego.
+        options: The options.
+        given: Ids of label objects that are known to play objects, by the objects' names.
+        among: What is known of who may play whom, for the label's own ego.
+    """
+    candidates = candidates_of(scenario, label, ego, options, given, among)
+    short = _short(candidates)
+    if short is not None:
+        thing, count = scenario.objects[short], len(candidates[short])
+        detail = f"only {count} {thing.category}" if count else f"no {thing.category}"
+        return Cause(f"{thing.name}.class", detail, thing.span, (short,))
+    if options.exact:
+        spare = len(_free(label, ego, options)) - len(candidates)
+        if spare:
+            return Cause("--exact", f"{spare} label objects are left over")
+    things = (label.ego, *label.objects)
+    disc = None if options.radius is None else ((things[ego].x, things[ego].y), options.radius)
+    return Cast(label, ego, tuple(map(observe, things)), observe_params(label), candidates, disc)
+
+
+def candidates_of(
+    scenario: Scenario,
+    label: Label,
+    ego: int,
+    options: MatchOptions,
+    given: Mapping[str, str],
+    among: Candidates | None = None,
+) -> dict[int, tuple[int, ...]]:
+    """For each object but the scenario's ego, the numbers of the label objects of its class; as `find_candidates`."""
+    free = _free(label, ego, options)
+    of_class: dict[str, tuple[int, ...]] = {}
+    candidates: dict[int, tuple[int, ...]] = {}
+    for thing in scenario.objects:
+        if thing.index == scenario.ego:
+            continue
+        found = of_class.get(thing.category)
+        if found is None:
+            found = tuple([number for number, kind in free if class_matches(thing.category, kind, options.classes)])
+            of_class[thing.category] = found
+        if thing.name in given:
+            wanted = given[thing.name]
+            found = tuple([number for number in found if number and label.objects[number - 1].id == wanted])
+        if among is not None and thing.index in among:
+            found = tuple([number for number in among[thing.index] if number in found])
+        candidates[thing.index] = found
+    return candidates
+
+
+def _free(label: Label, ego: int, options: MatchOptions) -> list[tuple[int, str]]:
+    """The numbers and classes of the things within the radius that may play others than the ego."""
+    things = (label.ego, *label.objects)
+    first = 1 if options.ego == "label" or not label.has_ego else 0
+    numbers = [number for number in range(first, len(things)) if number != ego]
+    if options.radius is not None:
+        x, y, reach = things[ego].x, things[ego].y, options.radius
+        numbers = [n for n in numbers if (things[n].x - x) ** 2 + (things[n].y - y) ** 2 <= reach * reach]
+    return [(number, things[number].category) for number in numbers]
+
+
+def _short(candidates: Mapping[int, tuple[int, ...]]) -> int | None:
+    """An object for which there is no label object left, if there is one."""
+    slots = [Slot(index, options) for index, options in candidates.items()]
+    empty = next((slot.name for slot in slots if not slot.candidates), None)
+    if empty is None and matchable(slots) is None:
+        return min(candidates, key=lambda index: len(candidates[index]))
+    return empty

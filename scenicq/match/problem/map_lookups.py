@@ -1,0 +1,61 @@
+"""What the map says of the places where the objects of labels are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scenicq.geometry.membership import contains, contains_many
+from scenicq.geometry.regions import Region
+from scenicq.geometry.road_direction import RoadDirection
+
+__all__ = ["XY", "Disc", "MapLookups"]
+
+Disc = tuple[tuple[float, float], float]
+"""The area that is looked at: centre and radius."""
+XY = tuple[float, float]
+
+
+@dataclass(eq=False, slots=True)
+class MapLookups:
+    """What the map says of places, looked up for many of them together.
+
+    Attributes:
+        directions: The headings that each field allows, by place.
+        inside: Whether a place lies in each region.
+    """
+
+    directions: dict[RoadDirection, dict[XY, tuple[float, ...]]] = field(
+        default_factory=dict["RoadDirection", "dict[XY, tuple[float, ...]]"]
+    )
+    inside: dict[int, tuple[Region, dict[XY, bool]]] = field(
+        default_factory=dict["int", "tuple[Region, dict[XY, bool]]"]
+    )
+
+    def look_up(self, fields: Iterable[RoadDirection], regions: Iterable[Region], places: Iterable[XY]) -> None:
+        """Look up places in fields and regions."""
+        wanted = list(dict.fromkeys(places))
+        if not wanted:
+            return
+        xy = np.array(wanted)
+        for one in fields:
+            self.directions.setdefault(one, {}).update(zip(wanted, one.values_many(xy), strict=True))
+        for region in regions:
+            found = contains_many(region, xy).tolist()
+            self.inside.setdefault(id(region), (region, {}))[1].update(zip(wanted, found, strict=True))
+
+    def allowed(self, one: RoadDirection, place: XY) -> tuple[float, ...]:
+        """The headings that a field allows at a place."""
+        known = self.directions.setdefault(one, {})
+        if place not in known:
+            known[place] = one.values(*place)
+        return known[place]
+
+    def within(self, region: Region, place: XY) -> bool:
+        """Whether a place lies in a region."""
+        known = self.inside.setdefault(id(region), (region, {}))[1]
+        if place not in known:
+            known[place] = contains(region, *place)
+        return known[place]

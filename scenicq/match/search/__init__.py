@@ -1,0 +1,1 @@
+"""Who plays which role: pruning of candidates and search of a correspondence."""

@@ -1,0 +1,110 @@
+"""Groups decided for given label objects, each question once.
+
+The answers are kept by the shape of the group and the label objects in its roles: what is decided for one pedestrian of
+forty-eight holds for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.groups import PARAMS, Group
+from scenicq.forest.nodes import Value
+from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.decide.decomposition import decide_decomposed
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.candidates import Cast
+from scenicq.match.problem.conditioned import Item, condition_group
+from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.problem.radius import within_radius
+from scenicq.match.search.group_plan import GroupPlan
+
+__all__ = ["Asker", "GroupCache", "translated"]
+
+
+class Asker(Protocol):
+    """Puts groups to a solver."""
+
+    def __call__(self, items: Sequence[Sequence[Item]]) -> Outcome:
+        """Decide groups together."""
+        ...
+
+
+@dataclass(eq=False, slots=True)
+class GroupCache:
+    """What has been decided of one label.
+
+    Attributes:
+        options: The options.
+        cast: The label and who may play whom.
+        ask: The solver.
+        places: What is known of places of the map.
+    """
+
+    options: MatchOptions
+    cast: Cast
+    ask: Asker
+    places: MapLookups
+    _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
+        default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
+    )
+
+    def items(self, group: Group, assignment: Mapping[int, int]) -> list[Item]:
+        """The constraints of a group given the label (algorithm 1, line 11).
+
+        Raises:
+            CannotEvaluate: Geometry cannot tell the value of an expression.
+        """
+        observed: dict[tuple[int, str], Value] = {
+            (index, name): value for index in group.objects for name, value in self.cast.seen[assignment[index]].items()
+        }
+        observed.update({(PARAMS, name): value for name, value in self.cast.params.items()})
+        items = condition_group(group, observed)
+        return items if self.cast.disc is None else within_radius(items, *self.cast.disc)
+
+    def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
+        """What is decided for the things in a group's roles, said of a group of the same shape (see `translated`)."""
+        key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
+        known = self._known.get(key)
+        if known is None:
+            outcome = self._in_closed_form(plan, assignment) or self._by_ladder(plan.group, assignment)
+            known = self._known[key] = (plan.group, outcome)
+        return known
+
+    def _in_closed_form(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
+        """What a closed form says, if it is clear."""
+        if plan.quick is None or self.options.method != "auto":
+            return None
+        seen = self.cast.seen
+        return plan.quick.decide(
+            lambda index, name: seen[assignment[index]][name], self.cast.disc, self.options.tolerance, self.places
+        )
+
+    def _by_ladder(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
+        try:
+            items = self.items(group, assignment)
+            if self.options.method == "smt":
+                return self.ask([items])
+            outcome = decide_decomposed(items, self.options.tolerance)
+            return self.ask([items]) if isinstance(outcome, Undecided) else outcome
+        except CannotEvaluate as error:
+            return Undecided(group.constraints[0], f"unsupported: {error}")
+
+
+def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:
+    """What was decided for a group, said of another one of the same shape."""
+    source, outcome = decided
+    if source is target:
+        return outcome
+    if isinstance(outcome, Satisfied):
+        pairs = zip(source.variables, target.variables, strict=True)
+        return Satisfied(
+            {new.identity: outcome.values[old.identity] for old, new in pairs if old.identity in outcome.values}
+        )
+    constraint = target.constraints[source.constraints.index(outcome.constraint)]
+    return (
+        Refuted(constraint, outcome.detail) if isinstance(outcome, Refuted) else Undecided(constraint, outcome.reason)
+    )

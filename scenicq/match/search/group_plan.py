@@ -1,0 +1,120 @@
+"""What matching can know of a scenario before it sees a label: its groups, sorted, with their shapes and twins."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+
+from scenicq.forest.groups import Group
+from scenicq.forest.scenario import BuiltIn, Scenario
+from scenicq.forest.walk import features
+from scenicq.match.decide.closed_form import ClosedForm, closed_form_of
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.constraints import Signature, build_groups
+from scenicq.match.problem.subgroups import parts_of
+from scenicq.match.problem.symmetry import Shape, interchangeable, shape_of
+from scenicq.match.search.interval_relaxation import Steps, steps_of
+
+__all__ = ["GroupPlan", "MatchPlan", "make_plan", "relevant_properties"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroupPlan:
+    """A group with its shape.
+
+    Attributes:
+        group: The group.
+        kind: Number of its shape: equal for groups that ask the same question of their roles.
+        roles: The objects that it is about, the ego left out, in the order in which the question speaks of them.
+        quick: Its closed form, if it has one.
+        parts: What a group about many objects demands of one or two of them.
+        steps: In which its necessary conditions are evaluated.
+    """
+
+    group: Group
+    kind: int
+    roles: tuple[int, ...]
+    quick: ClosedForm | None = None
+    parts: tuple[GroupPlan, ...] = ()
+    steps: Steps = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MatchPlan:
+    """A scenario's groups for one signature, sorted by how many objects they are about.
+
+    Attributes:
+        groups: All of them, in dependency order.
+        ego_only: Those about the ego and parameters alone.
+        unary: Those about one object and the ego, by that object.
+        joint: Those about several objects.
+        twins: For an object, an earlier one that is interchangeable with it.
+        links: For an object, those that it shares a group with.
+        signature: What is observed.
+    """
+
+    groups: tuple[GroupPlan, ...]
+    ego_only: tuple[GroupPlan, ...]
+    unary: Mapping[int, tuple[GroupPlan, ...]]
+    joint: tuple[GroupPlan, ...]
+    twins: Mapping[int, int]
+    links: Mapping[int, frozenset[int]]
+    signature: Signature
+
+
+def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[frozenset[str], ...]:
+    """For each object, the properties for which it matters whether a label observes them."""
+    used: dict[int, set[str]] = {thing.index: {"position", "heading"} for thing in scenario.objects}
+    roots = [given.value for thing in scenario.objects for given in thing.properties.values()]
+    roots += [requirement.condition for requirement in scenario.requirements]
+    roots += [given.value for given in scenario.params.values()]
+    for index, name in features(*roots):
+        used[index].add(name)
+    for thing in scenario.objects:
+        used[thing.index].update(name for name, given in thing.properties.items() if given.explicit)
+        if BuiltIn.COLLISION in options.enforce:
+            used[thing.index].update(("width", "length"))
+    return tuple(frozenset(used[thing.index]) for thing in scenario.objects)
+
+
+def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, kinds: dict[Hashable, int]) -> MatchPlan:
+    """Analyse a scenario for what is observed.
+
+    Args:
+        scenario: The scenario.
+        signature: What is observed.
+        options: Which built-in requirements are in force, which parameters are ignored.
+        kinds: Numbers of shapes, extended as new ones are met.
+    """
+    shapes: list[Shape] = []
+    groups: list[GroupPlan] = []
+    links: dict[int, set[int]] = {}
+    for group in build_groups(scenario, signature, options):
+        shape = shape_of(group, scenario.ego)
+        shapes.append(shape)
+        parts: list[GroupPlan] = []
+        for part in parts_of(group, scenario.ego):
+            small = shape_of(part, scenario.ego)
+            number = kinds.setdefault(small.key, len(kinds))
+            parts.append(GroupPlan(part, number, small.roles, closed_form_of(part)))
+        number = kinds.setdefault(shape.key, len(kinds))
+        groups.append(GroupPlan(group, number, shape.roles, closed_form_of(group), tuple(parts), steps_of(group)))
+        paired = [part.roles for part in parts if len(part.roles) > 1]
+        # of a chain, the next one is what can be checked next
+        chained = set(shape.roles) == {index for roles in paired for index in roles}
+        for roles in paired if chained else [shape.roles]:
+            for index in roles:
+                links.setdefault(index, set()).update(roles)
+    unary: dict[int, list[GroupPlan]] = {}
+    for each in groups:
+        if len(each.roles) == 1:
+            unary.setdefault(each.roles[0], []).append(each)
+    return MatchPlan(
+        tuple(groups),
+        tuple(each for each in groups if not each.roles),
+        {index: tuple(found) for index, found in unary.items()},
+        tuple(each for each in groups if len(each.roles) > 1),
+        interchangeable(scenario, shapes),
+        {index: frozenset(others - {index}) for index, others in links.items()},
+        signature,
+    )

@@ -1,0 +1,390 @@
+"""One label with one of its things as the ego: the body of algorithm 1.
+
+Conditions about one object and the ego leave each object its candidates; necessary conditions of pairs thin them out;
+the search then finds correspondences that satisfy the groups about several objects. Where there is little to try, it is
+tried before anything is thinned out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import cast
+
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.groups import Constraint, Group
+from scenicq.forest.scenario import Scenario
+from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.decide.decomposition import decide_decomposed
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.candidates import Cast
+from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.search.arc_consistency import thinned
+from scenicq.match.search.backtracking import Answer, Exhausted, Reporter, Slot, find_assignments
+from scenicq.match.search.group_cache import Asker, GroupCache, translated
+from scenicq.match.search.group_plan import GroupPlan, MatchPlan
+
+_FEW = 64
+"""Decisions in closed form that cost less than arrays; steps of a search that cost hardly anything."""
+_FEW_SLOTS = 8
+_FEW_TRIES = 128
+"""Candidates, counted once for each condition on them, that are looked at before anything is thinned out."""
+
+__all__ = ["Failure", "LabelSearch", "Solution"]
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """A correspondence that satisfies all groups, and how each was satisfied."""
+
+    assignment: Mapping[int, int]
+    outcomes: tuple[tuple[GroupPlan, Satisfied], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """What excluded a partial correspondence, or left it open.
+
+    Attributes:
+        depth: How far the correspondence had come.
+        group: The group that was not satisfied.
+        outcome: What was found of it.
+        assignment: The partial correspondence.
+    """
+
+    depth: int
+    group: Group
+    outcome: Refuted | Undecided
+    assignment: Mapping[int, int]
+
+    @property
+    def constraint(self) -> Constraint:
+        """The constraint to blame."""
+        return self.outcome.constraint
+
+
+@dataclass(eq=False)
+class LabelSearch:
+    """The search for correspondences of one label.
+
+    Attributes:
+        scenario: The scenario.
+        options: The options.
+        cast: The label and who may play whom.
+        ask: The solver.
+        reporter: Watches the search.
+        places: What is known of places of the map.
+        failure: What excluded the correspondence that came furthest.
+        undecided: What kept a correspondence that was not excluded from being a match.
+    """
+
+    scenario: Scenario
+    options: MatchOptions
+    cast: Cast
+    ask: Asker
+    reporter: Reporter | None = None
+    places: MapLookups = field(default_factory=MapLookups)
+    failure: Failure | None = None
+    undecided: Failure | None = None
+    _decisions: GroupCache = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Begin with nothing decided."""
+        self._decisions = GroupCache(self.options, self.cast, self.ask, self.places)
+
+    def solutions(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
+        """Every correspondence that matches, interchangeable objects in one order; what is left open is noted.
+
+        Args:
+            plan: The scenario's groups for what is observed of the candidates.
+            candidates: For each object, the things that it may be.
+
+        Raises:
+            Exhausted: The search takes more steps than it may.
+        """
+        if self.options.method == "monolithic":
+            yield from self._monolithic(plan, candidates)
+        else:
+            yield from self._modular(plan, candidates)
+
+    # --- deciding groups
+
+    def items(self, group: Group, assignment: Mapping[int, int]) -> list[Item]:
+        """The constraints of a group given the label (algorithm 1, line 11).
+
+        Raises:
+            CannotEvaluate: Geometry cannot tell the value of an expression.
+        """
+        return self._decisions.items(group, assignment)
+
+    def decide(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome:
+        """Decide a group for the things in its roles, or remember what was decided for them."""
+        return translated(self._decisions.of(plan, assignment), plan.group)
+
+    def _judge(self, plan: GroupPlan, assignment: Mapping[int, int], depth: int) -> Answer:
+        """Decide a group, and remember what failed furthest."""
+        decided = self._decisions.of(plan, assignment)
+        if isinstance(decided[1], Satisfied):
+            return Answer.YES
+        if isinstance(decided[1], Undecided):
+            return Answer.UNKNOWN
+        if self.failure is None or depth > self.failure.depth:
+            self.failure = Failure(
+                depth, plan.group, cast("Refuted", translated(decided, plan.group)), dict(assignment)
+            )
+        return Answer.NO
+
+    def _fail(self, failure: Failure) -> None:
+        if self.failure is None or failure.depth > self.failure.depth:
+            self.failure = failure
+
+    def _blamed(self, plan: GroupPlan, assignment: Mapping[int, int]) -> frozenset[int]:
+        """The roles that keep a group from being satisfied: one or two of them, if a part of it says so."""
+        for part in plan.parts:
+            if isinstance(self.decide(part, assignment), Refuted):
+                return frozenset(part.roles)
+        return frozenset(plan.roles)
+
+    # --- the query paper's algorithm 1
+
+    def _modular(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
+        ego = {self.scenario.ego: self.cast.ego}
+        answers = [self._judge(group, ego, 1) for group in plan.ego_only]
+        if Answer.NO in answers:
+            return
+        wanted = {index: numbers for index, numbers in candidates.items() if index != self.scenario.ego}
+        firm = Answer.UNKNOWN not in answers
+        given: list[dict[int, int]] = []
+        if firm and self.options.method == "auto" and _little(plan, wanted):
+            failure = self.failure
+            for assignment in self._at_once(plan, wanted, ego):
+                given.append(assignment)
+                yield self._solution(plan, assignment)
+            # what excludes a label is told by all of the conditions
+            self.failure = failure
+        judged = self._filter(plan, wanted, ego)
+        if judged is None:
+            return
+        slots, doubtful = judged
+        found = bool(given)
+        if firm:
+            for assignment in self._firm(plan, _without(slots, doubtful), ego):
+                if assignment not in given:
+                    found = True
+                    yield self._solution(plan, assignment)
+        if not found and self.undecided is None:
+            # nothing matches; if some correspondence fails nowhere either, it may match
+            open_one = next(self._search(plan, slots, ego, accept_unknown=True), None)
+            if open_one is not None:
+                self.undecided = self._first_open(plan, open_one)
+
+    def _at_once(
+        self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+    ) -> Iterator[dict[int, int]]:
+        """The first correspondences in the order of the program, as far as few steps lead to them."""
+        judged = self._judged(plan, wanted, ego)
+        if judged is None:
+            return
+        try:
+            yield from self._search(plan, _without(*judged), ego, accept_unknown=False, budget=_FEW)
+        except Exhausted:
+            return
+
+    def _filter(
+        self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+    ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
+        """Candidates that pass the groups about them and the ego alone, and which of them are doubtful."""
+        left = wanted
+        if self.options.method == "auto" and not _easy(plan, wanted):
+            left, failed = thinned(plan, wanted, self.cast, self.scenario.ego, self.options.tolerance)
+            if failed is not None:
+                self._blame_thinning(*failed, wanted, ego)
+                return None
+        return self._judged(plan, left, ego)
+
+    def _judged(
+        self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+    ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
+        """The same, candidate by candidate."""
+        slots: list[Slot] = []
+        doubtful: set[tuple[int, int]] = set()
+        known: dict[tuple[tuple[int, ...], tuple[int, ...]], tuple[tuple[int, ...], tuple[int, ...]]] = {}
+        for index, numbers in wanted.items():
+            groups = plan.unary.get(index, ())
+            # of objects about which the same is asked one is enough
+            key = tuple([group.kind for group in groups]), numbers
+            if key not in known:
+                answers = [(number, self._passes(groups, {**ego, index: number})) for number in numbers]
+                known[key] = (
+                    tuple([number for number, answer in answers if answer is not Answer.NO]),
+                    tuple([number for number, answer in answers if answer is Answer.UNKNOWN]),
+                )
+            kept, open_ones = known[key]
+            if not kept:
+                return None
+            doubtful.update((index, number) for number in open_ones)
+            slots.append(Slot(index, kept))
+        return slots, doubtful
+
+    def _blame_thinning(
+        self, index: int, blamed: GroupPlan, candidates: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
+    ) -> None:
+        """Note why an object has no candidate left; for the wording the first one is looked at without a solver."""
+        if len(blamed.roles) > 1:
+            outcome = Refuted(blamed.group.constraints[0], "no pair of label objects comes close")
+            self._fail(Failure(9, blamed.group, outcome, ego))
+            return
+        assignment = {**ego, index: candidates[index][0]}
+        try:
+            found = decide_decomposed(self.items(blamed.group, assignment), self.options.tolerance)
+        except CannotEvaluate:
+            found = None
+        outcome = found if isinstance(found, Refuted) else Refuted(blamed.group.constraints[0])
+        self._fail(Failure(2, blamed.group, outcome, assignment))
+
+    def _passes(self, groups: Sequence[GroupPlan], assignment: Mapping[int, int]) -> Answer:
+        answer = Answer.YES
+        for depth, group in enumerate(groups):
+            one = self._judge(group, assignment, 2 + depth)
+            if one is Answer.NO:
+                return one
+            answer = one if one is Answer.UNKNOWN else answer
+        return answer
+
+    def _firm(self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int]) -> Iterator[dict[int, int]]:
+        """Correspondences that satisfy all groups.
+
+        Few objects are searched for in the order of the program: then the first correspondence does not depend on how
+        many candidates are known not to pass.
+        """
+        given: list[dict[int, int]] = []
+        if len(slots) <= _FEW_SLOTS:
+            try:
+                for assignment in self._search(plan, slots, ego, accept_unknown=False, budget=_FEW):
+                    given.append(assignment)
+                    yield assignment
+                return
+            except Exhausted:
+                pass
+        for assignment in self._search(plan, slots, ego, accept_unknown=False):
+            if assignment not in given:
+                yield assignment
+
+    def _search(
+        self,
+        plan: MatchPlan,
+        slots: list[Slot],
+        ego: Mapping[int, int],
+        *,
+        accept_unknown: bool,
+        budget: int | None = None,
+    ) -> Iterator[dict[int, int]]:
+        due: dict[int, list[tuple[GroupPlan, frozenset[int]]]] = {}
+        parts: dict[int, list[tuple[int, GroupPlan, frozenset[int]]]] = {}
+        wary: set[int] = set()
+        if self.options.method == "auto":
+            for group in plan.joint:
+                for part in group.parts:
+                    for index in part.roles:
+                        parts.setdefault(index, []).append((group.kind, part, frozenset(part.roles)))
+        for group in plan.joint:
+            for index in group.roles:
+                due.setdefault(index, []).append((group, frozenset(group.roles)))
+        options = {slot.name: slot.candidates for slot in slots}
+
+        def check(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+            for whole, part, roles in parts.get(slot, ()):
+                ready = whole in wary and roles <= assignment.keys()
+                if ready and self._judge(part, assignment, 10 + len(assignment)) is Answer.NO:
+                    return Answer.NO, roles
+            for group, roles in due.get(slot, ()):
+                if roles <= assignment.keys():
+                    answer = self._judge(group, assignment, 10 + len(assignment))
+                    if answer is Answer.NO:
+                        # from now on its parts are looked at first
+                        wary.add(group.kind)
+                        return answer, self._blamed(group, assignment) if parts else roles
+                    if answer is Answer.UNKNOWN and not accept_unknown:
+                        return Answer.NO, roles
+            return Answer.YES, frozenset()
+
+        return find_assignments(
+            slots,
+            check,
+            fixed=ego,
+            twins={one: other for one, other in plan.twins.items() if options[one] == options[other]},
+            links=plan.links,
+            budget=self.options.budget if budget is None else min(budget, self.options.budget),
+            reporter=self.reporter,
+            in_order=budget is not None,
+        )
+
+    def _solution(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Solution:
+        outcomes = [(group, self.decide(group, assignment)) for group in plan.groups]
+        return Solution(assignment, tuple((group, found) for group, found in outcomes if isinstance(found, Satisfied)))
+
+    def _first_open(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Failure | None:
+        for group in plan.groups:
+            outcome = self.decide(group, assignment)
+            if isinstance(outcome, Undecided):
+                return Failure(0, group.group, outcome, assignment)
+        return None
+
+    # --- the query paper's baseline (section 5.1): one formula for all features of each correspondence
+
+    def _monolithic(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
+        ego = {self.scenario.ego: self.cast.ego}
+        slots = [Slot(index, options) for index, options in candidates.items() if index != self.scenario.ego]
+        for assignment in find_assignments(slots, _accept, fixed=ego, budget=self.options.budget):
+            outcome = self._together(plan, assignment)
+            if isinstance(outcome, Satisfied):
+                yield Solution(assignment, tuple((group, outcome) for group in plan.groups))
+                continue
+            group = next(each.group for each in plan.groups if outcome.constraint in each.group.constraints)
+            failure = Failure(1, group, outcome, assignment)
+            if isinstance(outcome, Refuted):
+                self._fail(failure)
+            elif self.undecided is None:
+                self.undecided = failure
+
+    def _together(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Outcome:
+        if not plan.groups:
+            return Satisfied({})
+        try:
+            return self.ask([self.items(each.group, assignment) for each in plan.groups])
+        except CannotEvaluate as error:
+            return Undecided(plan.groups[0].group.constraints[0], f"unsupported: {error}")
+
+
+def _easy(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
+    """Whether all pairs of candidates are decided faster than they are thinned out.
+
+    Conditions on known values alone are left to the thinning, which tells what no candidate satisfies.
+    """
+    pairs = 0
+    for group in plan.groups:
+        if group.quick is None or not group.group.variables:
+            return False
+        pairs += math.prod(len(candidates[index]) for index in group.roles)
+    return pairs <= _FEW
+
+
+def _little(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
+    """Whether there is little to try, all of it in closed form, in the order of the program."""
+    if len(candidates) > _FEW_SLOTS or any(group.quick is None for group in plan.groups):
+        return False
+    tries = {(group.kind, tuple([candidates[index] for index in group.roles])) for group in plan.groups if group.roles}
+    return sum(len(numbers) for _, options in tries for numbers in options) <= _FEW_TRIES
+
+
+def _without(slots: list[Slot], doubtful: set[tuple[int, int]]) -> list[Slot]:
+    """The slots without doubtful candidates."""
+    if not doubtful:
+        return slots
+    return [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in doubtful)) for s in slots]
+
+
+def _accept(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+    return Answer.YES, frozenset()

@@ -1,0 +1,1 @@
+"""Queries as they run: blocks, workers, shards, results."""

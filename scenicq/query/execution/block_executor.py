@@ -1,0 +1,91 @@
+"""Who decides the blocks of a query: this process, others, or others once it is clear that it takes long."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from scenicq.match.verdict import Cause, Unknown
+from scenicq.processes import Lost, Work, Workers, as_many_as_pay
+from scenicq.query.execution.block_matcher import Decided, Decider, every_label
+from scenicq.query.execution.results import Result
+from scenicq.query.prefilter.executor import Block
+from scenicq.store.dataset import Dataset
+
+__all__ = ["BlockExecutor"]
+
+_PAYS_S = 3.0
+"""Seconds of work that must be left for processes to be worth starting: it takes each about one."""
+_TRIES = 3
+"""Processes that a block, and then a frame alone, may cost."""
+
+
+class BlockExecutor:
+    """Decides blocks, in order whoever does it; a context manager.
+
+    A process that dies costs nothing but its block's time. Of a block that kills every process which takes it, the
+    frames that do so are found by halving, and are unknown.
+    """
+
+    def __init__(
+        self, dataset: Dataset, jobs: int | None, decider: Decider, start: Callable[..., Work[Block, Decided]],
+        setup: tuple[Any, ...],
+    ) -> None:  # fmt: skip
+        """Prepare; no process starts yet.
+
+        Args:
+            dataset: The dataset.
+            jobs: Processes; 1 for this one alone, None for as many as pays.
+            decider: Decides in this process.
+            start: Makes what decides in another; see `Workers`.
+            setup: Its arguments.
+        """
+        self.jobs = as_many_as_pay() if jobs is None else jobs
+        self._asked = jobs is not None
+        self._dataset, self._decider = dataset, decider
+        self._workers: Workers[Block, Decided] = Workers(self.jobs, start, setup)
+        self._started = False
+        self._open = ExitStack()
+
+    def __enter__(self) -> BlockExecutor:
+        """Nothing is started yet."""
+        self._open.enter_context(self._decider)
+        self._open.enter_context(self._workers)
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        """End all processes."""
+        self._open.__exit__(*error)
+
+    def decide(self, blocks: Sequence[Block]) -> Iterator[Decided]:
+        """Decide blocks; each is to be taken before the next is asked for."""
+        alone = self.jobs <= 1 or not (self._asked or self._started)
+        done, began = 0, time.monotonic()
+        while alone and done < len(blocks):
+            yield self._decider.decide(blocks[done])
+            done += 1
+            left_s = (time.monotonic() - began) / done * (len(blocks) - done)
+            alone = self.jobs <= 1 or left_s < _PAYS_S
+        if done < len(blocks):
+            self._started = True
+            yield from self._elsewhere(blocks[done:])
+
+    def _elsewhere(self, blocks: Iterable[Block], tries: int = _TRIES) -> Iterator[Decided]:
+        """Decide blocks side by side, a bounded number ahead."""
+        for block, found in self._workers.run(blocks, tries=tries):
+            yield from self._halves(block) if isinstance(found, Lost) else (found,)
+
+    def _halves(self, block: Block) -> Iterator[Decided]:
+        if block.end - block.first > 1:
+            for half in block.halves():
+                # a half is lost at once: only what is left to blame, a frame, gets more chances
+                yield from self._elsewhere([half], tries=1 if half.end - half.first > 1 else _TRIES)
+            return
+        for label in every_label(self._dataset, block):
+            lost = Unknown("crash", Cause("process", "every process that matched this frame died"))
+            result = Result(label.frame, label.recording, label.timestamp_us, lost, label.sensors)
+            yield Decided(np.full(1, -1, np.int16), [[result]], [])

@@ -1,0 +1,155 @@
+"""One block of a query decided: prefilter, then the matcher on what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from itertools import islice
+
+import duckdb
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.forest.scenario import Scenario
+from scenicq.geometry.network import Network
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.candidates import Candidates
+from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.verdict import Verdict
+from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.results import Result
+from scenicq.query.prefilter.executor import Block, Candidate, candidates, names, run_prefilter
+from scenicq.query.prefilter.plan import Plan, make_plan
+from scenicq.store.dataset import Dataset
+from scenicq.store.labels import Label
+
+_FIRST_BATCH, _BATCH = 16, 512
+"""Labels whose places are looked up together: few until it is known what matters."""
+
+__all__ = ["CompiledMap", "Decided", "Decider", "every_label"]
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledMap:
+    """A scenario over one map.
+
+    Attributes:
+        scenario: The scenario.
+        network: The map.
+        plan: The prefilter.
+    """
+
+    scenario: Scenario
+    network: Network
+    plan: Plan
+
+    @classmethod
+    def of(cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool) -> CompiledMap:
+        """With its prefilter, or one that excludes nothing."""
+        plan = make_plan(scenario, network, options) if prefilter else Plan(network.name, (), (), ())
+        return cls(scenario, network, plan)
+
+
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """What became of a block.
+
+    Attributes:
+        missed: For each frame in order the number of the plan's step that excludes it, -1 for candidates.
+        found: For each candidate in order its results, at least one.
+        names: Frame, recording and timestamp of every frame, if asked for.
+    """
+
+    missed: NDArray[np.int16]
+    found: Iterator[list[Result]] | list[list[Result]]
+    names: list[tuple[str, str, int]]
+
+
+@dataclass(slots=True)
+class Decider:
+    """What a process keeps between blocks.
+
+    Attributes:
+        dataset: The dataset.
+        options: Of the matcher.
+        solver: By name.
+        world: Compiles the program for a map; called once a map.
+        threads: Of the database.
+        all_matches: Whether every correspondence is a result.
+        every: Whether the names of excluded frames are wanted.
+    """
+
+    dataset: Dataset
+    options: MatchOptions
+    solver: str
+    world: Callable[[str], CompiledMap]
+    threads: int | None
+    all_matches: bool
+    every: bool
+    _worlds: dict[str, tuple[CompiledMap, Matcher]] = field(default_factory=dict["str", "tuple[CompiledMap, Matcher]"])
+    _open: ExitStack = field(default_factory=ExitStack)
+    _connection: duckdb.DuckDBPyConnection | None = None
+    _solver: LazySolver | None = None
+
+    def __enter__(self) -> Decider:
+        """Connect when needed."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let go of the database and the solver."""
+        self._open.close()
+
+    def decide(self, block: Block) -> Decided:
+        """Decide a block; its results come while they are taken, before the next block.
+
+        Raises:
+            ScenarioError: The program does not fit the map.
+        """
+        if self._connection is None:
+            self._connection = self.dataset.connect(threads=self.threads)
+            self._open.callback(self._connection.close)
+            self._solver = self._open.enter_context(LazySolver(self.solver))
+        if block.map not in self._worlds:
+            world = self.world(block.map)
+            self._worlds[block.map] = world, Matcher(world.scenario, self.options, self._solver)
+        world, matcher = self._worlds[block.map]
+        if not world.plan.stages:
+            labels = [Candidate(label, None) for label in every_label(self.dataset, block)]
+            return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
+        missed = run_prefilter(self.dataset, self._connection, world.plan, block)
+        named = names(self.dataset, self._connection, block) if self.every else []
+        left = candidates(self._connection, world.plan) if (missed < 0).any() else iter(())
+        return Decided(missed, self._matched(matcher, left), named)
+
+    def _matched(self, matcher: Matcher, left: Iterator[Candidate]) -> Iterator[list[Result]]:
+        """The results of labels, whose places are looked up so many at a time."""
+        size = _FIRST_BATCH
+        while batch := list(islice(left, size)):
+            labels = [(each.label, each.among) for each in batch]
+            places = matcher.look_up(labels)
+            verdicts: Iterator[list[Verdict]]
+            if self.all_matches:
+                verdicts = (_every_match(matcher, label, among, places) for label, among in labels)
+            else:
+                verdicts = ([verdict] for verdict in matcher.match_all(labels, places))
+            for (label, _), found in zip(labels, verdicts, strict=True):
+                yield [Result(label.frame, label.recording, label.timestamp_us, each, label.sensors) for each in found]
+            size = _BATCH
+
+
+def _every_match(matcher: Matcher, label: Label, among: Candidates | None, places: MapLookups) -> list[Verdict]:
+    """Every correspondence by which a label matches, or else why none does."""
+    matches: list[Verdict] = [*matcher.matches(label, among=among, places=places)]
+    return matches or [matcher.match(label, among=among, places=places)]
+
+
+def every_label(dataset: Dataset, block: Block) -> Iterator[Label]:
+    """The labels of a block, read without the database."""
+    first, last = block.recordings or ("", None)
+    return (
+        label
+        for label in dataset.labels_at(block.part, block.first, block.end)
+        if label.map == block.map and label.recording >= first and (last is None or label.recording <= last)
+    )

@@ -1,0 +1,150 @@
+"""Pieces of a query on Dask, the extra `scenicq[dask]`: on processes of this machine, or on a cluster.
+
+A cluster of our own listens on the loopback interface only, and takes tasks only from us: what passes between its
+processes is encrypted with keys that live as long as it does.
+"""
+
+# distributed is optional and has hardly any types.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportMissingImports=false, reportUntypedFunctionDecorator=false
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Generator, Iterable, Iterator
+from importlib.util import find_spec
+from itertools import islice
+from typing import Any
+
+from scenicq import __version__
+from scenicq.errors import DataError, Diagnostic
+from scenicq.processes import processors
+from scenicq.query.execution.partitions import Partition
+from scenicq.query.execution.run import Query
+from scenicq.query.execution.shards import Done, Engine, Progress, Question, alone, run_shard
+
+__all__ = ["dask_engine"]
+
+_LOOPBACK = "127.0.0.1"
+_CONNECT_S = 20
+_RETRIES = 2
+"""How often a piece is done again after an error of the operating system, such as a disk that does not answer."""
+
+_LATER = ("`--resume` with `-o FILE` goes on where a query stopped",)
+
+
+def dask_engine(address: str | None = None) -> Engine:
+    """An engine that runs pieces on Dask.
+
+    Args:
+        address: Of a scheduler, such as `tcp://host:8786`, whose workers have this version of scenicq and see the
+            dataset under the same path. By default workers are started on this machine for the time of the query, as
+            many as the query's `jobs` or, if that is None, as there are processors.
+
+    Raises:
+        DataError: option-invalid: Dask is not installed.
+    """
+    missing = [name for name in ("distributed", "cryptography") if find_spec(name) is None]
+    if missing:
+        message = f"`--engine dask` needs the package {missing[0]}, which is not installed"
+        raise DataError(Diagnostic("option-invalid", message, hints=("`pip install 'scenicq[dask]'` adds it",)))
+
+    def run(query: Query, pieces: Iterable[Partition], progress: Progress) -> Generator[tuple[Partition, Done]]:
+        with _quiet(), _client(query, address) as client:
+            for piece, done in _run(client, query, pieces):
+                yield piece, done
+                progress(piece.frames)
+
+    return run
+
+
+@contextlib.contextmanager
+def _quiet() -> Generator[None]:
+    """Dask tells of every worker that dies, on standard error; what matters is told by us."""
+    log = logging.getLogger("distributed")
+    before = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
+
+
+@contextlib.contextmanager
+def _client(query: Query, address: str | None) -> Generator[Any]:
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - optional, and slow to load
+    from distributed.security import Security  # noqa: PLC0415
+
+    if address is not None:
+        try:
+            client = Client(address, timeout=_CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            message = f"no Dask scheduler answers at {address}: {str(error).splitlines()[0]}"
+            raise DataError(Diagnostic("engine-failed", message)) from error
+        with client:
+            yield client
+        return
+    jobs = query.options.jobs or processors()
+    with (
+        tempfile.TemporaryDirectory(prefix="scenicq-dask-", ignore_cleanup_errors=True) as folder,
+        LocalCluster(
+            n_workers=jobs,
+            threads_per_worker=1,
+            host=_LOOPBACK,
+            dashboard_address=f"{_LOOPBACK}:0",
+            worker_dashboard_address=None,
+            security=Security.temporary(),
+            local_directory=folder,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tuple[Partition, Done]]:
+    """Hand out a bounded number of pieces ahead, and take what they give in order."""
+    from distributed import CancelledError, KilledWorker  # noqa: PLC0415
+
+    question = Question.of(query)
+    waiting = iter(pieces)
+    pending: deque[tuple[Partition, Any]] = deque()
+    try:
+        while True:
+            room = 3 * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) - len(pending)
+            for piece in islice(waiting, max(0, room)):
+                pending.append(
+                    (piece, client.submit(_work, question, piece, __version__, pure=False, retries=_RETRIES))
+                )
+            if not pending:
+                return
+            piece, future = pending.popleft()
+            try:
+                done = future.result()
+            except KilledWorker:
+                done = alone(query, piece)
+            future.release()
+            yield piece, done
+    except (OSError, CancelledError) as error:
+        message = f"the Dask cluster has stopped: {getattr(error, 'reason', error)}"
+        raise DataError(Diagnostic("engine-failed", message, hints=_LATER)) from error
+    finally:
+        with contextlib.suppress(Exception):
+            client.cancel([future for _, future in pending], force=True)
+
+
+_known = threading.local()
+
+
+def _work(question: Question, piece: Partition, client_version: str) -> Done:
+    """Run a piece in a worker, which keeps what it has compiled."""
+    if __version__ != client_version:
+        message = f"a worker has version {__version__} of scenicq, the client {client_version}"
+        raise DataError(Diagnostic("engine-failed", message, hints=("install the same version on both",)))
+    if getattr(_known, "fingerprint", None) != question.fingerprint:
+        _known.query, _known.fingerprint = question.query(), question.fingerprint
+    return run_shard(_known.query, piece)

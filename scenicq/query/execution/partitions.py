@@ -1,0 +1,198 @@
+"""Running a query piece by piece: partitions, their files, and putting them together.
+
+A partition is a run of recordings in the order of a query, so the pieces of a dataset are the same for everybody who
+asks for the same number. Each finished piece is one file, written under a temporary name and renamed; whoever runs
+again does what is missing. Any launcher will do: a loop, xargs, an array of cluster jobs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby, pairwise
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, cast
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.query.execution.results import Funnel
+from scenicq.query.execution.run import QueryOptions, Stretch
+from scenicq.store.atomic_files import whole_file
+from scenicq.store.dataset import Dataset
+
+__all__ = ["Gathered", "Partition", "fingerprint", "gather", "is_done", "partitions", "write_partition"]
+
+
+@dataclass(frozen=True, slots=True)
+class Partition:
+    """One piece of a dataset.
+
+    Attributes:
+        number: From 0.
+        count: How many pieces there are.
+        recordings: Its recordings of each map.
+    """
+
+    number: int
+    count: int
+    recordings: Mapping[str, Stretch]
+
+    @property
+    def frames(self) -> int:
+        """How many frames it holds."""
+        return sum(stretch.frames for stretch in self.recordings.values())
+
+
+def partitions(dataset: Dataset, count: int) -> tuple[Partition, ...]:
+    """At most `count` pieces of about the same number of frames; fewer where the dataset has fewer recordings.
+
+    One after the other they hold the frames in the order in which a query finds them: map by map.
+    """
+    with contextlib.closing(dataset.connect()) as connection:
+        rows = connection.execute("SELECT map, recording, count(*) FROM labels GROUP BY ALL").fetchall()
+    runs: list[tuple[str, str, int]] = sorted(rows)
+    total = sum(frames for *_, frames in runs)
+    cuts = [0]
+    seen = 0
+    for number, (*_, frames) in enumerate(runs, 1):
+        seen += frames
+        if seen * count >= total * len(cuts) or number == len(runs):
+            cuts.append(number)
+    pieces = [runs[low:high] for low, high in pairwise(cuts) if high > low]
+    return tuple(Partition(number, len(pieces), _stretches(piece)) for number, piece in enumerate(pieces))
+
+
+def _stretches(runs: Sequence[tuple[str, str, int]]) -> dict[str, Stretch]:
+    found: dict[str, Stretch] = {}
+    for name, group in groupby(runs, key=itemgetter(0)):
+        inside = list(group)
+        found[name] = Stretch(inside[0][1], inside[-1][1], sum(frames for *_, frames in inside))
+    return found
+
+
+def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
+    """A name for the question: pieces of another program, dataset or other options never mix."""
+    tables = {name: [part.sha256 for part in parts] for name, parts in dataset.manifest.tables.items()}
+    asked = asdict(options)
+    asked["match"]["enforce"] = sorted(asked["match"]["enforce"])
+    asked["match"]["ignore_params"] = sorted(asked["match"]["ignore_params"])
+    for name in ("jobs", "prefilter"):
+        asked.pop(name)
+    text = json.dumps([tables, program, asked], sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _file(folder: Path, question: str, number: int, count: int) -> Path:
+    return folder / f"{question}-{number:05}-of-{count:05}.jsonl"
+
+
+def is_done(folder: Path, question: str, number: int, count: int) -> bool:
+    """Whether a piece is finished."""
+    return _file(folder, question, number, count).exists()
+
+
+def write_partition(
+    folder: Path, question: str, piece: Partition, records: Iterable[Mapping[str, Any]], funnel: Funnel
+) -> Path:
+    """Write a finished piece: one line a record, the funnel last.
+
+    Args:
+        folder: Where the pieces are; made if need be.
+        question: Its `fingerprint`.
+        piece: Which piece.
+        records: Its results as plain values, in order.
+        funnel: Its counts, complete once the records are taken.
+
+    Raises:
+        DataError: target-unwritable.
+    """
+    target = _file(folder, question, piece.number, piece.count)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with whole_file(target) as file:
+            for each in records:
+                file.write((json.dumps(each, ensure_ascii=False) + "\n").encode())
+            counts = {name: getattr(funnel, name) for name in _COUNTS}
+            file.write((json.dumps({"funnel": counts}) + "\n").encode())
+    except OSError as error:
+        raise DataError(Diagnostic("target-unwritable", f"{target} cannot be written: {error.strerror}")) from None
+    return target
+
+
+_COUNTS = ("frames", "candidates", "cast", "matches", "unknowns", "excluded", "reasons")
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """The pieces of one question, put together.
+
+    Attributes:
+        question: Its fingerprint.
+        files: Their files, in order.
+        funnel: Their counts, added up.
+    """
+
+    question: str
+    files: tuple[Path, ...]
+    funnel: Funnel
+
+    def records(self) -> Iterator[dict[str, Any]]:
+        """The results in the order of the dataset, one piece in memory at a time."""
+        for path in self.files:
+            yield from _lines(path)[:-1]
+
+
+def _lines(path: Path) -> list[dict[str, Any]]:
+    try:
+        lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    except (OSError, ValueError):
+        lines = []
+    if not lines or "funnel" not in lines[-1]:
+        raise DataError(Diagnostic("store-damaged", f"{path} is not a complete piece of a result",
+                                   hints=("delete it and run its shard again",)))  # fmt: skip
+    return cast("list[dict[str, Any]]", lines)
+
+
+def gather(folder: Path, question: str | None = None, *, only: int | None = None) -> Gathered:
+    """Put the pieces in a folder together.
+
+    Args:
+        folder: Where the pieces are.
+        question: Which question's; there must be only one if not given.
+        only: The number of a single piece, from 0; all of them by default.
+
+    Raises:
+        DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions.
+    """
+    found = sorted(folder.glob("*-of-*.jsonl")) if folder.is_dir() else []
+    questions = sorted({path.name.rsplit("-", 3)[0] for path in found})
+    if question is None and len(questions) > 1:
+        raise DataError(Diagnostic("file-invalid", f"{folder} holds pieces of {len(questions)} different questions",
+                                   hints=("gather each from a folder of its own",)))  # fmt: skip
+    chosen = question or next(iter(questions), "")
+    found = [path for path in found if path.name.startswith(f"{chosen}-{'' if only is None else f'{only:05}-'}")]
+    if not found:
+        raise DataError(Diagnostic("file-missing", f"{folder} holds no piece of a result",
+                                   hints=("run `scenicq match ... --shard i/n -o` with this folder",)))  # fmt: skip
+    counts = {int(path.stem.rsplit("-", 1)[1]) for path in found}
+    count = max(counts)
+    missing = [str(n + 1) for n in range(count) if not is_done(folder, chosen, n, count)]
+    if only is None and (missing or len(counts) > 1):
+        shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
+        raise DataError(Diagnostic("file-missing", f"{len(missing)} of {count} pieces are missing: {shown}",
+                                   hints=("run their shards again",)))  # fmt: skip
+    total = Funnel()
+    for path in found:
+        _add(total, _lines(path)[-1]["funnel"])
+    return Gathered(chosen, tuple(found), total)
+
+
+def _add(total: Funnel, counts: Mapping[str, Any]) -> None:
+    for name in _COUNTS:
+        if isinstance(counts[name], dict):
+            getattr(total, name).update(counts[name])
+        else:
+            setattr(total, name, getattr(total, name) + counts[name])

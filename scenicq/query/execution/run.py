@@ -1,0 +1,358 @@
+"""Running a query: compile per map, prefilter, match the candidates, in the order of the store.
+
+The dataset is worked through block by block, in this process or in workers; results come out in order either way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal, cast
+
+import numpy as np
+
+from scenicq.compiler.program import compile_scenario
+from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
+from scenicq.forest.scenario import Scenario
+from scenicq.geometry.network import Network
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.preprocess import ready
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
+from scenicq.query.execution.block_executor import BlockExecutor
+from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
+from scenicq.query.execution.compiled_map import about_dataset, map_remark
+from scenicq.query.execution.results import Funnel, Result
+from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names
+from scenicq.query.prefilter.plan import Plan
+from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.manifest import Counts
+
+__all__ = ["Query", "QueryOptions", "Stretch", "read_program"]
+
+
+@dataclass(frozen=True, slots=True)
+class QueryOptions:
+    """How to run a query.
+
+    Attributes:
+        match: Options of the matcher.
+        solver: Which solver, as `scenicq.smt.solver.open_solver` takes it.
+        version: The version of Scenic; inferred if None.
+        initial: Whether dynamic parts of the program are ignored.
+        prefilter: Whether SQL narrows the frames first; the results are the same.
+        jobs: Processes that match; None for as many as pays.
+        limit: Matches after which to stop; None for all.
+        every: Whether frames that do not match are results too.
+        all_matches: Whether every correspondence of a frame is a result of its own.
+    """
+
+    match: MatchOptions = MatchOptions()
+    solver: str = "auto"
+    version: Literal[1, 2, 3] | None = None
+    initial: bool = False
+    prefilter: bool = True
+    jobs: int | None = 1
+    limit: int | None = None
+    every: bool = False
+    all_matches: bool = False
+
+
+def read_program(path: str | Path) -> Source:
+    """Read a scenario.
+
+    Raises:
+        DataError: file-missing, or file-invalid where it is not UTF-8 text.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror}")) from None
+    try:
+        return Source(str(path), data.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise DataError(Diagnostic("file-invalid", f"{path} is not text in UTF-8")) from None
+
+
+def beside(path: Path) -> Callable[[str], Source | None]:
+    """Reads files that a program imports: those in its own folder, nothing else."""
+    folder = path.resolve().parent
+
+    def load(name: str) -> Source | None:
+        file = (folder / name).resolve()
+        if not file.is_relative_to(folder) or not file.is_file():
+            return None
+        return read_program(file)
+
+    return load
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Recordings of a map that follow each other in the order of their names.
+
+    Attributes:
+        first, last: The same name for one recording.
+        frames: How many frames they have.
+    """
+
+    first: str
+    last: str
+    frames: int
+
+
+@dataclass(slots=True)
+class _Known:
+    """What a query has found out once, for it and its copies with other recordings."""
+
+    worlds: dict[str, CompiledMap] = field(default_factory=dict["str", "CompiledMap"])
+    extents: dict[str, list[Extent]] | None = None
+
+
+@dataclass(eq=False)
+class Query:
+    """A scenario and a dataset, ready to run.
+
+    Attributes:
+        dataset: The dataset.
+        source: The program.
+        options: The options.
+        recordings: What to look at on which map; everything if None.
+        funnel: Filled while results are taken.
+        file: Of the program, whose folder has the files that it imports; by its name if None.
+    """
+
+    dataset: Dataset
+    source: Source
+    options: QueryOptions = QueryOptions()
+    recordings: Mapping[str, Stretch] | None = None
+    funnel: Funnel = field(default_factory=Funnel)
+    file: Path | None = None
+    _known: _Known = field(default_factory=_Known, repr=False)
+
+    def compile(self, map_name: str) -> tuple[Scenario, Network]:
+        """The scenario over one of the dataset's maps, ready to be matched.
+
+        Raises:
+            ScenarioError: The program is wrong, or does not fit the map.
+        """
+        network = self.dataset.network(map_name)
+        options = self.options
+        try:
+            scenario = compile_scenario(
+                self.source,
+                network,
+                version=options.version,
+                initial=options.initial,
+                loader=beside(self.file or Path(self.source.name)),
+            )
+        except ScenarioError as error:
+            raise about_dataset(error, self.dataset, map_name) from None
+        return ready(scenario), network
+
+    def _check_ego(self) -> None:
+        """Refuse to take a stand-in for an ego that the source does not have."""
+        facts = cast("dict[str, object]", self.dataset.manifest.provenance.get("facts") or {})
+        said = str(facts.get("ego", ""))
+        if said.startswith("none") and self.options.match.ego == "label":
+            raise DataError(
+                Diagnostic(
+                    "option-invalid",
+                    f"{self.dataset.name} was ingested without an ego",
+                    hints=("`--ego any` lets the scenario's ego be any object of its class",),
+                )
+            )
+
+    def world(self, map_name: str) -> CompiledMap:
+        """The scenario over one of the dataset's maps, with its prefilter; compiled once.
+
+        Raises:
+            ScenarioError: The program is wrong, or does not fit the map.
+        """
+        worlds = self._known.worlds
+        if map_name not in worlds:
+            options = self.options
+            worlds[map_name] = CompiledMap.of(*self.compile(map_name), options.match, prefilter=options.prefilter)
+        return worlds[map_name]
+
+    def _worlds(self) -> dict[str, CompiledMap | Diagnostic]:
+        """The scenario over each map, or what the map lacks; an error if it fits none."""
+        self._check_ego()
+        found: dict[str, CompiledMap | Diagnostic] = {}
+        errors: list[ScenarioError] = []
+        for name in self.dataset.maps:
+            try:
+                found[name] = self.world(name)
+            except ScenarioError as error:
+                if error.diagnostics[0].code != "map-lacks":
+                    raise
+                errors.append(error)
+                found[name] = error.diagnostics[0]
+                count = self.dataset.manifest.by_map.get(name, Counts()).frames
+                message = f"{count} frames on map `{name}` cannot match: {error.diagnostics[0].message}"
+                self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
+                if here := self._frames(name):
+                    self.funnel.frames += here
+                    self.funnel.excluded[f"map {name}"] += here
+        if errors and len(errors) == len(found):
+            raise errors[0]
+        worlds = [world for world in found.values() if isinstance(world, CompiledMap)]
+        if worlds:
+            self.funnel.warnings += _remarks(worlds[0].scenario)
+            if remark := map_remark(self.source, self.options.version, self.dataset):
+                self.funnel.warnings.append(remark)
+        return found
+
+    def _frames(self, map_name: str) -> int:
+        """How many frames of a map are looked at."""
+        if self.recordings is None:
+            return self.dataset.manifest.by_map.get(map_name, Counts()).frames
+        return self.recordings[map_name].frames if map_name in self.recordings else 0
+
+    def _between(self, map_name: str) -> tuple[str, str] | None:
+        """The first and the last recording of a map that are looked at; None for all."""
+        return None if self.recordings is None else (self.recordings[map_name].first, self.recordings[map_name].last)
+
+    def plans(self) -> list[Plan]:
+        """The prefilter on each map."""
+        worlds = self._worlds().items()
+        return [world.plan for name, world in worlds if isinstance(world, CompiledMap) and self._frames(name)]
+
+    def blocks(self, map_name: str, least: int = 1) -> list[Block]:
+        """The frames of a map that are looked at, cut into blocks in the order of the store.
+
+        Args:
+            map_name: The map.
+            least: Blocks that there should be, unless they would become very small.
+        """
+        if self._known.extents is None:
+            with closing(self.dataset.connect()) as connection:
+                self._known.extents = extents(self.dataset, connection)
+        return blocks(self._known.extents, map_name, self._between(map_name), least=least, whole=self.options.prefilter)
+
+    def decider(self, threads: int | None = None) -> Decider:
+        """What decides the blocks of this query in one process; to be used in a `with` statement.
+
+        Args:
+            threads: Of the database; as many as it likes by default.
+        """
+        options = self.options
+        return Decider(
+            self.dataset,
+            options.match,
+            options.solver,
+            self.world,
+            threads=threads,
+            all_matches=options.all_matches,
+            every=options.every,
+        )
+
+    def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
+        """Results in the order of recording, time and frame, map by map.
+
+        Args:
+            progress: Called with the number of frames decided since the last call.
+
+        Raises:
+            ScenarioError: The program is wrong or not supported.
+        """
+        worlds = self._worlds()
+        left, progress = self.options.limit, progress or _ignore
+        with ExitStack() as stack:
+            stack.enter_context(self.dataset.blamed())
+            setup = (self.dataset.address, self.source, self.options, self.file)
+            hands = stack.enter_context(
+                BlockExecutor(self.dataset, self.options.jobs, self.decider(), _start_worker, setup)
+            )
+            for name, world in worlds.items():
+                if not self._frames(name):
+                    continue
+                if isinstance(world, Diagnostic):
+                    yield from self._lacking(name, world, progress)
+                    continue
+                cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1)
+                with closing(self._merge(world.plan, hands.decide(cut), progress)) as merged:
+                    for result in merged:
+                        yield result
+                        if isinstance(result.verdict, Match) and left is not None:
+                            left -= 1
+                            if left <= 0:
+                                return
+
+    def _lacking(self, map_name: str, told: Diagnostic, progress: Callable[[int], None]) -> Iterator[Result]:
+        """The frames of a map that lacks what the program needs, which are counted already."""
+        if self.options.every:
+            cause = Cause(f"map {map_name}", told.message, told.span)
+            with closing(self.dataset.connect()) as connection:
+                for block in self.blocks(map_name):
+                    for frame, recording, time in names(self.dataset, connection, block):
+                        yield Result(frame, recording, time, NoMatch(cause))
+        progress(self._frames(map_name))
+
+    def _merge(self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]) -> Generator[Result]:
+        for block in decided:
+            found = iter(block.found)
+            start = 0
+            try:
+                for place in np.flatnonzero(block.missed < 0).tolist():
+                    if self.options.every:
+                        yield from _excluded(plan, block, start, place)
+                    first, *more = next(found)
+                    self.funnel.count(first.verdict)
+                    progress(place + 1 - start)
+                    start = place + 1
+                    if self.options.every or isinstance(first.verdict, Match | Unknown):
+                        yield first
+                    yield from more
+                if self.options.every:
+                    yield from _excluded(plan, block, start, len(block.missed))
+                progress(len(block.missed) - start)
+                start = len(block.missed)
+            finally:
+                # as far as results were taken
+                past = block.missed[:start]
+                for step, count in enumerate(np.bincount(past[past >= 0], minlength=len(plan.steps)).tolist()):
+                    if count:
+                        self.funnel.exclude(plan.steps[step].what, count)
+
+
+def _excluded(plan: Plan, block: Decided, start: int, end: int) -> Iterator[Result]:
+    """The frames between two candidates."""
+    numbers: list[int] = block.missed[start:end].tolist()
+    for (frame, recording, time), number in zip(block.names[start:end], numbers, strict=True):
+        step = plan.steps[number]
+        yield Result(frame, recording, time, NoMatch(Cause(step.what, step.detail, step.span)))
+
+
+def _ignore(frames: int) -> None:
+    """No progress is shown."""
+
+
+def _remarks(scenario: Scenario) -> list[Diagnostic]:
+    """What the author should know: parts that say nothing about whether a label matches."""
+    soft = [
+        Diagnostic(
+            "soft-requirement",
+            "this requirement excludes nothing",
+            span,
+            "holds only with a probability",
+            hints=("a scene that breaks it is still possible: write `require` for a condition that must hold",),
+            severity="warning",
+        )
+        for span in (requirement.span for requirement in scenario.soft)
+    ]
+    return [*scenario.warnings, *scenario.ignored, *soft]
+
+
+def _start_worker(
+    dataset: str, source: Source, options: QueryOptions, file: Path | None
+) -> Callable[[Block, Callable[[object], None]], Decided]:
+    """What a worker process keeps between blocks."""
+    decider = Query(open_dataset(dataset), source, options, file=file).decider(threads=1)
+
+    def work(block: Block, _tell: Callable[[object], None]) -> Decided:
+        decided = decider.decide(block)
+        return replace(decided, found=list(decided.found))
+
+    return work

@@ -1,0 +1,1 @@
+"""What keeps a frame from matching, and how far it is."""

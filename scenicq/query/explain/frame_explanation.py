@@ -1,0 +1,231 @@
+"""Why a frame matches, or what keeps it from matching, in the words of the program.
+
+For a match: the correspondence and the values that prove it, each at its place in the program. For anything else: the
+correspondence that comes closest, each constraint that it breaks with the label's value and what was allowed, and the
+smallest tolerance under which the frame would match.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from scenicq.errors import Diagnostic, Span, render
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.groups import Group
+from scenicq.match.decide.cascade import Refuted, Satisfied, Undecided
+from scenicq.match.decide.solver_step import encoded
+from scenicq.match.matcher import Finding, Matcher
+from scenicq.match.problem.constraints import describe_constraint
+from scenicq.match.search.group_plan import MatchPlan
+from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
+from scenicq.query.explain.nearest_miss import Closest, closest, show_tolerance
+from scenicq.query.explain.violations import Violation, violations
+from scenicq.smt.encode import UnsupportedError
+from scenicq.smt.smtlib import to_smtlib
+from scenicq.store.labels import Label
+
+__all__ = ["Explanation", "Formula", "Proof", "explain", "show_explanation"]
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """A random variable of the program with the value that it must have had."""
+
+    span: Span | None
+    value: WitnessValue
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A group of constraints as SMT-LIB 2.
+
+    Attributes:
+        name: What the group is about, fit for a file name.
+        text: The script, or a comment where the group has none; the verdict is in a comment.
+    """
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """Why a verdict is as it is.
+
+    Attributes:
+        frame: The frame.
+        verdict: The verdict.
+        correspondence: The one that matches, else the one that comes closest, else a partial one.
+        proofs: The values that prove a match, in the order of the program.
+        violations: What the closest correspondence breaks, the first to be blamed first.
+        closest: The smallest tolerance under which the frame would match; None if it matches, or if none would do.
+        formulas: The groups under that correspondence.
+    """
+
+    frame: str
+    verdict: Verdict
+    correspondence: Mapping[str, str]
+    proofs: tuple[Proof, ...] = ()
+    violations: tuple[Violation, ...] = ()
+    closest: Closest | None = None
+    formulas: tuple[Formula, ...] = ()
+
+
+def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explanation:
+    """Explain the verdict on a label.
+
+    Args:
+        matcher: The matcher.
+        label: The label.
+        formulas: Whether to write the groups as formulas, too.
+    """
+    finding = matcher.examine(label)
+    if isinstance(finding.verdict, Match):
+        return Explanation(
+            label.frame,
+            finding.verdict,
+            finding.verdict.correspondence,
+            _proofs(finding),
+            formulas=_formulas(matcher, finding) if formulas else (),
+        )
+    nearest = closest(matcher, label)
+    if nearest is None or not isinstance(nearest.finding.verdict, Match):
+        return _without_match(matcher, label, finding, formulas=formulas)
+    found = replace(nearest.finding, attempt=_again(matcher, nearest.finding))
+    return Explanation(
+        label.frame,
+        finding.verdict,
+        nearest.finding.verdict.correspondence,
+        violations=_violations(matcher, found),
+        closest=nearest,
+        formulas=_formulas(matcher, found) if formulas else (),
+    )
+
+
+def _again(matcher: Matcher, finding: Finding) -> LabelSearch | None:
+    """The search of a finding with the matcher's own options."""
+    old = finding.attempt
+    return None if old is None else LabelSearch(matcher.scenario, matcher.options, old.cast, matcher.ask)
+
+
+def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas: bool) -> Explanation:
+    """No tolerance helps: say what excluded the correspondence that came furthest."""
+    match finding.verdict:
+        case NoMatch():
+            cause, shown = finding.verdict.cause, finding.verdict.partial
+        case Unknown():
+            cause, shown = finding.verdict.cause, finding.verdict.correspondence
+        case Match():
+            raise AssertionError("a match is explained by its witness")
+    failure = finding.attempt.failure if finding.attempt is not None else None
+    found: tuple[Violation, ...] = ()
+    if failure is not None and finding.attempt is not None and isinstance(finding.verdict, NoMatch):
+        found = violations(matcher, finding.attempt, failure.group, failure.assignment)
+    if not found:
+        told = "is not met" if isinstance(finding.verdict, NoMatch) else "is not decided"
+        found = (Violation(cause.what, told, cause.detail, cause.span),)
+    return Explanation(label.frame, finding.verdict, shown, violations=found)
+
+
+def _proofs(finding: Finding) -> tuple[Proof, ...]:
+    assert finding.attempt is not None
+    assert finding.plan is not None
+    found: list[Proof] = []
+    for plan in finding.plan.groups:
+        outcome = finding.attempt.decide(plan, finding.assignment)
+        if isinstance(outcome, Satisfied):
+            for leaf in plan.group.variables:
+                value = outcome.values.get(leaf.identity)
+                if isinstance(value, float):
+                    found.append(Proof(leaf.span, value))
+                elif isinstance(value, tuple):
+                    found.append(Proof(leaf.span, (value[0], value[1])))
+    return tuple(sorted(found, key=lambda proof: proof.span.start if proof.span else -1))
+
+
+def _violations(matcher: Matcher, finding: Finding) -> tuple[Violation, ...]:
+    attempt, plan = finding.attempt, finding.plan
+    assert attempt is not None
+    assert plan is not None
+    found: list[Violation] = []
+    for each in plan.groups:
+        outcome = attempt.decide(each, finding.assignment)
+        if isinstance(outcome, Refuted):
+            found += violations(matcher, attempt, each.group, finding.assignment)
+        elif isinstance(outcome, Undecided):
+            what = describe_constraint(matcher.scenario, outcome.constraint)
+            found.append(Violation(what, f"not decided ({outcome.reason})", "", outcome.constraint.span))
+    return tuple(found)
+
+
+def _formulas(matcher: Matcher, finding: Finding) -> tuple[Formula, ...]:
+    attempt, plan = finding.attempt, finding.plan
+    assert attempt is not None
+    assert plan is not None
+    return tuple(
+        _formula(matcher, attempt, plan, number, finding.assignment) for number, _ in enumerate(plan.groups, 1)
+    )
+
+
+def _formula(
+    matcher: Matcher, attempt: LabelSearch, plan: MatchPlan, number: int, assignment: Mapping[int, int]
+) -> Formula:
+    group: Group = plan.groups[number - 1].group
+    about = [describe_constraint(matcher.scenario, item) for item in group.constraints]
+    first = "".join(c if c.isalnum() or c in "._-" else "-" for c in about[0])[:40].strip("-")
+    outcome = attempt.decide(plan.groups[number - 1], assignment)
+    verdict = {Satisfied: "sat", Refuted: "unsat", Undecided: "unknown"}[type(outcome)]
+    try:
+        problem = encoded([attempt.items(group, assignment)], matcher.options).problem
+        text = to_smtlib(problem, matcher.options.precision)
+    except UnsupportedError as error:
+        text = f"; no formula: {error}\n"
+    except CannotEvaluate as error:
+        text = f"; no formula: {error}\n"
+    head = "".join(f"; {line}\n" for line in (*about, f"verdict: {verdict}"))
+    return Formula(f"{number:02}-{first}", head + text)
+
+
+def show_explanation(explanation: Explanation) -> str:
+    """An explanation as text, without a newline at the end."""
+    verdict = explanation.verdict
+    headline = {Match: "matches", NoMatch: "does not match", Unknown: "is undecided"}[type(verdict)]
+    lines = [f"frame {explanation.frame} {headline}"]
+    if isinstance(verdict, Unknown):
+        lines[0] += f": {verdict.reason}"
+    kind = "correspondence" if isinstance(verdict, Match) else "closest correspondence"
+    lines += [f"{kind}: {', '.join(f'{name} = {thing}' for name, thing in explanation.correspondence.items())}"]
+    if explanation.proofs:
+        lines += ["", "it matches with these values:", *_show_proofs(explanation.proofs)]
+    for violation in explanation.violations:
+        lines += ["", _show_violation(violation)]
+    if explanation.closest is not None:
+        lines += ["", f"it would match with --tolerance {show_tolerance(explanation.closest.tolerance)}"]
+    elif not isinstance(verdict, Match):
+        lines += ["", "no tolerance would make it match"]
+    return "\n".join(lines)
+
+
+def _show_proofs(proofs: Sequence[Proof]) -> list[str]:
+    rows: list[tuple[str, str, str]] = []
+    for proof in proofs:
+        value = proof.value
+        shown = f"({value[0]:z.2f}, {value[1]:z.2f})" if isinstance(value, tuple) else f"{value:z.4g}"
+        place = proof.span.place if proof.span else ""
+        text = " ".join(proof.span.text.split()) if proof.span else ""
+        rows.append((place, text if len(text) <= 60 else f"{text[:57]}...", shown))
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    return [f"  {place:{widths[0]}}  {text:{widths[1]}}  {shown}" for place, text, shown in rows]
+
+
+def _show_violation(violation: Violation) -> str:
+    role, dot, end = violation.what.rpartition(".")
+    if dot and end == "class":
+        message = f"no label object can play `{role}`"
+    else:
+        message = f"`{violation.what}` {violation.value}".rstrip()
+    if violation.span is None:
+        return f"excluded: {message}" + (f"\n  {violation.allowed}" if violation.allowed else "")
+    return render(Diagnostic("frame-excluded", message, violation.span, violation.allowed, severity="excluded"))

@@ -1,0 +1,1 @@
+"""Necessary conditions of a scenario as SQL, and what it leaves."""

@@ -1,0 +1,355 @@
+"""Necessary conditions: what must hold of a frame's columns for the frame to match.
+
+Taken from the forest by interval analysis. Each condition has a name, the place in the program it comes from, and holds
+for every label that matches (the tests compare with and without them). It is about the ego alone, about one object and
+the ego, or about two objects.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from scenicq.errors import Span
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Constant,
+    Contains,
+    DirectionAt,
+    DiscAt,
+    Feature,
+    Logic,
+    LogicOp,
+    Node,
+    PointIn,
+    RegionIntersection,
+    Rotate,
+    SectorAt,
+    VectorSum,
+)
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.walk import features
+from scenicq.geometry.network import Network
+from scenicq.geometry.regions import IntersectionOf, Region
+from scenicq.geometry.road_direction import RoadDirection
+from scenicq.match.options import MatchOptions
+from scenicq.query.prefilter.regions import RegionNames, near_region
+from scenicq.query.prefilter.sql_bounds import Bounds
+from scenicq.query.prefilter.sql_interval import (
+    SLACK,
+    Expr,
+    Interval,
+    add,
+    all_of,
+    any_of,
+    between,
+    difference,
+    less,
+    modulo_turn,
+    number,
+    rotate,
+)
+from scenicq.store.schema import MEMBERSHIP_RADIUS_M
+
+__all__ = ["EGO", "Condition", "conditions", "object_columns"]
+
+EGO = "ego"
+"""Alias of the frame's row; the objects of a condition are called `a` and, if there are two, `b`."""
+
+_NUMBERS = ("heading", "width", "length", "height")
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A necessary condition.
+
+    Attributes:
+        what: The feature or requirement, in the words of the program.
+        objects: The objects it is about but the ego, ascending: none, one (`a`) or two (`a` and `b`).
+        sql: Over the columns of `ego`, `a` and `b`; true where the label does not tell. Empty for one on memberships.
+        span: Where the program says it.
+        region: For a condition on memberships: SQL that holds of some row of the object's (or the ego's).
+    """
+
+    what: str
+    objects: tuple[int, ...]
+    sql: str
+    span: Span | None
+    region: str = ""
+
+
+def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, str]]:
+    """The properties that have columns, with them.
+
+    Args:
+        alias: Of the table.
+        prefix: Of the columns: those of the ego's begin with `ego_`.
+    """
+    start = f"{alias}.{prefix}"
+    found: dict[str, str | tuple[str, str]] = {name: f"{start}{name}" for name in _NUMBERS}
+    found["position"] = (f"{start}x", f"{start}y")
+    found["velocity"] = (f"{start}vx", f"{start}vy")
+    found["speed"] = f"sqrt({start}vx * {start}vx + {start}vy * {start}vy)"
+    return found
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Reads conditions off one scenario."""
+
+    scenario: Scenario
+    options: MatchOptions
+    names: RegionNames
+    road: RoadDirection
+    bounds: dict[tuple[int, ...], Bounds] = field(default_factory=dict["tuple[int, ...]", "Bounds"])
+
+    def of(self, objects: tuple[int, ...]) -> Bounds:
+        """Bounds over the columns of some objects and the ego's."""
+        if objects not in self.bounds:
+            aliases = {self.scenario.ego: (EGO, "ego_")} | dict(zip(objects, (("a", ""), ("b", "")), strict=False))
+            columns = {
+                (index, name): column
+                for index, (alias, prefix) in aliases.items()
+                for name, column in object_columns(alias, prefix).items()
+            }
+            self.bounds[objects] = Bounds(columns)
+        return self.bounds[objects]
+
+    def involved(self, *roots: Node, about: int | None = None) -> tuple[int, ...]:
+        """The objects that expressions are about, the ego left out."""
+        found = {index for index, _ in features(*roots)}
+        if about is not None:
+            found.add(about)
+        return tuple(sorted(found - {self.scenario.ego}))
+
+    # --- comparisons
+
+    def comparison(self, index: int, name: str, node: Node) -> Iterator[tuple[tuple[int, ...], str, str]]:
+        """Objects, SQL and membership condition that a feature's expression implies."""
+        objects = self.involved(node, about=index)
+        if len(objects) > 2:
+            objects = (index,)
+        bounds = self.of(objects)
+        own = bounds.columns.get((index, name))
+        if name == "position":
+            yield from self._position(index, node, objects, bounds)
+        elif name == "heading":
+            yield objects, self._heading(index, node, bounds), ""
+        elif isinstance(own, str):
+            allowed = [between(own, limits, self.options.tolerance.other) for limits in bounds.intervals(node)]
+            yield objects, _sql(any_of(allowed)), ""
+
+    def _position(
+        self, index: int, node: Node, objects: tuple[int, ...], bounds: Bounds
+    ) -> Iterator[tuple[tuple[int, ...], str, str]]:
+        reach = self.options.tolerance.reach
+        own = bounds.columns[index, "position"]
+        if isinstance(node, PointIn):
+            # Memberships are recorded up to a distance: a wider tolerance cannot be prefiltered by them.
+            names = self.names if reach <= MEMBERSHIP_RADIUS_M - SLACK else None
+            place = (own[0], own[1])
+            for near, sql in self._inside(node.region, place, bounds, names):
+                yield (() if index == self.scenario.ego else (index,)) if near else objects, sql, near
+            return
+        x, y = (own[0], own[1])
+        place, rest, moved = self._frame((x, y), node, bounds)
+        if not moved:
+            return
+        allowed = [all_of([between(place[0], a, reach), between(place[1], b, reach)]) for a, b in bounds.boxes(rest)]
+        yield objects, _sql(any_of(allowed)), ""
+
+    def _frame(self, place: tuple[Expr, Expr], node: Node, bounds: Bounds) -> tuple[tuple[Expr, Expr], Node, bool]:
+        """A place seen in the frames that an expression goes through, and what is left of the expression."""
+        moved = False
+        while True:
+            if self._from_ego(node, place):
+                assert isinstance(node, VectorSum)
+                assert isinstance(node.right, Rotate)
+                alias = str(place[0]).removesuffix(".x")
+                place, node, moved = (f"{alias}.ego_right", f"{alias}.ego_ahead"), node.right.vector, True
+            elif isinstance(node, VectorSum):
+                sides = ((node.left, node.right), (node.right, node.left))
+                for part, rest in sides:
+                    if known := bounds.exact_vector(part):
+                        shifted = [difference((p, p), (q, q))[0] for p, q in zip(place, known, strict=True)]
+                        place, node, moved = (shifted[0], shifted[1]), rest, True
+                        break
+                else:
+                    return place, node, moved
+            elif isinstance(node, Rotate) and (angle := bounds.exact(node.angle)) is not None:
+                back: Expr = -angle if isinstance(angle, float) else f"(-{angle})"
+                (px, _), (py, _) = rotate(((place[0], place[0]), (place[1], place[1])), (back, back))
+                place, node, moved = (px, py), node.vector, True
+            else:
+                return place, node, moved
+
+    def _from_ego(self, node: Node, place: tuple[Expr, Expr]) -> bool:
+        """Whether an expression is an offset in the ego's frame: each object's place in it is a column."""
+        return (
+            isinstance(node, VectorSum)
+            and isinstance(node.right, Rotate)
+            and self._is_ego(node.left, "position")
+            and self._is_ego(node.right.angle, "heading")
+            and place in (("a.x", "a.y"), ("b.x", "b.y"))
+        )
+
+    def _is_ego(self, node: Node, name: str) -> bool:
+        return isinstance(node, Feature) and (node.object, node.property) == (self.scenario.ego, name)
+
+    def _inside(
+        self, region: Node, place: tuple[str, str], bounds: Bounds, names: RegionNames | None
+    ) -> Iterator[tuple[str, str]]:
+        """Conditions on memberships, or SQL, that a place in a region meets."""
+        reach = self.options.tolerance.reach
+        match region:
+            case Constant() if isinstance(region.value, Region):
+                parts = region.value.parts if isinstance(region.value, IntersectionOf) else (region.value,)
+                for part in parts:
+                    near = None if names is None else near_region(part, names, reach)
+                    if near is not None:
+                        yield near, ""
+            case RegionIntersection():
+                for part in region.parts:
+                    yield from self._inside(part, place, bounds, names)
+            case DiscAt() | SectorAt():
+                yield "", _sql(self._in_view(region, place, bounds))
+            case _:
+                return
+
+    def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: Bounds) -> str | bool:
+        center = bounds.exact_vector(region.center)
+        if center is None:
+            return True
+        reach = self.options.tolerance.reach
+        from_ego = self._is_ego(region.center, "position") and place == ("a.x", "a.y")
+        dx, dy = (difference((p, p), (q, q))[0] for p, q in zip(place, center, strict=True))
+        away = "a.ego_distance" if from_ego else f"sqrt({number(dx)} * {number(dx)} + {number(dy)} * {number(dy)})"
+        near = any_of([less(away, add((high, high), (reach, reach))[1]) for _, high in bounds.intervals(region.radius)])
+        if not isinstance(region, SectorAt) or not isinstance(region.angle, Constant):
+            return near
+        half = float(region.angle.value) / 2 if isinstance(region.angle.value, float) else math.pi
+        if not (from_ego and self._is_ego(region.heading, "heading") and 0 <= half <= math.pi / 2):
+            return near
+        # a wedge of at most half a turn lies on one side of each of its edges
+        aside = f"abs(a.ego_right) * {number(math.cos(half))} - a.ego_ahead * {number(math.sin(half))}"
+        return all_of([near, less(f"({aside})", reach)])
+
+    def _heading(self, index: int, node: Node, bounds: Bounds) -> str:
+        own = bounds.columns[index, "heading"]
+        assert isinstance(own, str)
+        alias = own.removesuffix("heading")
+        terms = _summands(node)
+        fields = [term for term in terms if isinstance(term, DirectionAt)]
+        along = len(fields) == 1 and self._own_direction(fields[0], index)
+        base = own
+        rest = [term for term in terms if not (along and isinstance(term, DirectionAt))]
+        relative = next((term for term in rest if self._is_ego(term, "heading")), None)
+        if relative is not None and index != self.scenario.ego:
+            base, rest = f"{alias}relative_heading", [term for term in rest if term is not relative]
+        width = self.options.tolerance.heading + SLACK
+        alternatives = [((0.0, 0.0))]
+        for term in rest:
+            alternatives = [add(total, more) for total in alternatives for more in bounds.intervals(term)]
+        spans: list[tuple[Interval, Expr]] = []
+        for low, high in alternatives:
+            _, span = difference((high, high), (low, low))
+            if (isinstance(span, float) and span + 2 * width >= math.tau) or math.inf in (high, span):
+                return ""
+            spans.append((add((low, low), (-width, -width)), add((span, span), (2 * width, 2 * width))[1]))
+
+        def holds(turned: str) -> str:
+            # from where each span starts
+            angles = [(modulo_turn(number(difference((turned, turned), start)[0])), span) for start, span in spans]
+            return _sql(any_of([less(angle, span) for angle, span in angles]))
+
+        if not along:
+            return holds(base)
+        directions = f"{alias}road_directions"
+        one, each = holds(f"{base} - {directions}[1]"), holds(f"{base} - d")
+        # most places have one direction, for which arithmetic takes a fraction of what a function of lists does
+        among = (
+            f"CASE WHEN len({directions}) = 1 THEN {one} ELSE len(list_filter({directions}, lambda d: {each})) > 0 END"
+        )
+        return f"({base} IS NULL OR {among})" if each else ""
+
+    def _own_direction(self, node: DirectionAt, index: int) -> bool:
+        field_, point = node.field, node.point
+        return (
+            isinstance(point, Feature)
+            and (point.object, point.property) == (index, "position")
+            and isinstance(field_, Constant)
+            and field_.value is self.road
+        )
+
+    # --- requirements
+
+    def requirement(self, root: Node) -> Iterator[tuple[tuple[int, ...], str, str]]:
+        """The same for a requirement."""
+        if isinstance(root, Logic) and root.op is LogicOp.AND:
+            for part in root.args:
+                yield from self.requirement(part)
+            return
+        objects = self.involved(root)
+        if len(objects) > 2:
+            return
+        if isinstance(root, Contains) and isinstance(root.point, Feature) and root.point.property == "position":
+            if isinstance(root.region, Constant) and isinstance(root.region.value, Region):
+                near = near_region(root.region.value, self.names, 0.0)
+                if near is not None:
+                    yield objects, "", near
+            return
+        yield objects, _sql(self.of(objects).can_hold(root)), ""
+
+
+def _sql(condition: str | bool) -> str:
+    """SQL of a condition, empty if it always holds."""
+    return condition if isinstance(condition, str) else "" if condition else "false"
+
+
+_MOST_SUMMANDS = 64
+
+
+def _summands(node: Node) -> list[Node]:
+    """The terms of a sum; the sum itself if it has very many: terms that are shared count again and again."""
+    found: list[Node] = []
+    stack = [node]
+    while stack:
+        if len(stack) + len(found) > _MOST_SUMMANDS:
+            return [node]
+        part = stack.pop()
+        if isinstance(part, Arithmetic) and part.op is ArithmeticOp.ADD:
+            stack.extend(part.args)
+        else:
+            found.append(part)
+    return found
+
+
+def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> Iterator[Condition]:
+    """The necessary conditions of a scenario whose ego is the label's own, in the order of the program.
+
+    Args:
+        scenario: The scenario.
+        network: The map it was compiled for.
+        options: Tolerances.
+    """
+    if any(thing.mutated for thing in scenario.objects):
+        return  # noise of any size hides where things are
+    reader = _Reader(scenario, options, RegionNames.of(network), network.roadDirection)
+    for thing in scenario.objects:
+        named: Mapping[str, Node] = {name: given.value for name, given in thing.properties.items()}
+        compared = [name for name in ("position", "heading") if name in named]
+        compared += [name for name in named if thing.properties[name].explicit and name not in compared]
+        for name in compared:
+            what, span = f"{thing.name}.{name}", thing.properties[name].span
+            for objects, sql, region in reader.comparison(thing.index, name, named[name]):
+                if sql or region:
+                    yield Condition(what, objects, sql, span, region)
+    for requirement in scenario.requirements:
+        if requirement.built_in is not None or requirement.span is None:
+            continue
+        what = " ".join(requirement.span.text.split())
+        for objects, sql, region in reader.requirement(requirement.condition):
+            if sql or region:
+                yield Condition(what, objects, sql, requirement.span, region)

@@ -1,0 +1,249 @@
+"""A plan at work: the dataset block by block, what is left of each block, and its labels.
+
+A block is a run of frames in one part of the store, so memory depends on the size of a part, never on the dataset's.
+"""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import duckdb
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, Plan
+from scenicq.store.dataset import Dataset
+from scenicq.store.labels import Label
+from scenicq.store.reader import EGO_COLUMNS, LABEL_COLUMNS, OBJECT_COLUMNS, assemble
+from scenicq.store.schema import ArrowTable
+from scenicq.store.sql import sql_text
+
+__all__ = ["Block", "Candidate", "Extent", "blocks", "candidates", "extents", "names", "run_prefilter"]
+
+_SENSORS = "block_sensors"
+_FEWEST_FRAMES, _MOST_FRAMES = 2048, 40_000
+"""Frames of a block."""
+_BATCH = 1024
+"""Labels in memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """The frames of one map in one part of the store.
+
+    Attributes:
+        part: Number of the part.
+        first, end: From the first row of its labels to behind the last; frames of other maps may lie between.
+        recordings: The least and the greatest name of a recording.
+    """
+
+    part: int
+    first: int
+    end: int
+    recordings: tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Frames of one map that follow each other in one part of the store.
+
+    Attributes:
+        map: The map.
+        part: Number of the part.
+        first, end: The rows of its labels, the end left out.
+        recordings: Only from the first of these to the second, in order of their names; None for all.
+    """
+
+    map: str
+    part: int
+    first: int
+    end: int
+    recordings: tuple[str, str] | None = None
+
+    def halves(self) -> tuple[Block, Block]:
+        """The block in two; it must have two rows."""
+        middle = (self.first + self.end) // 2
+        return replace(self, end=middle), replace(self, first=middle)
+
+    @property
+    def where(self) -> str:
+        """What selects its rows of `labels`, in SQL."""
+        between = "" if self.recordings is None else " AND recording BETWEEN {} AND {}".format(
+            *map(sql_text, self.recordings)
+        )  # fmt: skip
+        return f"map = {sql_text(self.map)} AND file_row_number BETWEEN {self.first} AND {self.end - 1}{between}"
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A label that may match.
+
+    Attributes:
+        label: The label, possibly with those objects alone that may play a role.
+        among: The numbers of the objects that may play each role (1 is the first object of the label); None for any.
+    """
+
+    label: Label
+    among: Mapping[int, tuple[int, ...]] | None
+
+
+def extents(dataset: Dataset, connection: duckdb.DuckDBPyConnection) -> dict[str, list[Extent]]:
+    """Where the frames of each map are.
+
+    Args:
+        dataset: The dataset.
+        connection: To it.
+    """
+    found: dict[str, list[Extent]] = {}
+    for part, path in enumerate(dataset.files("labels")):
+        rows = connection.execute(
+            "SELECT map, min(file_row_number), max(file_row_number) + 1, min(recording), max(recording) "
+            f"FROM read_parquet({sql_text(str(path))}, file_row_number = true) GROUP BY map"
+        ).fetchall()
+        for name, first, end, low, high in rows:
+            found.setdefault(name, []).append(Extent(part, first, end, (low, high)))
+    return found
+
+
+def blocks(
+    where: Mapping[str, list[Extent]],
+    map_name: str,
+    recordings: tuple[str, str] | None = None,
+    *,
+    least: int = 1,
+    whole: bool = True,
+) -> list[Block]:
+    """The frames of a map, cut into blocks in the order of the store.
+
+    Args:
+        where: The dataset's `extents`.
+        map_name: The map.
+        recordings: The first and the last recording to look at, in order of their names; None for all.
+        least: Blocks that there should be, unless they would become very small.
+        whole: Whether a part may be one block; else blocks are as small as they may be.
+    """
+    chosen = [
+        each
+        for each in where.get(map_name, [])
+        if recordings is None or (recordings[0] <= each.recordings[1] and each.recordings[0] <= recordings[1])
+    ]
+    frames = sum(each.end - each.first for each in chosen)
+    size = min(_MOST_FRAMES, max(_FEWEST_FRAMES, -(-frames // least))) if whole else _FEWEST_FRAMES
+    cut: list[Block] = []
+    for each in chosen:
+        count = -(-(each.end - each.first) // size)
+        ends = [each.first + (each.end - each.first) * n // count for n in range(count + 1)]
+        cut += [Block(map_name, each.part, low, high, recordings) for low, high in pairwise(ends)]
+    return cut
+
+
+def _open(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block) -> None:
+    """Make the views that a plan reads."""
+    views = {LABELS: "labels", OBJECTS: "objects", MEMBERSHIPS: "memberships", _SENSORS: "sensors"}
+    for view, table in views.items():
+        path = sql_text(str(dataset.files(table)[block.part]))
+        rows = f" WHERE {block.where}" if view == LABELS else ""
+        connection.execute(
+            f"CREATE OR REPLACE TEMP VIEW {view} AS SELECT *, file_row_number AS number "
+            f"FROM read_parquet({path}, file_row_number = true){rows}"
+        )
+
+
+def run_prefilter(
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, plan: Plan, block: Block
+) -> NDArray[np.int16]:
+    """Run a plan on a block.
+
+    Args:
+        dataset: The dataset.
+        connection: To it; keeps what `candidates` reads.
+        plan: The plan.
+        block: The block.
+
+    Returns:
+        For each frame in order the number of the step that excludes it, -1 for candidates.
+    """
+    _open(dataset, connection, block)
+    numbers, missed = np.empty(0, np.int64), np.empty(0, np.int16)
+    for place, stage in enumerate(plan.stages):
+        for statement in stage.statements:
+            connection.execute(statement)
+        found: Any = connection.execute(f"SELECT f, coalesce(missed, -1) AS missed FROM {stage.table}").fetchnumpy()
+        if not place:
+            order = np.argsort(found["f"])
+            numbers, missed = found["f"][order], found["missed"][order].astype(np.int16)
+        else:
+            missed[np.searchsorted(numbers, found["f"])] = found["missed"]
+        if not (missed < 0).any():
+            break
+    return missed
+
+
+def names(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block) -> list[tuple[str, str, int]]:
+    """Frame, recording and timestamp of every frame of a block, in order."""
+    _open(dataset, connection, block)
+    return connection.execute(f"SELECT frame, recording, timestamp_us FROM {LABELS} ORDER BY number").fetchall()
+
+
+def candidates(connection: duckdb.DuckDBPyConnection, plan: Plan) -> Iterator[Candidate]:
+    """The labels that are left of the block that was sifted last, in order.
+
+    Args:
+        connection: The one that sifted.
+        plan: The plan.
+    """
+    left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
+    of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *EGO_COLUMNS))
+    of_objects = ", ".join(f"a.{name}" for name in OBJECT_COLUMNS)
+    frames = _rows(connection, f"SELECT l.number, {of_frames} FROM {LABELS} l WHERE l.number IN {left} ORDER BY 1")
+    mine = f"JOIN {LABELS} l ON s.frame = l.frame WHERE l.number IN {left} ORDER BY s.number"
+    sensors = _rows(connection, f"SELECT s.channel, s.path FROM {_SENSORS} s {mine}")
+    if not plan.roles:
+        objects = _rows(connection, f"SELECT {of_objects.replace('a.', 's.')} FROM {OBJECTS} s {mine}")
+        for label in _assembled(frames, objects, sensors):
+            yield Candidate(label, None)
+        return
+    flags = "".join(f", r.r{place}" for place in range(len(plan.roles)))
+    objects = _rows(
+        connection,
+        f"SELECT {of_objects}, r.f{flags} FROM {OBJECTS} a JOIN roles r ON a.number = r.row "
+        f"WHERE r.f IN {left} ORDER BY a.number",
+    )
+    numbers, owners = frames["number"].to_numpy(), objects["f"].to_numpy()
+    counts = np.searchsorted(owners, numbers, side="right") - np.searchsorted(owners, numbers)
+    frames = frames.set_column(frames.column_names.index("object_count"), "object_count", [counts.astype(np.int32)])
+    ends = np.concatenate(([0], np.cumsum(counts)))
+    may = [
+        (index, *_numbered(np.array(objects[f"r{place}"].to_pylist(), dtype=bool), ends))
+        for place, index in enumerate(plan.roles)
+    ]
+    for place, label in enumerate(_assembled(frames, objects, sensors)):
+        yield Candidate(label, {index: tuple(mine[cuts[place] : cuts[place + 1]]) for index, mine, cuts in may})
+
+
+def _numbered(chosen: NDArray[np.bool_], ends: NDArray[np.int64]) -> tuple[list[int], list[int]]:
+    """Objects that are chosen, counted from 1 in each label, and where those of a label end; `ends` begins with 0."""
+    rows = np.flatnonzero(chosen)
+    cuts = np.searchsorted(rows, ends)
+    return (rows - np.repeat(ends[:-1], np.diff(cuts)) + 1).tolist(), cuts.tolist()
+
+
+def _assembled(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> Iterator[Label]:
+    """Labels, so many at a time that the size of a block does not matter."""
+    ends = [np.concatenate(([0], np.cumsum(frames[f"{what}_count"].to_numpy()))) for what in ("object", "sensor")]
+    for start in range(0, len(frames), _BATCH):
+        stop = min(start + _BATCH, len(frames))
+        mine, channels = (table.slice(rows[start], rows[stop] - rows[start])
+                          for table, rows in zip((objects, sensors), ends, strict=True))  # fmt: skip
+        yield from assemble(frames.slice(start, stop - start), mine, channels)
+
+
+def _rows(connection: duckdb.DuckDBPyConnection, sql: str) -> ArrowTable:
+    return connection.sql(sql).to_arrow_table()

@@ -1,0 +1,46 @@
+"""Global parameters as necessary conditions on the frame."""
+
+from __future__ import annotations
+
+from scenicq.forest.nodes import Constant, Node, Select
+from scenicq.forest.scenario import Scenario
+from scenicq.match.options import MatchOptions
+from scenicq.query.prefilter.conditions import EGO, Condition
+from scenicq.query.prefilter.sql_bounds import Bounds
+from scenicq.query.prefilter.sql_interval import any_of, between
+from scenicq.store.sql import sql_text
+
+__all__ = ["param_conditions"]
+
+
+def param_conditions(scenario: Scenario, options: MatchOptions) -> list[Condition]:
+    """What the parameters that a program sets demand of those of a label, where it has them.
+
+    Args:
+        scenario: The scenario.
+        options: Which parameters are ignored, and the tolerance of numbers.
+    """
+    found: list[Condition] = []
+    for name, given in scenario.params.items():
+        if not given.explicit or name in options.ignore_params or not name.isidentifier():
+            continue
+        path = sql_text(f'$."{name}"')
+        seen = f"json_extract_string({EGO}.params, {path})"
+        texts = _texts(given.value)
+        if texts is not None:
+            sql: str | bool = f"{seen} IN ({', '.join(map(sql_text, texts))})"
+        else:
+            value = f"TRY_CAST({seen} AS DOUBLE)"
+            sql = any_of(
+                [between(value, limits, options.tolerance.other) for limits in Bounds({}).intervals(given.value)]
+            )
+        if isinstance(sql, str):
+            found.append(Condition(f"param {name}", (), sql, given.span))
+    return found
+
+
+def _texts(node: Node) -> list[str] | None:
+    """The texts that a value can be, None if it can be something else."""
+    options = node.options if isinstance(node, Select) else (node,)
+    texts = [option.value for option in options if isinstance(option, Constant) and isinstance(option.value, str)]
+    return texts if len(texts) == len(options) else None

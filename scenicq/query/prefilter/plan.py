@@ -1,0 +1,386 @@
+"""The prefilter: SQL that says which frames could match, who could play which role in them, and what excludes the rest.
+
+A plan works through a block of the dataset in stages, the cheap ones first, each on the frames that are left: columns
+of the frame; one pass over the objects, which gives every object the number of conditions that it meets of each role;
+memberships of regions; distinct objects for all roles; pairs of objects that conditions tie together. Objects are only
+ever joined two by two, and only those that are left. A frame that misses a step is out, with that step's name.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from scenicq.errors import Span
+from scenicq.forest.scenario import Scenario, ScenarioObject
+from scenicq.geometry.network import Network
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.preprocess import ready
+from scenicq.query.prefilter.conditions import EGO, Condition, conditions
+from scenicq.query.prefilter.params import param_conditions
+from scenicq.query.prefilter.sql_interval import SLACK, number
+from scenicq.store.classes import ROOT, class_matches, subclasses
+from scenicq.store.sql import sql_text
+
+__all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "Plan", "Stage", "Step", "make_plan"]
+
+LABELS, OBJECTS, MEMBERSHIPS = "block_labels", "block_objects", "block_memberships"
+"""The views that a plan reads: rows of a block of each table with their `number` in the file."""
+
+_MOST_PAIRS = 12
+"""Pairs of roles whose objects are joined."""
+_MOST_COUNTED = 6
+"""Roles whose pairs must find two objects."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A necessary condition of a frame.
+
+    Attributes:
+        what: What it is about, in the words of the program.
+        detail: What a frame that misses it lacks.
+        span: Where the program says it.
+    """
+
+    what: str
+    detail: str
+    span: Span | None
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """SQL that decides some steps for the frames that the stages before have left.
+
+    Attributes:
+        table: The table that it makes: `f`, the number of each frame left, and `missed`, the number of the first step
+            missed or null.
+        statements: To be run in order.
+    """
+
+    table: str
+    statements: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The prefilter of a scenario on one map.
+
+    Attributes:
+        map: The map.
+        steps: Conditions in the order in which they are blamed.
+        stages: How they are decided.
+        roles: The objects for which the table `roles` then has a column `r0`, `r1` ...: whether the object in row `row`
+            may play them. Empty if every object of a frame must be looked at.
+    """
+
+    map: str
+    steps: tuple[Step, ...]
+    stages: tuple[Stage, ...]
+    roles: tuple[int, ...]
+
+    @property
+    def sql(self) -> str:
+        """All statements, for people."""
+        return ";\n".join(statement for stage in self.stages for statement in stage.statements)
+
+
+@dataclass(slots=True)
+class _Role:
+    """One object's conditions: those on columns of its row, then those on memberships."""
+
+    thing: ScenarioObject
+    classes: str
+    plain: list[Condition]
+    placed: list[Condition]
+    column: str
+
+    @property
+    def full(self) -> int:
+        """The level of a row that meets all conditions on columns."""
+        return len(self.plain) + 1
+
+
+@dataclass(slots=True)
+class _Draft:
+    """A plan on the way."""
+
+    steps: list[Step] = field(default_factory=list[Step])
+    stages: list[Stage] = field(default_factory=list[Stage])
+
+    def step(self, what: str, span: Span | None, detail: str = "") -> int:
+        """Number of a new step."""
+        self.steps.append(Step(what, detail, span))
+        return len(self.steps) - 1
+
+    @property
+    def last(self) -> str:
+        """The table of the last stage."""
+        return self.stages[-1].table
+
+    def stage(self, statements: Sequence[str], blamed: Sequence[tuple[str, int]], joined: str = "") -> None:
+        """Add a stage: what a frame `s` must not be, with the number of the step that it then misses."""
+        table = f"stage{len(self.stages)}"
+        final = (
+            f"CREATE OR REPLACE TEMP TABLE {table} AS SELECT s.f, {_case(blamed)} AS missed "
+            f"FROM {self.last} s {joined} WHERE s.missed IS NULL"
+        )
+        self.stages.append(Stage(table, (*statements, final)))
+
+
+def _case(blamed: Sequence[tuple[str, int]]) -> str:
+    """The number of the first condition that holds, null if none does."""
+    if not blamed:
+        return "NULL::SMALLINT"
+    return f"(CASE {' '.join(f'WHEN {sql} THEN {step}' for sql, step in blamed)} END)::SMALLINT"
+
+
+def _level(conditions_: Sequence[str], first: int = 0) -> str:
+    """How many conditions hold before the first that does not."""
+    if not conditions_:
+        return f"{first}::UTINYINT"
+    cases = " ".join(f"WHEN NOT coalesce({sql}, true) THEN {place}" for place, sql in enumerate(conditions_, first))
+    return f"(CASE {cases} ELSE {first + len(conditions_)} END)::UTINYINT"
+
+
+def _table(name: str, query: str) -> str:
+    return f"CREATE OR REPLACE TEMP TABLE {name} AS {query}"
+
+
+def _columns(alias: str, texts: Iterable[str]) -> list[str]:
+    """The columns of a table that conditions use."""
+    pattern = re.compile(rf"\b{alias}\.(\w+)")
+    return sorted({name for text in texts for name in pattern.findall(text)})
+
+
+def _classes(category: str, options: MatchOptions) -> list[str]:
+    return sorted(name for name in subclasses(ROOT) if class_matches(category, name, options.classes))
+
+
+def _any_of(names: Iterable[str]) -> str:
+    listed = ", ".join(map(sql_text, sorted(set(names))))
+    return f"a.class IN ({listed})" if listed else "false"
+
+
+def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Plan:
+    """The prefilter of a scenario, compiled against the map, under the options.
+
+    Every step is necessary: a frame that matches misses none of them, and keeps every object that plays a role in some
+    match.
+
+    Args:
+        scenario: The scenario.
+        network: The map it was compiled against.
+        options: Tolerances, classes, radius.
+    """
+    scenario, own_ego = ready(scenario), options.ego == "label"
+    found = list(conditions(scenario, network, options)) if own_ego else []
+    columns: dict[tuple[str, ...], str] = {}
+    roles: list[_Role] = []
+    for thing in scenario.objects:
+        if thing.index != scenario.ego:
+            mine = [each for each in found if each.objects == (thing.index,)]
+            plain, placed = [each for each in mine if not each.region], [each for each in mine if each.region]
+            classes = _any_of(_classes(thing.category, options))
+            key = (classes, *(each.sql or each.region for each in (*plain, *placed)))
+            roles.append(_Role(thing, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
+    pairs = _pairs(found)
+    draft = _Draft()
+    _frames(draft, [each for each in found if not each.objects], param_conditions(scenario, options), roles, pairs)
+    if roles:
+        _objects(draft, roles, pairs, options)
+    placed_table = _regions(draft, [each for each in found if not each.objects and each.region], roles)
+    if roles and own_ego:
+        _distinct(draft, roles, placed_table, pairs)
+        for objects, tied in list(pairs.items())[:_MOST_PAIRS]:
+            _pair(draft, roles, objects, tied)
+    narrowed = own_ego and not options.exact
+    return Plan(
+        network.name,
+        tuple(draft.steps),
+        tuple(draft.stages),
+        tuple(role.thing.index for role in roles) if narrowed else (),
+    )
+
+
+def _pairs(found: Sequence[Condition]) -> dict[tuple[int, ...], list[Condition]]:
+    pairs: dict[tuple[int, ...], list[Condition]] = {}
+    for each in found:
+        if len(each.objects) == 2:
+            pairs.setdefault(each.objects, []).append(each)
+    return pairs
+
+
+def _frames(
+    draft: _Draft,
+    own: Sequence[Condition],
+    params: Sequence[Condition],
+    roles: Sequence[_Role],
+    pairs: dict[tuple[int, ...], list[Condition]],
+) -> None:
+    """What the columns of the frame decide."""
+    used = [each.sql for role in roles for each in role.plain] + [each.sql for tied in pairs.values() for each in tied]
+    kept = "".join(f", {EGO}.{name}" for name in _columns(EGO, used))
+    blamed = [
+        (f"NOT coalesce({each.sql}, true)", draft.step(each.what, each.span))
+        for each in (*params, *own)
+        if not each.region
+    ]
+    query = f"SELECT {EGO}.number AS f, {EGO}.frame{kept}, {_case(blamed)} AS missed FROM {LABELS} {EGO}"
+    draft.stages.append(Stage("stage0", (_table("stage0", query),)))
+
+
+def _reached(role: _Role, classes: Sequence[str]) -> str:
+    """How far an object of one of some classes comes in a role: 1 by its class, more by what is asked of it alone."""
+    plain = [each.sql for each in role.plain]
+    return _level(plain, 1) if len(classes) == 1 else _level([role.classes, *plain])
+
+
+def _objects(
+    draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[Condition]], options: MatchOptions
+) -> None:
+    """One pass over the objects: how far each comes in each role."""
+    own_ego = options.ego == "label"
+    tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
+    kept = [f"a.{name}" for name in sorted({*_columns("a", tied), *_columns("b", tied)})]
+    if any(role.placed for role in roles):
+        kept.append("a.id")
+    distinct = {role.column: role for role in roles}
+    classes = tuple(dict.fromkeys(role.classes for role in roles))
+    levels = [f"{_reached(role, classes)} AS {role.column}" for role in distinct.values()]
+    near = f" AND a.ego_distance <= {number(options.radius + SLACK)}" if own_ego and options.radius is not None else ""
+    narrow = (
+        f"SELECT {EGO}.f, a.number AS row, {', '.join([*kept, *levels])} FROM {OBJECTS} a "
+        f"JOIN stage0 {EGO} ON a.frame = {EGO}.frame WHERE {EGO}.missed IS NULL AND ({' OR '.join(classes)}){near}"
+    )
+    pools: dict[str, int] = {}
+    blamed: list[tuple[str, int]] = []
+    counts: dict[str, str] = {}
+    for role in roles:
+        pools[role.classes] = pools.get(role.classes, 0) + 1
+        # With any object as the ego, the label's own ego may play another role.
+        least = pools[role.classes] - (not own_ego)
+        count = counts.setdefault(f"count(*) FILTER ({role.column} >= 1)", f"n{len(counts)}")
+        step = draft.step(f"{role.thing.name}.class", role.thing.span, f"no {role.thing.category}")
+        blamed.append((f"coalesce({count}, 0) < {least}", step))
+    for role in roles:
+        furthest = counts.setdefault(f"max({role.column})", f"n{len(counts)}")
+        for place, each in enumerate(role.plain, 1):
+            blamed.append((f"{furthest} <= {place}", draft.step(each.what, each.span)))
+    tallied = ", ".join(f"{sql} AS {name}" for sql, name in counts.items())
+    draft.stage(
+        [_table("narrow", narrow)],
+        blamed,
+        f"LEFT JOIN (SELECT f, {tallied} FROM narrow GROUP BY f) t ON t.f = s.f",
+    )
+
+
+def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) -> str:
+    """What memberships of regions decide; returns the table of objects and how far they come."""
+    mine = {each.region: f"e{place}" for place, each in enumerate(own)}
+    distinct = {role.column: role for role in roles if role.placed}
+    others: dict[str, str] = {}
+    for role in distinct.values():
+        for each in role.placed:
+            others.setdefault(each.region, f"g{len(others)}")
+    if not mine and not others:
+        return "narrow"
+    flags = [f"bool_or({sql}) AS {name}" for sql, name in (*mine.items(), *others.items())]
+    left = f"f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)"
+    asked = [f"SELECT f, frame, 'ego' AS object FROM stage0 WHERE {left}"] if mine else []
+    if others:
+        placed = " OR ".join(f"n.{name} = {role.full}" for name, role in distinct.items())
+        asked.append(
+            f"SELECT n.f, {EGO}.frame, n.id AS object FROM narrow n JOIN stage0 {EGO} USING (f) "
+            f"WHERE ({placed}) AND n.{left}"
+        )
+    statements = [
+        _table(
+            "flags",
+            f"SELECT q.f, m.object, {', '.join(flags)} FROM {MEMBERSHIPS} m JOIN ({' UNION ALL '.join(asked)}) q "
+            f"ON m.frame = q.frame AND m.object = q.object WHERE {' OR '.join((*mine, *others))} "
+            "GROUP BY q.f, m.object",
+        )
+    ]
+    joined = "LEFT JOIN flags e ON e.f = s.f AND e.object = 'ego'" if mine else ""
+    blamed = [
+        (f"NOT coalesce(e.{name}, false)", draft.step(each.what, each.span))
+        for each, name in zip(own, mine.values(), strict=False)
+    ]
+    if others:
+        raised: list[str] = []
+        for name, role in distinct.items():
+            further = _level([f"coalesce(g.{others[each.region]}, false)" for each in role.placed], role.full)
+            raised.append(f"CASE WHEN {name} < {role.full} THEN {name} ELSE {further} END AS {name}")
+        statements.append(
+            _table(
+                "placed",
+                f"SELECT n.* REPLACE ({', '.join(raised)}) FROM narrow n "
+                "LEFT JOIN flags g ON g.f = n.f AND g.object = n.id "
+                f"WHERE n.f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)",
+            )
+        )
+        tallied = ", ".join(f"max({name}) AS m{name}" for name in distinct)
+        joined += f" LEFT JOIN (SELECT f, {tallied} FROM placed GROUP BY f) t ON t.f = s.f"
+        for role in roles:
+            for place, each in enumerate(role.placed, role.full):
+                blamed.append((f"m{role.column} <= {place}", draft.step(each.what, each.span)))
+    draft.stage(statements, blamed, joined)
+    return "placed" if others else "narrow"
+
+
+def _distinct(
+    draft: _Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[Condition]]
+) -> None:
+    """Who is left for each role, and whether there are enough of them for any two and for all."""
+    tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
+    kept = "".join(f", {name}" for name in sorted({*_columns("a", tied), *_columns("b", tied)}))
+    flags = [f"{role.column} = {role.full + len(role.placed)}" for role in roles]
+    chosen = ", ".join(f"{flag} AS r{place}" for place, flag in enumerate(flags))
+    table = _table(
+        "roles",
+        f"SELECT f, row{kept}, {chosen} FROM {source} "
+        f"WHERE ({' OR '.join(dict.fromkeys(flags))}) AND f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)",
+    )
+    together: list[tuple[int, ...]] = [tuple(range(len(roles)))]
+    if 2 < len(roles) <= _MOST_COUNTED:
+        together = [*itertools.combinations(range(len(roles)), 2), *together]
+    counts = [
+        f"count(*) FILTER ({' OR '.join(f'r{place}' for place in places)}) AS n{number_}"
+        for number_, places in enumerate(together)
+    ]
+    blamed: list[tuple[str, int]] = []
+    tally = ""
+    if len(roles) > 1:
+        step = draft.step("correspondence", roles[-1].thing.span, "no distinct label objects for all objects")
+        blamed = [(f"coalesce(n{place}, 0) < {len(places)}", step) for place, places in enumerate(together)]
+        tally = f"LEFT JOIN (SELECT f, {', '.join(counts)} FROM roles GROUP BY f) t ON t.f = s.f"
+    draft.stage([table], blamed, tally)
+
+
+def _pair(draft: _Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[Condition]) -> None:
+    """Two roles whose objects conditions tie together: whoever has no partner is out of the role."""
+    one, other = (next(place for place, role in enumerate(roles) if role.thing.index == index) for index in objects)
+    ego = f" JOIN stage0 {EGO} ON {EGO}.f = a.f" if _columns(EGO, [each.sql for each in tied]) else ""
+    level = _level([each.sql for each in tied])
+    statements = [
+        _table(
+            "pairs",
+            f"SELECT a.f, a.row AS one, b.row AS other, {level} AS level FROM roles a "
+            f"JOIN roles b ON a.f = b.f AND a.row <> b.row{ego} WHERE a.r{one} AND b.r{other} "
+            f"AND a.f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)",
+        ),
+        _table(
+            "roles",
+            "SELECT * REPLACE ("
+            + ", ".join(
+                f"r{place} AND row IN (SELECT {side} FROM pairs WHERE level = {len(tied)}) AS r{place}"
+                for place, side in ((one, "one"), (other, "other"))
+            )
+            + ") FROM roles WHERE f IN (SELECT f FROM pairs)",
+        ),
+    ]
+    blamed = [(f"coalesce(t.level, 0) <= {place}", draft.step(each.what, each.span)) for place, each in enumerate(tied)]
+    draft.stage(statements, blamed, "LEFT JOIN (SELECT f, max(level) AS level FROM pairs GROUP BY f) t ON t.f = s.f")

@@ -1,0 +1,106 @@
+"""Hidden places on a bend of many short segments: their directions follow from one another, few have to be tried."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import compiled, drawn, label_of
+from shapely import LineString, Point
+
+from scenicq.geometry.features import MapFeature
+from scenicq.geometry.network import Network
+from scenicq.match.fields import heading_propagation
+from scenicq.match.matcher import Matcher
+from scenicq.match.verdict import Match, NoMatch
+
+TURN = np.linspace(0.0, 1.5 * math.pi, 60)
+LINE = [(20.0 * math.cos(angle), 20.0 * math.sin(angle)) for angle in TURN.tolist()]
+AREA = LineString(LINE).buffer(2.0, cap_style="flat")
+BEND = Network(
+    "bend",
+    [
+        MapFeature("road", "road", AREA, {"forward": "group"}),
+        MapFeature("group", "lane_group", AREA, {"road": "road"}),
+        MapFeature("lane", "lane", AREA, {"road": "road", "group": "group", "centerline": [LINE]}),
+    ],
+)
+HEADER = "model scenic.domains.driving.model\nego = new Car\nspot = new OrientedPoint on road\n"
+PROGRAMS = {
+    "a known way": "new Car following roadDirection from spot for 12",
+    "a random way": "new Car following roadDirection from spot for Range(5, 15)",
+    "facing as there": "new Car following roadDirection from spot for 12, "
+    "facing Range(-5, 5) deg relative to spot.heading",
+    "two ways": "next = new OrientedPoint following roadDirection from spot for 4\n"
+    "new Car following roadDirection from next for 6",
+}
+FEW = 5000
+"""Cases for six labels: each has four steps or more over some ten directions, ten thousand combinations at least."""
+
+
+@pytest.fixture
+def cases(monkeypatch):
+    """How many cases are narrowed."""
+    counts = []
+
+    def counted(some):
+        counts.append(some.size)
+        return settled(some)
+
+    settled = heading_propagation.settled
+    monkeypatch.setattr(heading_propagation, "settled", counted)
+    return counts
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_bend_is_followed_without_a_solver_and_without_all_combinations(name, cases):
+    scenario = compiled(HEADER + PROGRAMS[name], BEND)
+    matcher = Matcher(scenario)
+    for seed in range(2):
+        label = label_of(scenario, drawn(scenario, seed), random.Random(seed))
+        (car,) = label.objects
+        assert isinstance(matcher.match(label), Match)
+        # no chain of this length leads out of the lane by more than it bends away
+        away = replace(car, x=car.x * 2.0, y=car.y * 2.0)
+        assert isinstance(matcher.match(replace(label, objects=(away,))), NoMatch)
+        turned = replace(car, heading=car.heading + 1.5)
+        assert isinstance(matcher.match(replace(label, objects=(turned,))), NoMatch)
+    assert 0 < sum(cases) < FEW
+
+
+def test_a_place_matches_where_walking_back_leads_to_a_spot_on_the_road():
+    scenario = compiled(HEADER + PROGRAMS["a known way"], BEND)
+    matcher, field = Matcher(scenario), BEND.roadDirection
+    base = label_of(scenario, drawn(scenario, 0), random.Random(0))
+    rng, seen = np.random.default_rng(4), Counter()
+    for _ in range(40):
+        angle, radius = rng.uniform(0.9, 4.4), rng.uniform(17.0, 25.5)
+        x, y = radius * math.cos(angle), radius * math.sin(angle)
+        # where the tolerance may tell, at the ends of the road's width and where two segments meet, both will do
+        reached = {starts_on_road(x + dx, y + dy) for dx in (-0.002, 0, 0.002) for dy in (-0.002, 0, 0.002)}
+        if len(reached) == 1:
+            car = replace(base.objects[0], x=x, y=y, heading=field.values(x, y)[0])
+            verdict = matcher.match(replace(base, objects=(car,)))
+            assert isinstance(verdict, Match if reached == {True} else NoMatch), (x, y)
+            seen[type(verdict)] += 1
+    assert min(seen[Match], seen[NoMatch]) > 3
+
+
+def starts_on_road(x, y):
+    """Whether some spot on the road leads to a point by four steps of 3 m along the field."""
+    field, places = BEND.roadDirection, np.array([(x, y)])
+    headings = np.unique(field.headings(np.array([(-30.0, -30.0, 30.0, 30.0)]))[1])
+    for _ in range(4):
+        back = 3.0 * np.stack([np.sin(headings), -np.cos(headings)], axis=1)
+        places = (places[:, None] + back[None]).reshape(-1, 2)
+        wanted = np.tile(headings, len(places) // len(headings)).tolist()
+        found = field.values_many(places)
+        fits = [any(abs(one - heading) < 1e-8 for one in values) for values, heading in zip(found, wanted, strict=True)]
+        places = places[np.array(fits)]
+        if not len(places):
+            return False
+    return any(AREA.covers(Point(*place)) for place in places)

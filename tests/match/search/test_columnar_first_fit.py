@@ -1,0 +1,123 @@
+"""Labels decided together: the same verdict, correspondence and witness, to the last bit, as one by one."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from programs import HEADER, PROGRAMS
+from scenes import STREET, compiled, drawn, label_of
+
+from scenicq.match.decide.compiled_expressions import clipped, turned
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.problem.candidates import candidates_of
+from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.verdict import Match
+from scenicq.smt.solver import open_solver
+
+ROWS = """
+ego = new Car on road
+front = ego
+for number in range(3):
+    front = new Car ahead of front by Range(2, 4) + Range(0, 1)
+new Bicycle right of front by Normal(1.5, 0.25)
+"""
+ANY_HEADING = """
+ego = new Car on road
+other = new Car at (ego offset by (Range(-3, 3), Range(5, 30))), facing Normal(0, 1) relative to ego.heading
+require other.length * 2 > ego.width and (distance from ego to other) > 4
+"""
+TURNED = """
+ego = new Car on road
+other = new Car at ego.position offset along (ego.heading + 0.3) by (Range(-3, 3), Range(5, 30)),
+    facing (Range(-1, 1) + min(ego.heading, 0.2)) relative to roadDirection
+"""
+FASTER = """
+ego = new Car on road
+other = new Car ahead of ego by Range(1, 2) + ego.speed, with speed Range(0, 30), facing Discrete({0.1: 1, 0.2: 2})
+"""
+CASES = {**PROGRAMS, "rows": ROWS, "any heading": ANY_HEADING, "turned": TURNED, "faster": FASTER}
+SURE = ("ahead", "offset", "left of", "facing field", "normal", "rows", "any heading", "turned")
+"""Programs of which every drawn scene is decided together with the others."""
+OPTIONS = (
+    MatchOptions(),
+    MatchOptions(tolerance=Tolerance(x=0.5, y=0.2, heading=0.1), radius=30.0),
+    MatchOptions(tolerance=Tolerance(position=1.0, heading=0.3)),
+)
+
+
+@pytest.fixture(scope="module")
+def solver():
+    with open_solver("portable") as opened:
+        yield opened
+
+
+def labels(scenario, seeds):
+    for seed in seeds:
+        rng = random.Random(seed)
+        label = label_of(scenario, drawn(scenario, seed), rng, distractors=seed % 4, sizes=bool(seed % 2))
+        yield label
+        moved = [
+            replace(each, x=each.x + rng.choice([0.0, 0.2, 6.0]), heading=each.heading + rng.choice([0.0, 0.05, 2.0]))
+            for each in label.objects
+        ]
+        yield replace(label, objects=tuple(moved))
+        yield replace(label, objects=label.objects[1:])
+        if seed % 2:
+            unsized = [replace(each, width=None, length=None) for each in label.objects]
+            yield replace(label, objects=tuple(unsized))
+
+
+def with_candidates(scenario, options, found):
+    return [(label, candidates_of(scenario, label, 0, options, {})) for label in found]
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("options", OPTIONS, ids=["plain", "box", "disc"])
+def test_the_same_is_found_together(name, options, solver):
+    scenario = compiled(HEADER + CASES[name], STREET)
+    matcher = Matcher(scenario, options, solver)
+    asked = with_candidates(matcher.scenario, options, labels(scenario, range(4)))
+    alone = [matcher.match(label, among=among) for label, among in asked]
+    together = list(matcher.match_all(asked, matcher.look_up(asked)))
+    assert together == alone
+    assert list(map(str, together)) == list(map(str, alone))
+    if not options.radius:
+        assert any(isinstance(verdict, Match) for verdict in together)
+
+
+@pytest.mark.parametrize("name", SURE)
+def test_what_surely_matches_is_not_decided_one_by_one(name, monkeypatch):
+    scenario = compiled(HEADER + CASES[name], STREET)
+    options = MatchOptions(tolerance=Tolerance(position=0.01, heading=0.01))
+    matcher = Matcher(scenario, options)
+    asked = []
+    for seed in range(6):
+        label = label_of(scenario, drawn(scenario, seed), random.Random(seed))
+        who = {each.id: number for number, each in enumerate(label.objects, 1)}
+        asked.append((label, {each.index: (who[f"object-{each.index}"],) for each in scenario.objects if each.index}))
+    alone = []
+    monkeypatch.setattr(Matcher, "match", lambda *args, **more: alone.append(args))
+    found = list(matcher.match_all(asked, MapLookups()))
+    assert not alone
+    assert all(isinstance(verdict, Match) for verdict in found)
+
+
+numbers = st.floats(allow_nan=False, allow_infinity=False, width=64)
+
+
+@given(st.lists(st.tuples(numbers, numbers, numbers), min_size=1, max_size=20))
+def test_columns_are_what_numbers_are(rows):
+    values, lows, highs = (np.array(each) for each in zip(*rows, strict=True))
+    one_by_one = [clipped(*row) for row in rows]
+    together = clipped(values, lows, highs).tolist()
+    assert list(map(repr, together)) == list(map(repr, one_by_one))
+    cosines, sines = turned(values)
+    assert [*zip(cosines.tolist(), sines.tolist(), strict=True)] == [turned(float(value)) for value in values]
+    assert math.cos(rows[0][0]) == cosines[0]

@@ -1,0 +1,70 @@
+"""Labels decided without a search: the same verdict, correspondence, witness and cause as by the search."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import pytest
+from programs import HEADER, PROGRAMS
+from scenes import compiled, drawn, label_of
+
+from scenicq.match import matcher as matching
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.search.backtracking import SilentReporter
+from scenicq.match.verdict import Match
+from scenicq.smt.solver import open_solver
+
+ROWS = """
+ego = new Car on road
+front = ego
+for number in range(4):
+    if number % 2 == 0:
+        front = new Car ahead of front by Normal(3, 0.5)
+    else:
+        new Bicycle right of front by Normal(1.5, 0.25)
+"""
+CROWD = """
+ego = new Car on road
+for number in range(4):
+    new Pedestrian offset by (Range(-5, 5), Range(3, 103)), facing Range(-120, 120) deg relative to ego.heading
+"""
+CASES = {**PROGRAMS, "rows": ROWS, "crowd": CROWD}
+BY_THEMSELVES = ("ahead", "offset", "left of", "facing field", "normal", "rows", "crowd")
+"""Programs of which every drawn scene is decided without a search."""
+
+
+@pytest.fixture(scope="module")
+def solver():
+    with open_solver("portable") as opened:
+        yield opened
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("radius", [None, 30.0])
+def test_the_same_is_found_without_a_search(name, radius, solver, monkeypatch):
+    scenario = compiled(HEADER + CASES[name])
+    matcher = Matcher(scenario, MatchOptions(radius=radius), solver)
+    direct = []
+    solve = matching.Casting.solve
+
+    def counted(casting):
+        direct.append(solve(casting))
+        return direct[-1]
+
+    monkeypatch.setattr(matching.Casting, "solve", counted)
+    matched = 0
+    for seed in range(4):
+        rng = random.Random(seed)
+        label = label_of(scenario, drawn(scenario, seed), rng, distractors=seed)
+        moved = tuple(replace(each, x=each.x + rng.choice([0.0, 4.0])) for each in label.objects)
+        for each in (label, replace(label, objects=moved), replace(label, objects=label.objects[1:])):
+            given = {scenario.objects[-1].name: each.objects[0].id} if each.objects and seed % 2 else {}
+            found = matcher.match(each, given=given)
+            assert found == matcher.match(each, SilentReporter(), given=given)
+            matched += isinstance(found, Match)
+        if name in BY_THEMSELVES and radius is None:
+            assert isinstance(matcher.match(label), Match)
+            assert isinstance(direct[-1], matching.Solution)
+    assert matched or radius

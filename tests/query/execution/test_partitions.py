@@ -1,0 +1,111 @@
+"""A query run piece by piece gives what it gives in one go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from scenicq.errors import DataError
+from scenicq.importers.ingest import ingest
+from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
+from scenicq.query.execution.results import record
+from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.store.dataset import Dataset, open_dataset
+
+ROOT = Path(__file__).parents[3]
+PROGRAM = ROOT / "sample_data" / "scenarios" / "01_pedestrian_facing_ego.scenic"
+OPTIONS = QueryOptions(MatchOptions(tolerance=parse_tolerance("x=0.25,y=0.25,heading=5deg"), classes="coarse"))
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory) -> Dataset:
+    target = tmp_path_factory.mktemp("partitions") / "crossroads"
+    ingest(ROOT / "sample_data" / "crossroads", target)
+    return open_dataset(target)
+
+
+def run_shard(dataset: Dataset, folder: Path, piece: Partition, options: QueryOptions = OPTIONS) -> Path:
+    source = read_program(PROGRAM)
+    query = Query(dataset, source, options, recordings=piece.recordings)
+    question = fingerprint(dataset, source.text, options)
+    records = (record(result) for result in query.results())
+    return write_partition(folder, question, piece, records, query.funnel)
+
+
+def whole(dataset: Dataset) -> tuple[list[dict], Query]:
+    query = Query(dataset, read_program(PROGRAM), OPTIONS)
+    return [record(result) for result in query.results()], query
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 6, 100])
+def test_pieces_hold_every_recording_once(dataset, count):
+    pieces = partitions(dataset, count)
+    names = sorted(dataset.manifest.by_recording)
+    stretches = [stretch for piece in pieces for stretch in piece.recordings.values()]
+    covered = [name for stretch in stretches for name in names if stretch.first <= name <= stretch.last]
+    assert covered == names
+    assert len(pieces) <= count
+    assert [piece.number for piece in pieces] == list(range(len(pieces)))
+    assert sum(piece.frames for piece in pieces) == dataset.manifest.total.frames
+
+
+@pytest.mark.parametrize("count", [1, 3, 6])
+def test_pieces_put_together_are_the_whole(dataset, tmp_path, count):
+    expected, query = whole(dataset)
+    assert expected
+    for piece in reversed(partitions(dataset, count)):
+        run_shard(dataset, tmp_path, piece)
+    found = gather(tmp_path)
+    assert list(found.records()) == expected
+    assert found.funnel == replace(query.funnel, warnings=[])
+    assert found.funnel.frames == dataset.manifest.total.frames
+
+
+def test_a_missing_piece_is_named(dataset, tmp_path):
+    pieces = partitions(dataset, 3)
+    for piece in (pieces[0], pieces[2]):
+        run_shard(dataset, tmp_path, piece)
+    with pytest.raises(DataError, match="1 of 3 pieces are missing: 2"):
+        gather(tmp_path)
+    question = fingerprint(dataset, read_program(PROGRAM).text, OPTIONS)
+    assert [is_done(tmp_path, question, number, 3) for number in range(3)] == [True, False, True]
+
+
+def test_a_truncated_piece_is_refused(dataset, tmp_path):
+    path = run_shard(dataset, tmp_path, partitions(dataset, 1)[0])
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(lines[:-1]))
+    with pytest.raises(DataError, match="not a complete piece"):
+        gather(tmp_path)
+
+
+def test_pieces_of_two_questions_do_not_mix(dataset, tmp_path):
+    (piece,) = partitions(dataset, 1)
+    run_shard(dataset, tmp_path, piece)
+    run_shard(dataset, tmp_path, piece, replace(OPTIONS, match=MatchOptions()))
+    with pytest.raises(DataError, match="2 different questions"):
+        gather(tmp_path)
+    assert gather(tmp_path, fingerprint(dataset, read_program(PROGRAM).text, OPTIONS)).funnel.matches
+
+
+def test_how_it_is_run_is_not_part_of_the_question(dataset):
+    text = read_program(PROGRAM).text
+    same = fingerprint(dataset, text, replace(OPTIONS, jobs=4, prefilter=False))
+    assert same == fingerprint(dataset, text, OPTIONS)
+    assert fingerprint(dataset, text + " ", OPTIONS) != same
+
+
+def test_a_failed_piece_leaves_nothing_behind(dataset, tmp_path):
+    (piece,) = partitions(dataset, 1)
+
+    def broken():
+        yield {"frame": "1"}
+        raise KeyboardInterrupt
+
+    query = Query(dataset, read_program(PROGRAM), OPTIONS)
+    with pytest.raises(KeyboardInterrupt):
+        write_partition(tmp_path, "question", piece, broken(), query.funnel)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,250 @@
+"""A query that is run by several processes gives what one gives, whatever happens to them."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenicq.errors import DataError
+from scenicq.importers.ingest import ingest
+from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.verdict import Unknown
+from scenicq.query.execution import dask_engine as dask
+from scenicq.query.execution.partitions import partitions
+from scenicq.query.execution.results import Funnel, record
+from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.shards import Question, in_order, run_here
+from scenicq.query.prefilter import executor
+from scenicq.store.dataset import Dataset, open_dataset
+
+ROOT = Path(__file__).parents[3]
+PROGRAM = ROOT / "sample_data" / "scenarios" / "01_pedestrian_facing_ego.scenic"
+OPTIONS = QueryOptions(
+    MatchOptions(tolerance=parse_tolerance("x=0.25,y=0.25,heading=5deg"), classes="coarse"), prefilter=False, every=True
+)
+
+needs_signals = pytest.mark.skipif(os.name != "posix", reason="signals")
+Found = tuple[list[dict[str, Any]], Funnel]
+
+
+@pytest.fixture(scope="module")
+def dataset(crossroads: Path) -> Dataset:
+    return open_dataset(crossroads)
+
+
+def query(dataset: Dataset, **changes: Any) -> Query:
+    return Query(dataset, read_program(PROGRAM), replace(OPTIONS, **changes))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(dataset: Dataset) -> Found:
+    one = query(dataset)
+    return [record(result) for result in one.results()], one.funnel
+
+
+def taken(found: Query, results: Iterator[Any], now_and_then: Any = lambda: None) -> Found:
+    records = []
+    with contextlib.closing(results):
+        for result in results:
+            records.append(record(result))
+            now_and_then()
+    return records, found.funnel
+
+
+def kill_one() -> None:
+    children = multiprocessing.active_children()
+    if children:
+        os.kill(random.choice(children).pid, signal.SIGKILL)
+
+
+@pytest.fixture
+def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executor, "_FEWEST_FRAMES", 8)
+    monkeypatch.setattr(executor, "_MOST_FRAMES", 16)
+
+
+@needs_signals
+@pytest.mark.usefixtures("small_batches")
+@pytest.mark.parametrize("kills", [2, pytest.param(20, marks=pytest.mark.slow)])
+def test_matching_processes_that_are_killed(dataset: Dataset, undisturbed: Found, kills: int) -> None:
+    found, left = query(dataset, jobs=2), [kills]
+
+    def kill() -> None:
+        if left[0] and random.random() < 0.3:
+            left[0] -= 1
+            kill_one()
+
+    assert taken(found, found.results(), kill) == undisturbed
+    assert left == [0]
+    assert multiprocessing.active_children() == []
+
+
+@needs_signals
+@pytest.mark.slow
+def test_a_frame_that_kills_is_unknown_and_no_other(dataset: Dataset, scenarios: Path) -> None:
+    program = read_program(scenarios / "02_crossing_cars.scenic")
+    options = QueryOptions(MatchOptions(method="smt"), solver="sh -c 'kill -9 $PPID'", limit=None)
+    alone = list(Query(dataset, program, replace(options, solver="portable")).results())
+    found = list(Query(dataset, program, replace(options, jobs=2)).results())
+    assert [result.frame for result in found] == [result.frame for result in alone] != []
+    assert {result.verdict.reason for result in found if isinstance(result.verdict, Unknown)} == {"crash"}
+
+
+@needs_signals
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_pieces_in_order_are_the_whole(dataset: Dataset, undisturbed: Found, jobs: int) -> None:
+    found, decided, killed = query(dataset, jobs=jobs), [], []
+
+    def kill() -> None:
+        if jobs > 1 and not killed:
+            killed.append(kill_one())
+
+    results = in_order(found, run_here, partitions(dataset, 6), decided.append)
+    assert taken(found, results, kill) == undisturbed
+    assert sum(decided) == dataset.manifest.total.frames
+
+
+def test_pieces_of_several_maps_come_as_the_query_finds_them(tmp_path: Path) -> None:
+    ingest(ROOT / "sample_data" / "nuscenes_tiny", tmp_path / "d")
+    dataset = open_dataset(tmp_path / "d")
+    program = tmp_path / "any.scenic"
+    program.write_text("model scenic.domains.driving.model\nego = new Car on road\nother = new Car\n")
+    whole = Query(dataset, read_program(program), OPTIONS)
+    expected = taken(whole, whole.results())
+    for count in (1, 2, 100):
+        found = Query(dataset, read_program(program), OPTIONS)
+        assert taken(found, in_order(found, run_here, partitions(dataset, count), lambda _: None)) == expected
+
+
+def test_another_dataset_under_the_same_path_is_noticed(dataset: Dataset, tmp_path: Path) -> None:
+    asked = Question.of(query(dataset))
+    ingest(ROOT / "sample_data" / "nuscenes_tiny", tmp_path / "d")
+    with pytest.raises(DataError, match="has changed since the query began"):
+        replace(asked, dataset=str(tmp_path / "d")).query()
+    assert asked.query().options.jobs == 1
+
+
+def dask_children() -> list[Any]:
+    psutil = pytest.importorskip("psutil")
+    found = []
+    for each in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            found += [each] if "spawn_main" in " ".join(each.cmdline()) else []
+    return found
+
+
+@pytest.fixture
+def needs_dask() -> None:
+    pytest.importorskip("distributed", reason="scenicq[dask] is not installed")
+
+
+@needs_signals
+@pytest.mark.usefixtures("needs_dask")
+def test_dask_gives_the_same_and_listens_on_the_loopback_only(dataset: Dataset, undisturbed: Found) -> None:
+    psutil = pytest.importorskip("psutil")
+    found, addresses = query(dataset, jobs=2), set()
+
+    def look() -> None:
+        if not addresses:
+            processes = [psutil.Process(), *dask_children()]
+            opened = [each for process in processes for each in process.net_connections("inet")]
+            addresses.update(each.laddr.ip for each in opened if each.status == psutil.CONN_LISTEN)
+
+    assert (
+        taken(found, in_order(found, dask.dask_engine(), partitions(dataset, 6), lambda _: None), look) == undisturbed
+    )
+    assert addresses == {"127.0.0.1"}
+    assert dask_children() == []
+
+
+@needs_signals
+@pytest.mark.slow
+@pytest.mark.usefixtures("needs_dask")
+def test_dask_workers_that_are_killed(dataset: Dataset, undisturbed: Found) -> None:
+    chance, killed = random.Random(0), 0
+    while killed < 20:
+        found = query(dataset, jobs=2)
+
+        def kill(least: int = killed) -> None:
+            nonlocal killed
+            children = dask_children()
+            if killed < least + 5 and children and chance.random() < 0.2:
+                killed += 1
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(chance.choice(children).pid, signal.SIGKILL)
+
+        engine = dask.dask_engine()
+        assert taken(found, in_order(found, engine, partitions(dataset, 6), lambda _: None), kill) == undisturbed
+
+
+@pytest.mark.usefixtures("needs_dask")
+@pytest.mark.slow
+def test_no_scheduler_where_one_should_be(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dask, "_CONNECT_S", 1)
+    with pytest.raises(DataError, match=r"no Dask scheduler answers at tcp://127.0.0.1:9") as error:
+        list(dask.dask_engine("tcp://127.0.0.1:9")(query(dataset), (), lambda _: None))
+    assert error.value.diagnostics[0].code == "engine-failed"
+
+
+def test_without_the_extra_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dask, "find_spec", lambda _: None)
+    with pytest.raises(DataError, match=r"pip install 'scenicq\[dask\]'"):
+        dask.dask_engine()
+
+
+RESUMED = """
+import sys
+from scenicq.query.execution import shards
+shards.PIECE_FRAMES = 20
+from scenicq_cli.main import main
+if __name__ == "__main__":
+    main()
+"""
+
+
+@needs_signals
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(
+    ("jobs", "kills"), [(1, 2), *(pytest.param(jobs, 20, marks=pytest.mark.slow) for jobs in (1, 2))]
+)
+def test_a_resumed_run_that_is_killed(crossroads: Path, tmp_path: Path, run: Any, kills: int, jobs: int) -> None:
+    given = ["match", PROGRAM, crossroads, "--tolerance", "heading=5deg,position=0.3", "--classes", "coarse", "--all"]
+    given += ["--no-prefilter"]
+    assert run(*given, "-o", tmp_path / "undisturbed.jsonl").exit_code == 0
+    (tmp_path / "program.py").write_text(RESUMED)
+    command = [sys.executable, tmp_path / "program.py", *given, "-o", tmp_path / "found.jsonl", "--resume"]
+    command += ["--jobs", str(jobs)]
+
+    def start() -> subprocess.Popen[bytes]:
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        return subprocess.Popen([str(word) for word in command], env=environment, stderr=subprocess.DEVNULL)
+
+    began = time.monotonic()
+    assert start().wait() == 0
+    whole_s = time.monotonic() - began
+    expected = (tmp_path / "undisturbed.jsonl").read_bytes()
+    assert (tmp_path / "found.jsonl").read_bytes() == expected
+    chance = random.Random(kills)
+    for _ in range(kills):
+        (tmp_path / "found.jsonl").unlink(missing_ok=True)
+        process = start()
+        time.sleep(chance.uniform(0.3, 1.0) * whole_s)
+        process.kill()
+        process.wait()
+        if (tmp_path / "found.jsonl").exists():
+            assert (tmp_path / "found.jsonl").read_bytes() == expected
+    assert start().wait() == 0
+    assert (tmp_path / "found.jsonl").read_bytes() == expected
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["found.jsonl", "program.py", "undisturbed.jsonl"]
