@@ -49,6 +49,7 @@ CODES: dict[str, str] = {
     "runtime-error": "evaluating the program failed",
     "map-lacks": "the map of the dataset has no element of the needed kind",
     "option-invalid": "an option has a value that cannot be used",
+    "sql-invalid": "a question in SQL that the database refuses",
     # the data
     "unknown-class": "an object class that no taxonomy lists",
     "dataset-unrecognised": "no importer recognises the source",
