@@ -23,6 +23,7 @@ from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
 from scenicq.query.execution.compiled_map import about_dataset, map_remark
+from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names
 from scenicq.query.prefilter.plan import Plan
@@ -46,6 +47,7 @@ class QueryOptions:
         limit: Matches after which to stop; None for all.
         every: Whether frames that do not match are results too.
         all_matches: Whether every correspondence of a frame is a result of its own.
+        strict: Whether what the program sets and no label has is an error.
     """
 
     match: MatchOptions = MatchOptions()
@@ -57,6 +59,7 @@ class QueryOptions:
     limit: int | None = None
     every: bool = False
     all_matches: bool = False
+    strict: bool = False
 
 
 def read_program(path: str | Path) -> Source:
