@@ -70,6 +70,7 @@ CODES: dict[str, str] = {
     "solver-failed": "the solver cannot be started",
     # the answers
     "frame-excluded": "what a frame shows is not what the program allows",
+    "never-compared": "the program sets what no label of the dataset has",
 }
 """Every diagnostic code with its meaning."""
 

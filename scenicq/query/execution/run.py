@@ -111,6 +111,7 @@ class _Known:
 
     worlds: dict[str, CompiledMap] = field(default_factory=dict["str", "CompiledMap"])
     extents: dict[str, list[Extent]] | None = None
+    coverage: Coverage | None = None
 
 
 @dataclass(eq=False)
@@ -202,9 +203,32 @@ class Query:
             raise errors[0]
         worlds = [world for world in found.values() if isinstance(world, CompiledMap)]
         if worlds:
-            self.funnel.warnings += _remarks(worlds[0].scenario)
+            compared = self.coverage()
+            self.funnel.warnings += [*compared.warnings, *_remarks(worlds[0].scenario)]
+            self.funnel.missing.update(compared.missing)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
+        return found
+
+    def coverage(self) -> Coverage:
+        """How much of what the program sets is compared with the labels; found out once.
+
+        Raises:
+            ScenarioError: The program is wrong; never-compared, where the options are strict.
+        """
+        self._check_ego()
+        if self._known.coverage is None:
+            scenarios: list[Scenario] = []
+            for name in self.dataset.maps:
+                try:
+                    scenarios.append(self.world(name).scenario)
+                except ScenarioError as error:
+                    if error.diagnostics[0].code != "map-lacks":
+                        raise
+            self._known.coverage = coverage(self.dataset, scenarios, self.options.match)
+        found = self._known.coverage
+        if self.options.strict and found.warnings:
+            raise ScenarioError([replace(each, severity="error") for each in found.warnings])
         return found
 
     def _frames(self, map_name: str) -> int:
