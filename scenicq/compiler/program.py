@@ -268,9 +268,7 @@ def _object(instance: Instance, name: str) -> ScenarioObject:
         properties["mutationScale"] = Property(to_scalar(instance.mutation, instance.span), False, instance.span)
     assert instance.index is not None
     mutated = _mutated(instance)
-    return ScenarioObject(
-        instance.index, name, instance.cls.category, properties, mutated, instance.span, uncomparable
-    )
+    return ScenarioObject(instance.index, name, instance.cls.category, properties, mutated, instance.span, uncomparable)
 
 
 def _mutated(instance: Instance) -> frozenset[str]:

@@ -117,7 +117,7 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
     for scenario in scenarios:
         for each in _settings(scenario, options):
             places.setdefault((each.span, each.name, each.category), each)
-    found = list(places.values())
+    found = sorted(places.values(), key=lambda each: each.span.start if each.span is not None else 0)
     if not found or not dataset.manifest.total.frames:
         return Coverage()
     with closing(dataset.connect()) as connection, dataset.blamed():

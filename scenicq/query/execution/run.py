@@ -5,7 +5,7 @@ The dataset is worked through block by block, in this process or in workers; res
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -210,21 +210,34 @@ class Query:
                 self.funnel.warnings.append(remark)
         return found
 
-    def coverage(self) -> Coverage:
+    def fitting(self, maps: Iterable[str] | None = None) -> Iterator[CompiledMap]:
+        """The scenario over each map that it fits.
+
+        Args:
+            maps: Only these; all by default.
+
+        Raises:
+            ScenarioError: The program is wrong.
+        """
+        for name in self.dataset.maps if maps is None else maps:
+            try:
+                yield self.world(name)
+            except ScenarioError as error:
+                if error.diagnostics[0].code != "map-lacks":
+                    raise
+
+    def coverage(self, maps: Sequence[str] | None = None) -> Coverage:
         """How much of what the program sets is compared with the labels; found out once.
+
+        Args:
+            maps: The program is compiled over these; over all by default.
 
         Raises:
             ScenarioError: The program is wrong; never-compared, where the options are strict.
         """
         self._check_ego()
         if self._known.coverage is None:
-            scenarios: list[Scenario] = []
-            for name in self.dataset.maps:
-                try:
-                    scenarios.append(self.world(name).scenario)
-                except ScenarioError as error:
-                    if error.diagnostics[0].code != "map-lacks":
-                        raise
+            scenarios = [each.scenario for each in self.fitting(maps)]
             self._known.coverage = coverage(self.dataset, scenarios, self.options.match)
         found = self._known.coverage
         if self.options.strict and found.warnings:
