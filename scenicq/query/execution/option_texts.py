@@ -39,6 +39,7 @@ class OptionTexts(TypedDict, total=False):
     limit: int | None
     every: bool
     all_matches: bool
+    strict: bool
     scenic: str | None
     initial: bool
     ignore_params: str | None
@@ -98,6 +99,6 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
         budget=given.get("budget", _DEFAULTS.budget),
         ignore_params=_DEFAULTS.ignore_params.union(_names(given.get("ignore_params"))),
     )
-    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches", "model")
+    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches", "strict", "model")
     values: dict[str, Any] = {name: value for name, value in given.items() if name in same}
     return QueryOptions(match=options, version=None if scenic is None else VERSIONS[scenic], **values)
