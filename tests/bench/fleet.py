@@ -25,7 +25,7 @@ from scenicq.compiler.default_street import street
 from scenicq.geometry.features import REFERENCES, MapFeature, names
 from scenicq.importers.base import Entry, Labels
 from scenicq.importers.report import Report
-from scenicq.importers.segments import World, Job, fingerprint, write_segments
+from scenicq.importers.segments import Job, World, fingerprint, write_segments
 from scenicq.store.columns import MemberColumns, RecordingColumns
 from scenicq.store.manifest import Manifest
 from scenicq.store.segment import SEGMENT_OBJECTS, segments_of
