@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ERRORS", "Errors", "average_precision", "box_errors", "mean_errors"]
+__all__ = ["ERRORS", "Errors", "average_precision", "box_errors", "mean_errors", "resampled_errors"]
 
 Reals = NDArray[np.float64]
 
@@ -132,3 +132,29 @@ def _running_mean(values: Reals) -> Reals:
     counts = np.cumsum(known)
     sums = np.nancumsum(values)
     return np.divide(sums, counts, out=np.zeros(len(values)), where=counts != 0)
+
+
+def resampled_errors(sums: Reals, counts: Reals, found: Reals, objects: Reals, *, clipped: bool) -> Reals:
+    """The mean of one error in each resample, shape (b,); nan where nothing was found.
+
+    Args:
+        sums: Sum of the error over what was found up to each class of scores, shape (b, n).
+        counts: Of how many it is known.
+        found: How many were found.
+        objects: How many label objects there are, shape (b,).
+        clipped: See `mean_errors`.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = sums / counts
+        recall = found / objects[:, None]
+    if not clipped:
+        return means[:, -1]
+    samples = np.linspace(0, 1, _SAMPLES)
+    first = round(100 * _NEAREST) + 1
+    values = np.full(len(sums), math.nan)
+    for row in range(len(sums)):
+        known = counts[row] > 0
+        if known.any():
+            reached = samples[first:][samples[first:] <= recall[row, -1]]
+            values[row] = np.interp(reached, recall[row, known], means[row, known]).mean() if len(reached) else 1.0
+    return values
