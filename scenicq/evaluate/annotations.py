@@ -143,9 +143,7 @@ def _annotations(objects: Any, points: tuple[str, ...]) -> Annotations:
         category=category,
         source_classes=source_classes,
         source_category=source_category,
-        **{
-            name: _reals(objects[name]) for name in ("x", "y", "heading", "width", "length", "height", "vx", "vy")
-        },
+        **{name: _reals(objects[name]) for name in ("x", "y", "heading", "width", "length", "height", "vx", "vy")},
         points={name: np.array([*map(count(name), told)], dtype=np.float64)[at] for name in points},
         visibility=visibility,
         visible=np.array([order[level] for level in levels], dtype=np.int32)[at],

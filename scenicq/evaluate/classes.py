@@ -53,7 +53,9 @@ class ClassFigures:
     errors: dict[str, Figure]
 
 
-def class_figures(detection: Detection, group: str, frames: Bools, weights: Reals, least: float) -> Iterator[ClassFigures]:
+def class_figures(
+    detection: Detection, group: str, frames: Bools, weights: Reals, least: float
+) -> Iterator[ClassFigures]:
     """The figures of each class that has label objects.
 
     Args:

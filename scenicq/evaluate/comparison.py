@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,12 +111,17 @@ def _percent(share: Share) -> str:
 def distance_names() -> tuple[str, ...]:
     """Names of the classes of distance."""
     ends = [f"{end:g}" for end in DISTANCES_M]
-    return (f"up to {ends[0]} m", *(f"{a} to {b} m" for a, b in zip(ends, ends[1:], strict=False)), f"over {ends[-1]} m")
+    return (
+        f"up to {ends[0]} m",
+        *(f"{low} to {high} m" for low, high in pairwise(ends)),
+        f"over {ends[-1]} m",
+    )
 
 
 def _table(values: Reals, recording: Numbers, stratum: Numbers, shape: tuple[int, int]) -> Reals:
     """Sums by recording and stratum."""
-    return np.bincount(recording * shape[1] + stratum, weights=values, minlength=shape[0] * shape[1]).reshape(shape)
+    sums = np.bincount(recording * shape[1] + stratum, weights=values, minlength=shape[0] * shape[1])
+    return sums.astype(np.float64).reshape(shape)
 
 
 def compare(
@@ -133,7 +139,8 @@ def compare(
     Args:
         about: What is compared.
         missed: Whether each object was missed, shape (n,).
-        mine, others: The groups, shape (n,).
+        mine: The objects in question, shape (n,).
+        others: Those that they are compared with, shape (n,).
         recording: Number of each object's recording, shape (n,).
         stratum: Number of each object's stratum; objects of one are alike.
         weights: How often each recording counts in each resample, shape (resamples, recordings).
@@ -147,9 +154,7 @@ def compare(
 
     counts = Counts(table(missed & mine), table(mine), table(missed & others), table(others))
     used = (counts.of.sum(axis=0) > 0) | (counts.other_of.sum(axis=0) > 0)
-    counts = Counts(
-        counts.missed[:, used], counts.of[:, used], counts.other_missed[:, used], counts.other_of[:, used]
-    )
+    counts = Counts(counts.missed[:, used], counts.of[:, used], counts.other_missed[:, used], counts.other_of[:, used])
     first, second = (float(values[0]) for values in rates(counts, np.ones((1, shape[0]))))
     many, many_others = rates(counts, weights)
     effective = effective_number(counts.of.sum(axis=1))

@@ -214,8 +214,11 @@ def _check_frame_of_reference(predictions: Predictions, frame: Numbers, frames: 
 def _classes(objects: Annotations, predictions: Predictions) -> tuple[list[str], Numbers, Numbers]:
     """The classes that are evaluated, and their numbers for label objects and predictions; -1 for those without."""
     protocol = predictions.protocol
-    own = dict(zip(objects.source_category.tolist(), objects.category.tolist(), strict=True))
-    tree_of = {objects.source_classes[source]: objects.classes[number] for source, number in own.items()}
+    sources, first = np.unique(objects.source_category, return_index=True)
+    tree_of: dict[str, str] = {
+        objects.source_classes[int(source)]: objects.classes[int(objects.category[row])]
+        for source, row in zip(sources, first, strict=True)
+    }
     if protocol.classes is not None:
         known = sorted(set(protocol.classes.values()))
         of_source = protocol.classes

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
 
 Bools = NDArray[np.bool_]
 
-Results: TypeAlias = "Path | str | Iterable[Result | Mapping[str, Any]]"
+Results: TypeAlias = Path | str | Iterable[Result | Mapping[str, Any]]
 """A file of results, results as a query gives them, or records of them."""
 
 _WORST = 50
@@ -142,7 +142,9 @@ def evaluate(
         hint = f"known are {', '.join(f'{known:g}' for known in THRESHOLDS_M)}"
         raise DataError(Diagnostic("option-invalid", f"no centre distance of {distance_m:g} m", hints=(hint,)))
     runs = None if simulated is None else read_simulated(Path(simulated), seed)
-    named = results if isinstance(results, Mapping) else {_name_of(results): results}
+    named: Mapping[str, Results] = (
+        cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}
+    )
     if isinstance(predictions, Path | str):
         predictions = read_predictions(Path(predictions))
     detection = detect(dataset, predictions, missing)
@@ -157,12 +159,8 @@ def evaluate(
             message = f"{simulated} has no run of {', '.join(missing_runs)}"
             hint = f"it has {', '.join(sorted(runs))}; a scenario is called after its file of results"
             raise DataError(Diagnostic("file-invalid", message, hints=(hint,)))
-        found = [
-            replace(each, simulated=verdict(runs[each.name], _decisive(each))) for each in found
-        ]
-    return Evaluation(
-        predictions.name, distance_m, least_score, tuple(found), tuple(_warnings(found)), detection
-    )
+        found = [replace(each, simulated=verdict(runs[each.name], _decisive(each))) for each in found]
+    return Evaluation(predictions.name, distance_m, least_score, tuple(found), tuple(_warnings(found)), detection)
 
 
 def _name_of(results: Results) -> str:
@@ -280,6 +278,7 @@ class _Judge:
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.nan_to_num(lost[numbers] / of[numbers])
         frames = detection.frames
-        for number in numbers[np.lexsort((numbers, -false[numbers], -lost[numbers], -share))][:_WORST].tolist():
+        order = np.lexsort((numbers, -false[numbers], -lost[numbers], -share))[:_WORST]
+        for number in map(int, numbers[order]):
             recording = frames.recordings[frames.recording[number]]
             yield WorstFrame(frames.names[number], recording, int(lost[number]), int(of[number]), int(false[number]))

@@ -80,9 +80,9 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
             unknown[where] = True
             continue
         matching[where] = True
-        known = {key: value for key, value in (each.get("witness") or {}).items() if value is not None}
+        known = _known(each, "witness")
         names = objects.ids if "frame" in each else objects.tracks
-        cast = {role: its for role, its in (each.get("correspondence") or {}).items() if its not in (None, _EGO)}
+        cast = {role: its for role, its in _known(each, "correspondence").items() if its != _EGO}
         for frame in where:
             witness.setdefault(frame, known)
             here = {names[number]: number for number in range(starts[frame + 1] - 1, starts[frame] - 1, -1)}
@@ -98,6 +98,12 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
         roles=tuple(Played(role, np.array(sorted(numbers), dtype=np.int64)) for role, numbers in played.items()),
         witness=witness,
     )
+
+
+def _known(each: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """What a result says under a name, without what is null."""
+    told: Mapping[str, Any] = each.get(name) or {}
+    return {key: value for key, value in told.items() if value is not None}
 
 
 def _frames_of(name: str, each: Mapping[str, Any], frames: Frames, recordings: Mapping[str, int]) -> list[int]:

@@ -86,7 +86,7 @@ def average_precision(found: Reals, wrong: Reals, objects: Reals, *, clipped: bo
         if objects[row] <= 0:
             precisions[row] = math.nan
         elif found.shape[1] and found[row, -1] > 0:
-            values = np.interp(samples, recall[row], precision[row], right=0)
+            values: Reals = np.interp(samples, recall[row], precision[row], right=0)
             if clipped:
                 values = np.maximum(values[round(100 * _NEAREST) + 1 :] - _NEAREST, 0) / (1 - _NEAREST)
             precisions[row] = values.mean()
@@ -104,7 +104,7 @@ def mean_errors(score: Reals, is_found: NDArray[np.bool_], errors: Reals, object
         clipped: Whether means up to each recall are averaged over the recalls reached, from above 10 %.
     """
     if not clipped:
-        return np.array([_mean(values) for values in errors.T])
+        return np.array([_mean(errors[:, place]) for place in range(len(ERRORS))])
     if not len(errors) or not objects:
         return np.ones(len(ERRORS))
     samples = np.linspace(0, 1, _SAMPLES)
@@ -115,8 +115,11 @@ def mean_errors(score: Reals, is_found: NDArray[np.bool_], errors: Reals, object
     if last < first:
         return np.ones(len(ERRORS))
     own = score[is_found]
-    means = [np.interp(reached[::-1], own[::-1], _running_mean(values)[::-1])[::-1] for values in errors.T]
-    return np.array([mean[first : last + 1].mean() for mean in means])
+    found = np.empty(len(ERRORS))
+    for place in range(len(ERRORS)):
+        means: Reals = np.interp(reached[::-1], own[::-1], _running_mean(errors[:, place])[::-1])[::-1]
+        found[place] = means[first : last + 1].mean()
+    return found
 
 
 def _mean(values: Reals) -> float:
@@ -156,5 +159,6 @@ def resampled_errors(sums: Reals, counts: Reals, found: Reals, objects: Reals, *
         known = counts[row] > 0
         if known.any():
             reached = samples[first:][samples[first:] <= recall[row, -1]]
-            values[row] = np.interp(reached, recall[row, known], means[row, known]).mean() if len(reached) else 1.0
+            between: Reals = np.interp(reached, recall[row, known], means[row, known])
+            values[row] = between.mean() if len(reached) else 1.0
     return values

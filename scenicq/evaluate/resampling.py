@@ -23,8 +23,8 @@ __all__ = [
     "holm",
     "interval_of",
     "rate_interval",
-    "resamples",
     "rates",
+    "resamples",
     "sign_flip_test",
 ]
 

@@ -6,7 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import pairwise
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ __all__ = ["Slice", "slices"]
 Reals = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Numbers = NDArray[np.int64]
+_Pair = Sequence[Any]
 
 _PARTS = 5
 """Into how many parts of like size numbers are cut."""
@@ -63,7 +65,9 @@ def slices(
     def told(by: str, names: Sequence[str], part: Numbers, *, others_too: bool = True) -> Iterator[Slice]:
         """Slices by the number of each object's part, -1 for none."""
         there = [number for number in range(len(names)) if (mine & (part == number)).any()]
-        if len(there) > 1:
+        # what differs between any two recordings, as their names do, is no slice
+        shared = any(len(np.unique(recording[mine & (part == number)])) > 1 for number in there)
+        if len(there) > 1 and shared:
             for number in there:
                 of = part == number
                 other = share_of(missed, others & of, recording, weights) if others_too else None
@@ -88,16 +92,20 @@ def slices(
             yield from told(f"{key}{suffix}", names, part[objects.frame], others_too=False)
 
 
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, list | tuple) and len(cast(_Pair, value)) == 2
+
+
 def _itself(value: Any) -> Any:
     return None if isinstance(value, list | tuple) else value
 
 
 def _first(value: Any) -> Any:
-    return value[0] if isinstance(value, list | tuple) and len(value) == 2 else None
+    return cast(_Pair, value)[0] if _is_pair(value) else None
 
 
 def _second(value: Any) -> Any:
-    return value[1] if isinstance(value, list | tuple) and len(value) == 2 else None
+    return cast(_Pair, value)[1] if _is_pair(value) else None
 
 
 def _parts(values: Sequence[Any], of: NDArray[np.int32]) -> tuple[list[str], Numbers]:
@@ -129,7 +137,7 @@ def _cut(values: Sequence[Any], known: Sequence[float], none: Numbers) -> tuple[
         ends = np.append(np.unique(numbers), math.inf)
         names = [f"{end:.4g}" for end in ends[:-1]]
     else:
-        names = [f"{low:.4g} to {high:.4g}" for low, high in zip(ends, ends[1:], strict=False)]
+        names = [f"{low:.4g} to {high:.4g}" for low, high in pairwise(ends.tolist())]
     part = none.copy()
     for place, value in enumerate(values):
         if isinstance(value, int | float) and ends[0] <= value <= ends[-1]:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -25,6 +25,9 @@ from scenicq.store.schema import ArrowTable
 __all__ = ["read_predictions"]
 
 Reals = NDArray[np.float64]
+
+_compute: Any = import_module("pyarrow.compute")
+"""Of which no stubs know the functions."""
 
 _HINT = (
     "known are nuScenes detection results (.json), Argoverse 2 detections (.feather), and labels of the interchange "
@@ -130,7 +133,7 @@ class _Gathered:
         none = np.zeros(0, dtype=np.int32)
         values = np.concatenate([np.zeros((0, len(_NUMBERS))), *self._values])
         self._values.clear()
-        columns = {name: np.ascontiguousarray(values[:, place]) for place, name in enumerate(_NUMBERS)}
+        columns: dict[str, Any] = {name: np.ascontiguousarray(values[:, place]) for place, name in enumerate(_NUMBERS)}
         return Predictions(
             name=str(path),
             protocol=protocol,
@@ -229,8 +232,8 @@ def _argoverse2(path: Path) -> Predictions:
 
 def _frames_of(table: ArrowTable, names: Sequence[str]) -> tuple[list[str], NDArray[np.int32]]:
     """The names of frames in the order in which they come, and the number of the frame of each row."""
-    texts = [pc.cast(table[name], pa.string()) for name in names]
-    joined = pc.binary_join_element_wise(*texts, "/") if len(texts) > 1 else texts[0]
+    texts = [_compute.cast(table[name], pa.string()) for name in names]
+    joined = _compute.binary_join_element_wise(*texts, "/") if len(texts) > 1 else texts[0]
     encoded = joined.combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy(zero_copy_only=False).astype(np.int32)
 
@@ -239,7 +242,7 @@ def _codes(path: Path, column: Any) -> tuple[list[str], NDArray[np.int32]]:
     """Distinct texts, and the number of each row's."""
     if column.null_count:
         raise _invalid(path, "a class is missing")
-    encoded = pc.cast(column, pa.string()).combine_chunks().dictionary_encode()
+    encoded = _compute.cast(column, pa.string()).combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy(zero_copy_only=False).astype(np.int32)
 
 
@@ -254,7 +257,7 @@ def _reals(path: Path, table: ArrowTable, name: str) -> Reals:
     if name not in table.column_names:
         return np.full(len(table), np.nan)
     try:
-        column = pc.cast(table[name], pa.float64())
+        column = _compute.cast(table[name], pa.float64())
     except pa.ArrowException as error:
         raise _invalid(path, f"`{name}`: {error}") from None
     values: Reals = column.to_numpy()
@@ -275,26 +278,28 @@ def _parquet(path: Path) -> Predictions:
         frame = np.array([numbers[name] for name in frames], dtype=np.int32)[frame] if frames else frame
         frames = known
     classes, category = _codes(path, table["class"])
-    columns = {name: _reals(path, table, name) for name in _NUMBERS}
+    columns: dict[str, Any] = {name: _reals(path, table, name) for name in _NUMBERS}
     return Predictions(str(path), PLAIN, frames, frame, classes, category, **columns)
 
 
 def _unnested(path: Path, table: ArrowTable) -> tuple[ArrowTable, list[str]]:
     """One row a box of labels with lists of objects, and the names of all labels."""
-    names: list[str] = pc.cast(table["id"], pa.string()).to_pylist()
+    names: list[str] = _compute.cast(table["id"], pa.string()).to_pylist()
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise _duplicate(str(path), f"frame {twice} is there more than once")
     objects = table["objects"].combine_chunks()
     try:
         boxes = pa.Table.from_struct_array(objects.flatten())
-        rows = boxes.append_column("frame", pc.take(pa.array(names, pa.string()), pc.list_parent_indices(objects)))
+        rows = boxes.append_column(
+            "frame", _compute.take(pa.array(names, pa.string()), _compute.list_parent_indices(objects))
+        )
         for pair, ends in (("position", ("x", "y")), ("velocity", ("vx", "vy"))):
             if pair in rows.column_names:
                 for place, name in enumerate(ends):
-                    rows = rows.append_column(name, pc.list_element(rows[pair], place))
+                    rows = rows.append_column(name, _compute.list_element(rows[pair], place))
         if "heading" not in rows.column_names and "yaw" in rows.column_names:
-            rows = rows.append_column("heading", pc.subtract(rows["yaw"], math.pi / 2))
+            rows = rows.append_column("heading", _compute.subtract(rows["yaw"], math.pi / 2))
     except (pa.ArrowException, AttributeError, TypeError) as error:
         raise _invalid(path, f"`objects` are no boxes: {error}") from None
     return rows, names
@@ -325,8 +330,17 @@ def _check(found: Predictions) -> None:
     # equal boxes lie together when sorted by all that tells them apart
     order = np.lexsort((found.y, found.x, found.category, found.frame))
     same = np.ones(max(len(order) - 1, 0), dtype=np.bool_)
-    for values in (found.frame, found.category, found.x, found.y, found.heading, found.width, found.score):
-        ordered = values[order]
+    compared: tuple[NDArray[Any], ...] = (
+        found.frame,
+        found.category,
+        found.x,
+        found.y,
+        found.heading,
+        found.width,
+        found.score,
+    )
+    for each in compared:
+        ordered = each[order]
         same &= ordered[1:] == ordered[:-1]
     if same.any():
         box = int(order[int(np.argmax(same))])
