@@ -279,6 +279,7 @@ class _Judge:
             share = np.nan_to_num(lost[numbers] / of[numbers])
         frames = detection.frames
         order = np.lexsort((numbers, -false[numbers], -lost[numbers], -share))[:_WORST]
-        for number in map(int, numbers[order]):
-            recording = frames.recordings[frames.recording[number]]
+        worst: list[int] = numbers[order].tolist()
+        for number in worst:
+            recording = frames.recordings[int(frames.recording[number])]
             yield WorstFrame(frames.names[number], recording, int(lost[number]), int(of[number]), int(false[number]))

@@ -86,7 +86,7 @@ def average_precision(found: Reals, wrong: Reals, objects: Reals, *, clipped: bo
         if objects[row] <= 0:
             precisions[row] = math.nan
         elif found.shape[1] and found[row, -1] > 0:
-            values: Reals = np.interp(samples, recall[row], precision[row], right=0)
+            values = np.asarray(np.interp(samples, recall[row], precision[row], right=0), dtype=np.float64)
             if clipped:
                 values = np.maximum(values[round(100 * _NEAREST) + 1 :] - _NEAREST, 0) / (1 - _NEAREST)
             precisions[row] = values.mean()
@@ -159,6 +159,6 @@ def resampled_errors(sums: Reals, counts: Reals, found: Reals, objects: Reals, *
         known = counts[row] > 0
         if known.any():
             reached = samples[first:][samples[first:] <= recall[row, -1]]
-            between: Reals = np.interp(reached, recall[row, known], means[row, known])
+            between = np.asarray(np.interp(reached, recall[row, known], means[row, known]), dtype=np.float64)
             values[row] = between.mean() if len(reached) else 1.0
     return values

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -82,8 +81,10 @@ def slices(
         values = [params.get(name) for params in frames.params]
         names, part = _parts(values, in_question)
         yield from told(f"param {name}", names, part[objects.frame])
-    keys = Counter(key for frame in in_question.tolist() for key in matched.witness.get(frame, {}))
+    keys = {key for frame in in_question.tolist() for key in matched.witness.get(frame, {})}
     for key in sorted(keys):
+        if key.startswith("<"):
+            continue  # a variable of a library, which the author has not named
         for suffix, take in (("", _itself), (" x", _first), (" y", _second)):
             drawn = [None] * len(frames.names)
             for frame in in_question.tolist():
