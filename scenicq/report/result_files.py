@@ -38,8 +38,8 @@ def read_results(path: Path) -> dict[str, Record]:
         DataError: file-missing, or file-invalid.
     """
     found: dict[str, Record] = {}
-    for number, each in enumerate(_records(path, _NEEDED), 1):
-        _check(path, number, each, _TEXTS)
+    for where, each in _records(path, _NEEDED):
+        _check(path, where, each, _TEXTS)
         old = found.get(each["frame"])
         if old is None or (each["verdict"] == "match" and old["verdict"] != "match"):
             found[each["frame"]] = each
@@ -52,12 +52,14 @@ def read_records(path: Path) -> Iterator[Record]:
     Raises:
         DataError: file-missing, or file-invalid.
     """
-    for number, each in enumerate(_records(path, None), 1):
-        _check(path, number, each, ("frame", "verdict") if "frame" in each else ("recording", "verdict"))
+    for where, each in _records(path, None):
+        _check(path, where, each, ("verdict",))
+        _check(path, where, each, ("frame",) if "frame" in each else ("recording",))
         yield each
 
 
-def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[Record]:
+def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[tuple[str, Record]]:
+    """The results, each with the line or row where it is."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -90,43 +92,37 @@ def _json(path: Path, where: str, text: str) -> Any:
         raise _invalid(path, f"{where} is not JSON") from None
 
 
-def _check(path: Path, number: int, each: Record, texts: tuple[str, ...]) -> None:
-    if not all(isinstance(each.get(key), str) for key in texts):
-        raise _invalid(path, f"result {number} lacks {' or '.join(f'`{name}`' for name in texts)}")
-
-
-def _mapping(path: Path, where: str, each: Any) -> Record:
-    if not isinstance(each, dict):
+def _check(path: Path, where: str, each: Any, texts: tuple[str, ...]) -> None:
+    if not isinstance(each, dict) or not all(isinstance(cast(Record, each).get(key), str) for key in texts):
         raise _invalid(path, f"{where} is no result")
-    return cast(Record, each)
 
 
-def _of_lines(path: Path, text: str) -> Iterator[Record]:
+def _of_lines(path: Path, text: str) -> Iterator[tuple[str, Any]]:
     for number, line in enumerate(text.split("\n"), 1):
         if line.strip():
             where = f"line {number}"
-            yield _mapping(path, where, _json(path, where, line))
+            yield where, _json(path, where, line)
 
 
-def _of_csv(path: Path, text: str) -> Iterator[Record]:
+def _of_csv(path: Path, text: str) -> Iterator[tuple[str, Record]]:
     limit = csv.field_size_limit(_LONGEST)
     try:
         rows = csv.DictReader(io.StringIO(text, newline=""), strict=True)
         for number, row in enumerate(rows, 1):
-            yield _row(path, f"row {number}", row)
+            yield f"row {number}", _row(path, f"row {number}", row)
     except csv.Error as error:
         raise _invalid(path, f"it is not CSV: {error}") from None
     finally:
         csv.field_size_limit(limit)
 
 
-def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[Record]:
+def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[tuple[str, Record]]:
     try:
         table = pq.read_table(pa.BufferReader(data), columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError) as error:
         raise _invalid(path, f"it is not Parquet with results: {str(error).partition(chr(10))[0]}") from None
     for number, row in enumerate(table.to_pylist(), 1):
-        yield _row(path, f"row {number}", row)
+        yield f"row {number}", _row(path, f"row {number}", row)
 
 
 def _row(path: Path, where: str, row: Record) -> Record:
