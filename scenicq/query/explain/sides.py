@@ -31,13 +31,15 @@ class Side:
     Attributes:
         text: The comparison in the words of the program.
         values: Its two values with the operator between them.
-        true: Whether it holds.
+        negated: Whether it stands under a `not`, and so must be false.
+        true: Whether it is as it must be.
         apart: How far the values are apart.
         unit: Of the values: "deg", "m" or empty.
     """
 
     text: str
     values: str
+    negated: bool
     true: bool
     apart: float
     unit: str
@@ -71,7 +73,7 @@ def sides(
         unit = "deg" if _OF_ANGLES.search(text) else "m" if isinstance(node.left, Norm | Distance) else ""
         shown = f"{amount(left, unit)} {node.op.value} {amount(right, unit)}"
         holds = _holds(node.op.value, left, right) == plain
-        yield Side(text if plain else f"not ({text})", shown, holds, abs(left - right), unit)
+        yield Side(text if plain else f"not ({text})", shown, not plain, holds, abs(left - right), unit)
 
 
 def _holds(op: str, left: float, right: float) -> bool:

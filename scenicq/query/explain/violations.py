@@ -87,7 +87,8 @@ def _sides(attempt: LabelSearch, item: Item, assignment: Mapping[int, int]) -> s
     assert isinstance(constraint, Condition)
     if isinstance(node, Constant) and isinstance(node.value, Undefined):
         return node.value.reason
-    told = [each.values for each in sides(attempt, constraint, assignment, {}) if not each.true]
+    failing = (each for each in sides(attempt, constraint, assignment, {}) if not each.true)
+    told = [f"{each.values} is {'true' if each.negated else 'false'}" for each in failing]
     if isinstance(constraint.expression, Encloses):
         told.append("the whole box must lie inside; `.position in` asks of the centre alone")
     return "; ".join(told)

@@ -79,7 +79,7 @@ def test_a_requirement_shows_both_sides_and_no_tolerance_helps():
     found = explain(matcher(text), frame(car("a", 1.75, 80.0)))
     assert found.closest is None
     (violation,) = found.violations
-    assert violation.allowed == "30 < 20 is false"
+    assert violation.allowed == "30 m < 20 m is false"
     assert "no tolerance would make it match" in show_explanation(found)
 
 
