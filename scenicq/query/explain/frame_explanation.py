@@ -21,7 +21,7 @@ from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.explain.margins import Margin, margins
-from scenicq.query.explain.nearest_miss import Closest, closest, show_tolerance
+from scenicq.query.explain.nearest_miss import Closest, closest, separated, show_tolerance
 from scenicq.query.explain.violations import Violation, violations
 from scenicq.smt.encode import UnsupportedError
 from scenicq.smt.smtlib import to_smtlib
@@ -101,6 +101,8 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
     nearest = closest(matcher, label)
     if nearest is None or not isinstance(nearest.finding.verdict, Match):
         return _without_match(matcher, label, finding, formulas=formulas)
+    nearest = separated(matcher, label, nearest)
+    assert isinstance(nearest.finding.verdict, Match)
     found = replace(nearest.finding, attempt=_again(matcher, nearest.finding))
     return Explanation(
         label.frame,
@@ -212,10 +214,20 @@ def show_explanation(explanation: Explanation) -> str:
     for violation in explanation.violations:
         lines += ["", _show_violation(violation)]
     if explanation.closest is not None:
-        lines += ["", f"it would match with --tolerance {show_tolerance(explanation.closest.tolerance)}"]
+        lines += ["", *_show_advice(explanation.closest)]
     elif not isinstance(verdict, Match):
         lines += ["", "no tolerance would make it match"]
     return "\n".join(lines)
+
+
+def _show_advice(nearest: Closest) -> list[str]:
+    alone = [f"--tolerance {show_tolerance(each)}" for each in nearest.alone]
+    if len(alone) == 1:
+        return [f"it would match with {alone[0]}"]
+    if alone:
+        return ["it would match with any one of these:", *(f"  {each}" for each in alone)]
+    told = f"it would match with --tolerance {show_tolerance(nearest.tolerance)}"
+    return [told, "  (no part of it is enough alone; of all that are, it has the least widest part, 20 deg being 1 m)"]
 
 
 def _show_proofs(proofs: Sequence[Proof]) -> list[str]:

@@ -17,12 +17,12 @@ from scenicq.forest.walk import leaves
 from scenicq.geometry.angles import normalize
 from scenicq.match.decide.cascade import decide
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.constraints import describe_constraint
 from scenicq.match.problem.evaluation import show_value
 from scenicq.match.problem.outcome import Refuted, Satisfied
 from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.tolerance import Tolerance
 from scenicq.query.explain.sides import sides
 
 __all__ = ["Violation", "allowed_values", "choices", "distance_off", "violations"]
@@ -177,7 +177,7 @@ def distance_off(constraint: Comparison, node: Node, observed: Value) -> float |
     high = math.pi if constraint.property == "heading" else _FAR_M
 
     def reached(size: float) -> bool:
-        wide = Tolerance(None, None, size, size, size)
+        wide = Tolerance(position=size, heading=size, other=size)
         return isinstance(decide([(constraint, node, observed)], wide), Satisfied)
 
     if reached(0.0):
