@@ -197,8 +197,8 @@ def _enough(
 
 
 def _least(enough: Callable[[float], bool], low: float, high: float) -> float:
-    """The least number that is enough, known to lie between two, up to the precision of this module."""
-    while high - low > max(FINEST_M, high / 100):
+    """The least number that is enough, known to lie between two, up to a millimetre."""
+    while high - low > FINEST_M:
         middle = (low + high) / 2
         low, high = (low, middle) if enough(middle) else (middle, high)
     return high
