@@ -169,7 +169,7 @@ def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
         sizes = [found.widening_m, *(size for size in _LADDER_M if size > found.widening_m)]
         reached = next((place for place, size in enumerate(sizes) if at({part: size})), None)
         if reached is not None:
-            low = sizes[reached - 1] if reached else found.widening_m
+            low = sizes[reached - 1] if reached else max(0.0, 0.98 * found.widening_m - FINEST_M)
             least = _least(partial(_enough, at, part, {}), low, sizes[reached])
             alone.append((least, _with_parts(base.tolerance, {part: least})))
     if alone:
