@@ -20,7 +20,7 @@ def rows(count=12):
         yield (
             f"{log}/{315966253660357000 + number * 1000:018}", log, f"{315966253.66 + number:.2f} s",
             "no_match: would match with position=2.544,heading=50.91deg" if number % 3 else "match",
-            f"leftward=1046f1{number:02}-152a-4e82-b61b-75468bcda8ae rightward=f6964{number:02}a-b84b-4c1e-afcf-902343d36a40",
+            f"leftward=1046f1{number:02}-152a-4e82-b61b-7546 rightward=f6964{number:02}a-b84b-4c1e-afcf-9023",
             f"val/{log}/sensors/lidar/{number}.feather",
         )  # fmt: skip
 
