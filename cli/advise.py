@@ -26,8 +26,9 @@ def is_nearly_empty(query: Query) -> bool:
 
 def _number(outlook: Outlook) -> str:
     about = "about " if outlook.sampled else ""
-    most = "" if outlook.certain else "at most "
-    return f"{about}{most}{outlook.frames:,}"
+    if outlook.certain:
+        return f"{about}{outlook.most:,}"
+    return f"{about}{outlook.least:,} to {outlook.most:,}" if outlook.least else f"{about}at most {outlook.most:,}"
 
 
 def advise(query: Query, *, asked: bool) -> None:

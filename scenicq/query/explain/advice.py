@@ -16,6 +16,7 @@ from itertools import islice
 import numpy as np
 
 from scenicq.errors import Span
+from scenicq.forest.kinds import kind_of
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
@@ -37,6 +38,8 @@ _ANYWHERE = {"position": 1e5, "heading": math.pi}
 """Sizes of a tolerance by which a feature is as good as not compared."""
 _WIDER = (("position", 1.0), ("position", 4.0), ("heading", math.radians(20)), ("heading", math.radians(45)))
 """Parts of the tolerance that are tried, in metres and radians."""
+_WIDER_NUMBER = 0.5
+"""Tolerance of speeds, sizes and other numbers that is tried."""
 _PATIENCE = 5
 """Seconds that may pass for one of work: solvers work elsewhere, and others on the same machine."""
 
@@ -53,6 +56,7 @@ class Change:
         unset: Object and property that are not compared.
         category: Object and the class that it is given.
         tolerance: The tolerance, where it is another one.
+        ignored: A parameter that is not compared.
     """
 
     told: str
@@ -62,6 +66,7 @@ class Change:
     unset: tuple[int, str] | None = None
     category: tuple[int, str] | None = None
     tolerance: Tolerance | None = None
+    ignored: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,15 +75,20 @@ class Outlook:
 
     Attributes:
         change: The change.
-        frames: How many.
-        certain: Whether they all match, rather than being left by the prefilter.
-        sampled: Whether the number was projected from a sample.
+        least: How many match as far as they were decided.
+        most: How many may match: with those that the prefilter leaves and nobody decided.
+        sampled: Whether the numbers were projected from a sample.
     """
 
     change: Change
-    frames: int
-    certain: bool
+    least: int
+    most: int
     sampled: bool
+
+    @property
+    def certain(self) -> bool:
+        """Whether the number is known."""
+        return self.least == self.most
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +97,7 @@ class Advice:
 
     Attributes:
         first: What excludes most frames, with how many.
-        outlooks: The changes that leave frames, the most first.
+        outlooks: The changes that may leave frames, those that are known to leave most first.
         complete: Whether all changes were looked at within the time.
     """
 
@@ -132,9 +142,9 @@ def advice(query: Query, *, budget_s: float = math.inf) -> Advice:
             complete = False
             break
         outlook = _outlook(query, worlds, change, clock)
-        if outlook.frames > query.funnel.matches:
+        if outlook.most > query.funnel.matches:
             found.append(outlook)
-    found.sort(key=lambda each: -each.frames)
+    found.sort(key=lambda each: (-each.least, -each.most))
     return Advice(tuple(excluded[:3]), tuple(found), complete)
 
 
@@ -147,6 +157,10 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
                 names = " and ".join(scenario.objects[index].name for index in requirement.objects)
                 text = f"{requirement.built_in.value} of {names}"
             yield Change(f"without `{text}`", text, requirement.span, requirement=number)
+    for name, given in scenario.params.items():
+        if given.explicit and name not in options.ignore_params:
+            yield Change(f"--ignore-params {name}", f"param {name}", given.span, ignored=name)
+    numbers: dict[str, None] = {}
     for thing in scenario.objects:
         for name, given in thing.properties.items():
             what = f"{thing.name}.{name}"
@@ -156,10 +170,16 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
                 yield Change(f"`{what}` not compared", what, given.span, tolerance=wide)
             elif given.explicit and name not in _ANYWHERE:
                 yield Change(f"`{what}` not compared", what, given.span, unset=(thing.index, name))
+                if kind_of(given.value) == "scalar":
+                    numbers[name] = None
         wider = ancestors(thing.category)[1:2] if is_class(thing.category) else ()
         for category in wider:
             told = f"`{thing.name}` as `{category}`"
             yield Change(told, f"{thing.name}.class", thing.span, category=(thing.index, category))
+    for name in numbers:
+        if options.tolerance.of(0, name).size < _WIDER_NUMBER:
+            wide = replace(options.tolerance, rules=(*options.tolerance.rules, ("", name, _WIDER_NUMBER)))
+            yield Change(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
     for name, size in _WIDER:
         disc = name != "position" or options.tolerance.x is None
         if disc and getattr(options.tolerance, name) < size:
@@ -191,6 +211,8 @@ def _outlook(query: Query, worlds: list[CompiledMap], change: Change, clock: _Cl
     options = query.options.match
     if change.tolerance is not None:
         options = replace(options, tolerance=change.tolerance)
+    if change.ignored:
+        options = replace(options, ignore_params=options.ignore_params | {change.ignored})
     total = query.dataset.manifest.total.frames
     sampled = total > _MOST_FRAMES
     changed = {
@@ -212,8 +234,5 @@ def _outlook(query: Query, worlds: list[CompiledMap], change: Change, clock: _Cl
                     matched += isinstance(results[0].verdict, Match)
                     if clock.is_over:
                         break
-    certain = decided == left
-    frames = matched if certain else left
-    if sampled and looked_at:
-        frames = round(frames * total / looked_at)
-    return Outlook(change, frames, certain, sampled)
+    scale = total / looked_at if sampled and looked_at else 1.0
+    return Outlook(change, round(scale * matched), round(scale * (matched + left - decided)), sampled)

@@ -42,24 +42,42 @@ def test_each_number_is_that_of_the_changed_program(dataset):
     without = told["without `require (distance to walker) < 2`"]
     assert without.certain
     assert not without.sampled
-    assert without.frames == taken(dataset, TEXT.replace("require (distance to walker) < 2\n", "")).funnel.matches > 0
+    assert without.least == taken(dataset, TEXT.replace("require (distance to walker) < 2\n", "")).funnel.matches > 0
     for change, outlook in told.items():
         if change.startswith("--tolerance "):
-            assert outlook.frames == taken(dataset, TEXT, change.removeprefix("--tolerance ")).funnel.matches
-    assert [each.frames for each in found.outlooks] == sorted((each.frames for each in found.outlooks), reverse=True)
+            assert outlook.least == taken(dataset, TEXT, change.removeprefix("--tolerance ")).funnel.matches
+    assert [each.least for each in found.outlooks] == sorted((each.least for each in found.outlooks), reverse=True)
 
 
 def test_a_feature_is_a_change_too(dataset):
     text = TEXT.replace("< 2", "< 30").replace("facing Range(0, 360) deg", "facing Range(1, 2) deg")
-    told = {each.change.told: each.frames for each in advice(taken(dataset, text)).outlooks}
+    told = {each.change.told: each.least for each in advice(taken(dataset, text)).outlooks}
     loose = taken(dataset, text, "position=0.25,heading=5deg,walker.heading=180deg")
     assert told["`walker.heading` not compared"] == loose.funnel.matches > 0
 
 
 def test_a_wider_class_is_a_change_too(dataset):
     text = "model scenic.domains.driving.model\nego = new Car\nother = new Bus on road, facing Range(0, 360) deg\n"
-    told = {each.change.told: each.frames for each in advice(taken(dataset, text)).outlooks}
+    told = {each.change.told: each.least for each in advice(taken(dataset, text)).outlooks}
     assert told["`other` as `Vehicle`"] == taken(dataset, text.replace("Bus", "Vehicle")).funnel.matches > 0
+
+
+def test_a_parameter_is_a_change_too(dataset):
+    plain = TEXT.replace("< 2", "< 30")
+    text = plain.replace("ego =", "param weather = 'foggy'\nego =")
+    told = {each.change.told: each.least for each in advice(taken(dataset, text)).outlooks}
+    assert told["--ignore-params weather"] == taken(dataset, plain).funnel.matches > 0
+
+
+def test_a_number_may_be_further_off(dataset):
+    text = (
+        "model scenic.domains.driving.model\nego = new Car\nother = new Car on road, with width 1.6, with speed 0.3\n"
+    )
+    query = taken(dataset, text)
+    for change, outlook in {each.change.told: each for each in advice(query).outlooks}.items():
+        if change in ("--tolerance width=0.5", "--tolerance speed=0.5"):
+            wider = taken(dataset, text, f"position=0.25,heading=5deg,{change.removeprefix('--tolerance ')}")
+            assert outlook.least == wider.funnel.matches > query.funnel.matches
 
 
 def test_large_datasets_are_sampled(dataset, monkeypatch):
