@@ -21,9 +21,9 @@ from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import ready
 from scenicq.query.execution.compiled_map import program_network, read_network
 from scenicq.query.execution.run import beside, read_program
-from scenicq.store.dataset import open_dataset
 
 from .cache import user_cache
+from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
 from .report import as_json, count, show
@@ -55,7 +55,7 @@ def networks_of(
             Diagnostic("option-invalid", "a dataset brings its own maps: `--map` is too much", hints=(hint,))
         )
     if dataset is not None:
-        opened = open_dataset(dataset)
+        opened = open_checked(dataset)
         yield from (opened.network(name) for name in opened.maps)
     elif map_file is not None:
         yield read_network(map_file, user_cache() / "maps")

@@ -14,9 +14,10 @@ from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query, read_program
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
-from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 
+from .datasets import open_checked
 from .main import NOTHING
 from .manual import Manual
 from .match import match
@@ -65,7 +66,7 @@ def explain(
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
-    query = Query(open_dataset(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
+    query = Query(open_checked(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
     label = find_label(query.dataset, frame)
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)

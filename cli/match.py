@@ -19,8 +19,8 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query, read_program
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
-from scenicq.store.dataset import open_dataset
 
+from .datasets import open_checked
 from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
@@ -129,7 +129,7 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     chosen = choose_format(format_, None if shard else file)
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
-    query = Query(open_dataset(dataset), read_program(scenario), query_options(given))
+    query = Query(open_checked(dataset), read_program(scenario), query_options(given))
     if explain:
         show_plan(query)
         return

@@ -62,6 +62,7 @@ CODES: dict[str, str] = {
     "store-missing": "the folder is not a dataset of ours",
     "store-version": "the dataset was written by another version",
     "store-damaged": "a file of the dataset is missing or changed",
+    "dataset-invalid": "a table of the dataset holds what no dataset may",
     "target-exists": "the target is there already",
     "target-unwritable": "the target cannot be written",
     "engine-failed": "what runs a query on other processes or machines is not there, or stopped",
