@@ -65,6 +65,7 @@ CODES: dict[str, str] = {
     "dataset-invalid": "a table of the dataset holds what no dataset may",
     "target-exists": "the target is there already",
     "target-unwritable": "the target cannot be written",
+    "resources-exhausted": "the system gives no more memory, files or processes",
     "engine-failed": "what runs a query on other processes or machines is not there, or stopped",
     # the solvers
     "solver-missing": "the solver cannot be loaded",

@@ -145,7 +145,7 @@ class Dataset:
         """
         try:
             yield
-        except ScenicqError:
+        except (ScenicqError, MemoryError):
             raise
         except Exception as error:
             if self.folder is not None:

@@ -37,7 +37,7 @@ def check_dataset(dataset: Dataset) -> None:
     for name in manifest.maps:
         try:
             dataset.network(name)
-        except ScenicqError:
+        except (ScenicqError, MemoryError):
             raise
         except Exception as error:  # noqa: BLE001 - whatever a map that nobody has made by our rules leads to
             invalid(manifest.tables["regions"][0].path, f"map {name} cannot be put together: {error}"[:200])

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
+from scenicq.budget import look
+
 __all__ = ["Answer", "Exhausted", "Reporter", "SilentReporter", "Slot", "find_assignments", "matchable"]
 
 
@@ -216,6 +218,7 @@ def find_assignments(
             if twin is not None and twin in assignment and candidate <= assignment[twin]:
                 frame.blamed.add(twin)
                 continue
+            look()
             budget -= 1
             if budget < 0:
                 raise Exhausted
