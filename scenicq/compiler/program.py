@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import cast
 
+from scenicq.budget import TimeIsUp, limited
 from scenicq.compiler import operators
 from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
@@ -41,6 +42,9 @@ from scenicq.syntax.walk import walk
 
 __all__ = ["Loader", "compile_scenario"]
 
+MOST_SECONDS = 60.0
+"""Processor seconds that evaluating a program may take; what it does has its price in steps, but maps differ."""
+
 Loader = Callable[[str], Source | None]
 """Gives the text of a file beside the program, by its name relative to the program's folder; None if there is none."""
 
@@ -65,6 +69,17 @@ def compile_scenario(
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
     """
+    try:
+        with limited(MOST_SECONDS):
+            return _compiled(source, network, version, initial=initial, loader=loader)
+    except TimeIsUp:
+        raise fail("budget-exceeded", f"evaluating the program takes more than {MOST_SECONDS:g} s", _start(source), "",
+                   ("make loops shorter, and ask less of the map in them",)) from None  # fmt: skip
+
+
+def _compiled(
+    source: Source, network: Network, version: int | None, *, initial: bool, loader: Loader | None
+) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
     world = _World(network, chosen, initial, loader)
@@ -252,6 +267,7 @@ def _is_feature(value: ModelValue) -> bool:
 
 def _object(instance: Instance, name: str) -> ScenarioObject:
     properties: dict[str, Property] = {}
+    uncomparable: dict[str, Span | None] = {}
     for key, value in instance.properties.items():
         if key in PARTIAL:
             continue
@@ -261,10 +277,13 @@ def _object(instance: Instance, name: str) -> ScenarioObject:
             raise fail("wrong-value", f"the {key} of an object must be positive", span, "not positive")
         if node is not None:
             properties[key] = Property(node, key in instance.explicit, span)
+        elif key in instance.explicit and value is not None:
+            uncomparable[key] = span
     if instance.mutation is not None:
         properties["mutationScale"] = Property(to_scalar(instance.mutation, instance.span), False, instance.span)
     assert instance.index is not None
-    return ScenarioObject(instance.index, name, instance.cls.category, properties, _mutated(instance), instance.span)
+    mutated = _mutated(instance)
+    return ScenarioObject(instance.index, name, instance.cls.category, properties, mutated, instance.span, uncomparable)
 
 
 def _mutated(instance: Instance) -> frozenset[str]:

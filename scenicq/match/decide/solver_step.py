@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from scenicq.budget import waiting
 from scenicq.forest.groups import Comparison, Constraint
-from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
-from scenicq.match.decide.evaluation import replay
 from scenicq.match.fields.field_solver import repaired
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.smt.answer import Sat, Solver, Unknown, Unsat
 from scenicq.smt.case_split import check_by_cases
 from scenicq.smt.encode import Encoding, Target, UnsupportedError, encode
