@@ -82,7 +82,7 @@ def test_a_closed_standard_error_changes_no_exit_code(command, crossroads):
 
 def _written(form: str) -> str:
     sink = io.BytesIO()
-    writer = make_writer(form, sink)
+    writer = make_writer(form, sink, tuple)
     record = {"frame": EVIL, "recording": EVIL, "timestamp_us": 0, "verdict": "match", "correspondence": {"a": EVIL},
               "witness": {}, "sensors": {}}  # fmt: skip
     writer.write(record)
