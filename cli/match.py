@@ -19,6 +19,7 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
+from scenicq.store.atomic_files import sole_writer
 
 from .datasets import open_checked
 from .deliver import Wanted, deliver
@@ -162,15 +163,16 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         engine = kept(engine or run_here, pieces)
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
     results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
-    try:
-        deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
-    except BaseException:
+    with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
+        try:
+            deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
+        except BaseException:
+            if pieces is not None:
+                with contextlib.suppress(OSError):
+                    pieces.rmdir()  # if nothing is done yet
+            raise
         if pieces is not None:
-            with contextlib.suppress(OSError):
-                pieces.rmdir()  # if nothing is done yet
-        raise
-    if pieces is not None:
-        shutil.rmtree(pieces, ignore_errors=True)
+            shutil.rmtree(pieces, ignore_errors=True)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 

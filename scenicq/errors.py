@@ -65,6 +65,7 @@ CODES: dict[str, str] = {
     "store-damaged": "a file of the dataset is missing or changed",
     "dataset-invalid": "a table of the dataset holds what no dataset may",
     "target-exists": "the target is there already",
+    "target-busy": "another run writes to the target",
     "target-unwritable": "the target cannot be written",
     "resources-exhausted": "the system gives no more memory, files or processes",
     "predictions-invalid": "a predicted box has a value that makes no sense",

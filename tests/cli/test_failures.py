@@ -34,7 +34,7 @@ def _raise(error: BaseException):
     ],
 )
 def test_what_the_system_refuses_is_told_and_no_mistake_of_ours(error, told, run, crossroads, monkeypatch):
-    monkeypatch.setattr("scenicq_cli.match.read_program", lambda _: _raise(error))
+    monkeypatch.setattr("scenicq_cli.match.open_checked", lambda _: _raise(error))
     result = run("match", PROGRAM, crossroads)
     assert result.exit_code == 2
     assert result.stderr.startswith("error[resources-exhausted]")

@@ -17,10 +17,10 @@ from scenicq.store.labels import Label, LabelObject
 
 
 @pytest.fixture
-def clock(monkeypatch):
-    """A clock of the thread that goes on by ten seconds whenever it is looked at."""
+def start(monkeypatch):
+    """Starts a clock of the thread that goes on by ten seconds whenever it is looked at."""
     ticks = itertools.count(0, 10)
-    monkeypatch.setattr(budget.time, "thread_time", lambda: float(next(ticks)))
+    return lambda: monkeypatch.setattr(budget.time, "thread_time", lambda: float(next(ticks)))
 
 
 def _matcher(program: str, solver: object = None, **options: object) -> Matcher:
@@ -52,13 +52,15 @@ def test_nothing_is_limited_without_a_block():
         assert left == 3.0
 
 
-def test_time_is_up_within_the_block_alone(clock):
+def test_time_is_up_within_the_block_alone(start):
+    start()
     with budget.limited(50.0), pytest.raises(budget.TimeIsUp):
         _look_often()
     budget.look()
 
 
-def test_an_inner_block_gives_no_more_than_an_outer_one(clock):
+def test_an_inner_block_gives_no_more_than_an_outer_one(start):
+    start()
     with budget.limited(30.0), budget.limited(math.inf), pytest.raises(budget.TimeIsUp):
         _look_often()
 
@@ -75,8 +77,10 @@ def test_what_a_solver_takes_counts(monkeypatch):
 
 
 @pytest.mark.parametrize("method", ["auto", "smt"])
-def test_a_label_that_takes_too_long_is_unknown(method, clock):
-    verdict = _matcher(PROGRAM, timeout_s=2.0, method=method).match(_label((3.0, 3.0), (4.0, 4.0)))
+def test_a_label_that_takes_too_long_is_unknown(method, start):
+    matcher = _matcher(PROGRAM, timeout_s=2.0, method=method)
+    start()
+    verdict = matcher.match(_label((3.0, 3.0), (4.0, 4.0)))
     assert isinstance(verdict, Unknown)
     assert verdict.reason == "timeout"
 
@@ -94,10 +98,12 @@ class _Slow:
         return Unsat()
 
 
-def test_a_solver_gets_what_is_left(clock):
+def test_a_solver_gets_what_is_left(start):
     solver = _Slow()
-    _matcher(PROGRAM, solver, timeout_s=4000.0, method="smt").match(_label((3.0, 3.0)))
-    _matcher(PROGRAM, solver, timeout_s=4000.0, method="smt").match(_label((3.0, 3.0), (4.0, 4.0)))
+    matcher = _matcher(PROGRAM, solver, timeout_s=4000.0, method="smt")
+    start()
+    matcher.match(_label((3.0, 3.0)))
+    matcher.match(_label((3.0, 3.0), (4.0, 4.0)))
     assert solver.given
     assert all(0 < seconds < 4000.0 for seconds in solver.given)
 
@@ -107,5 +113,7 @@ def test_with_enough_time_the_same_label_matches():
     assert isinstance(_matcher(program).match(_label((3.0, 3.0), (4.0, 4.0))), Match)
 
 
-def test_finding_every_match_ends_too(clock):
-    assert list(_matcher(PROGRAM, timeout_s=2.0).matches(_label((3.0, 3.0), (4.0, 4.0)))) == []
+def test_finding_every_match_ends_too(start):
+    matcher = _matcher(PROGRAM, timeout_s=2.0)
+    start()
+    assert list(matcher.matches(_label((3.0, 3.0), (4.0, 4.0)))) == []
