@@ -10,6 +10,7 @@ The interpreter collects objects, requirements and parameters; `program` turns t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import Any, assert_never, cast
 
@@ -135,6 +136,10 @@ class Interpreter:
     def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:
         """Require that a choice does not come out as one of some options; see `Runner`."""
         self.excluded.add(index, options, count, span)
+
+    def assuming(self, index: Node, option: int, count: int) -> AbstractContextManager[None]:
+        """Exclude only under an option of a choice; see `Runner`."""
+        return self.excluded.assuming(index, option, count)
 
     def demand(self, condition: Callable[[], Node], span: Span) -> None:
         """Require a condition; see `specifiers.Evaluator`."""
