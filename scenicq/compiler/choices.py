@@ -16,7 +16,16 @@ from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
 
-__all__ = ["distribute", "each_existing", "each_option", "holds_instances", "is_choice", "make_choice", "map_choice", "regions_apart"]
+__all__ = [
+    "distribute",
+    "each_existing",
+    "each_option",
+    "holds_instances",
+    "is_choice",
+    "make_choice",
+    "map_choice",
+    "regions_apart",
+]
 
 _MOST_OPTIONS = 20_000
 """Options of a choice, those of nested choices included."""

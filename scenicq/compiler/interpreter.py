@@ -197,7 +197,7 @@ class Interpreter:
         self, cls: ScenicClass, specifiers: tuple[ast.Specifier, ...], scope: Environment, span: Span
     ) -> Instance:
         is_object = cls.derives_from("Object")
-        around = Surroundings(self.version, self.ego, lambda: self.workspace, is_object=is_object)
+        around = Surroundings(self.version, self.ego, lambda: self.workspace, self.budget, is_object=is_object)
         kept = [node for node in specifiers if not self._is_dynamic(node)]
         bound = tuple(bind(node, lambda part: evaluate(self, part, scope), around) for node in kept)
         if scope.library:

@@ -1,8 +1,8 @@
 """Are the programs that Scenic's own repository publishes decided, and rightly?
 
 Run by `make conformance SCENIC=CHECKOUT`: `python tests/conformance/published.py CHECKOUT`. Scenic draws scenes of each
-program of `examples/driving` and `examples/carla` on the town that it names and on others, once (`published_scenes.py`).
-Each becomes a label with four more objects, in any order, and is matched with its program, `--initial`, position=0.05
+program of `examples/driving` and `examples/carla` on the town that it names and on another, once
+(`published_scenes.py`). Each becomes a label with four more objects, in any order, and is matched with its program, `--initial`, position=0.05
 and heading=0.5deg: it must match. With an object displaced to where no program puts one, or turned across the road, it
 must not. What takes longer than the limit counts as late. The table names the slowest label of each program.
 """
@@ -28,7 +28,6 @@ from run_conformance import SCENIC, read_map
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
-from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
@@ -78,7 +77,17 @@ class Row:
         )
 
 
-HEADING = f"{'program.town':<66}{'match':>8}{'no':>8}{'unknown':>8}{'late':>8}{'told':>9}{'compile':>9}{'median':>9}{'worst':>9}"
+_COLUMNS = (
+    ("match", 8),
+    ("no", 8),
+    ("unknown", 8),
+    ("late", 8),
+    ("told", 9),
+    ("compile", 9),
+    ("median", 9),
+    ("worst", 9),
+)
+HEADING = f"{'program.town':<66}" + "".join(f"{name:>{width}}" for name, width in _COLUMNS)
 
 
 class Town:
