@@ -13,18 +13,15 @@ from typing import Protocol
 from scenicq.compiler.coerce import to_scalar, to_vector
 from scenicq.compiler.environment import Budget
 from scenicq.compiler.operators import direction_at, oriented
+from scenicq.compiler.step_counts import FEWEST, LONGEST, StepCount
 from scenicq.compiler.values import Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.bounds import scalar_bounds
-from scenicq.forest.nodes import ArithmeticOp, CompareOp, Node, Select
+from scenicq.forest.nodes import ArithmeticOp, Node, Select
 
 __all__ = ["follow"]
 
-FEWEST = 4
-"""Steps in the paper, and the fewest in later versions."""
-LONGEST = 5.0
-"""Metres of the longest step in later versions."""
 MOST = 100
 """Steps of the longest way whose length is random."""
 MOST_KNOWN = 2_000
@@ -75,13 +72,14 @@ def _count(length: float) -> int:
 
 def _ways(field: ModelValue, start: Node, length: Node, fewest: int, most: int, span: Span) -> tuple[Node, Node]:
     """Position and heading at the end, by the number of steps that the distance has."""
-    position, heading = _way(field, start, length, most, span)
-    for count in range(most - 1, fewest - 1, -1):
-        longer = build.compare(CompareOp.GT, length, build.constant(count * LONGEST, span), span)
-        end, direction = _way(field, start, length, count, span)
-        position = Select(longer, (end, position), span=span)
-        heading = Select(longer, (direction, heading), span=span)
-    return position, heading
+    ways = [_way(field, start, length, count, span) for count in range(fewest, most + 1)]
+    if len(ways) == 1:
+        return ways[0]
+    index = StepCount(length, fewest, most).index(span)
+    return (
+        Select(index, tuple(position for position, _ in ways), span=span),
+        Select(index, tuple(heading for _, heading in ways), span=span),
+    )
 
 
 def _way(field: ModelValue, start: Node, length: Node, count: int, span: Span) -> tuple[Node, Node]:
