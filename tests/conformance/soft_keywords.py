@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-HEADER = "ego = new Object at (50, 50)\n"
+HEADER = "ego = new Object at (20, 20)\n"
 CONTEXTS: dict[str, str] = {
     "operand": "W = 3\nparam answer = W",
     "first in a sum": "W = 3\nparam answer = W + 1",
@@ -61,14 +61,14 @@ CONTEXTS: dict[str, str] = {
     "after by": "W = 2\np = new OrientedPoint at (9, 9)\no = new Object left of p by W\nparam answer = o.position.x",
     "after offset by": "W = (3, 3)\nparam answer = ((1, 1) offset by W).x",
     "before offset by": "W = (3, 3)\nparam answer = (W offset by (1, 1)).x",
-    "after relative to": "W = 0.5\nparam answer = 0.25 relative to W",
-    "before relative to": "W = 0.5\nparam answer = W relative to 0.25",
-    "after distance to": "W = (50, 53)\nparam answer = distance to W",
-    "after distance from": "W = (50, 53)\nparam answer = distance from W to (50, 50)",
-    "after to": "W = (50, 53)\nparam answer = distance from (50, 50) to W",
-    "after can see": "W = (50, 53)\nparam answer = 1 if ego can see W else 2",
+    "after relative to": "W = 0.5\no = new Object at (9, 9), facing 0.25 relative to W\nparam answer = o.heading",
+    "before relative to": "W = 0.5\no = new Object at (9, 9), facing W relative to 0.25\nparam answer = o.heading",
+    "after distance to": "W = (20, 23)\nparam answer = distance to W",
+    "after distance from": "W = (20, 23)\nparam answer = distance from W to (20, 20)",
+    "after to": "W = (20, 23)\nparam answer = distance from (20, 20) to W",
+    "after can see": "W = (20, 23)\nrequire ego can see W\nparam answer = 1",
     "after front of": "W = ego\nparam answer = (front of W).position.x",
-    "after visible": "W = CircularRegion((50, 50), 3)\no = new Object on visible W\nparam answer = 1",
+    "after visible": "W = CircularRegion((20, 20), 3)\no = new Object on visible W\nparam answer = 1",
 }
 """Programs with the word `W` as a name; what they compute stands in the parameter `answer`."""
 
@@ -85,19 +85,25 @@ def program(context: str, word: str) -> str:
 
 def outcome(text: str) -> Any:
     """What Scenic says: the answer, or None where it refuses the program."""
-    import scenic  # noqa: PLC0415 - only where Scenic is installed
+    import scenic
 
     try:
         scene, _ = scenic.scenarioFromString(text, mode2D=True).generate(maxIterations=100)
-    except Exception:  # noqa: BLE001 - whatever Scenic refuses it with
+    except Exception:
         return None
-    answer = scene.params["answer"]
-    return answer if isinstance(answer, bool | int | str) else round(float(answer), 6)
+    return plain(scene.params.get("answer"))
+
+
+def plain(answer: Any) -> Any:
+    """An answer that can be compared and kept: a number of six digits, a text, or "?" for anything else."""
+    if isinstance(answer, bool | str):
+        return answer
+    return round(float(answer), 6) if isinstance(answer, int | float) else "?"
 
 
 def main(out: Path) -> None:
     """Ask Scenic for every word in every context, and keep the outcomes where they differ from the usual one."""
-    from scenic.syntax.parser import ScenicParser  # noqa: PLC0415 - only where Scenic is installed
+    from scenic.syntax.parser import ScenicParser
 
     kept: dict[str, Any] = {"words": sorted(ScenicParser.SOFT_KEYWORDS), "usual": {}, "others": {}}
     for context in CONTEXTS:
