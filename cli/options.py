@@ -6,63 +6,33 @@ import shlex
 import shutil
 from typing import Any
 
-from scenicq.errors import DataError, Diagnostic, SolverError
-from scenicq.forest.scenario import BuiltIn
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.errors import Diagnostic, SolverError
+from scenicq.match.options import MatchOptions
+from scenicq.query.execution.option_texts import OptionTexts, read_options
 from scenicq.query.execution.run import QueryOptions
 
-from .check import read_version
-
-__all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "built_ins", "query_options"]
+__all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "query_options"]
 
 DEFAULTS = MatchOptions()
 """What counts as a match unless options say otherwise."""
 _SOLVERS = ("auto", "dreal", "portable")
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "ignore_params",
+    "initial", "ignore_params", "strict",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
 TOPICS = {
-    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget"},
+    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
         "limit", "every", "all_matches", "near", "format_", "output", "report", "sensors", "export", "explain",
     },
     "Long runs": {"shard", "resume"},
-    "Messages and exit code": {"exit_zero", "summary", "quiet", "help"},
+    "Messages and exit code": {"strict", "exit_zero", "summary", "quiet", "help"},
 }  # fmt: skip
 """The options of `match` as its help lists them."""
 ONE_FRAME = {"prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False}
 """The rest of the options of a query about one frame."""
-
-
-def _names(text: str | None) -> list[str]:
-    return [name.strip() for name in (text or "").split(",") if name.strip()]
-
-
-def built_ins(text: str | None, *others: str) -> frozenset[BuiltIn]:
-    """The built-in requirements of a list.
-
-    Args:
-        text: Names, separated by commas.
-        others: Names that may stand among them.
-
-    Raises:
-        DataError: option-invalid.
-    """
-    known = [*BuiltIn, *others]
-    for name in _names(text):
-        if name not in known:
-            hint = f"known are {', '.join(known)}, separated by commas"
-            raise DataError(Diagnostic("option-invalid", f"`{name}` is no built-in requirement", hints=(hint,)))
-    return frozenset(BuiltIn(name) for name in _names(text) if name not in others)
-
-
-def _enforced(text: str | None) -> frozenset[BuiltIn]:
-    """The built-in requirements in force: visibility always, unless the list has `none`."""
-    asked = built_ins(text, "none")
-    return asked if "none" in _names(text) else asked | DEFAULTS.enforce
 
 
 def _check_solver(name: str) -> None:
@@ -78,19 +48,5 @@ def _check_solver(name: str) -> None:
 
 def query_options(given: dict[str, Any]) -> QueryOptions:
     """The options of a query from those of the command line."""
-    tolerance = given["tolerance"]
     _check_solver(given["solver"])
-    options = MatchOptions(
-        tolerance=DEFAULTS.tolerance if tolerance is None else parse_tolerance(tolerance),
-        classes=given["classes"],
-        ego=given["ego"],
-        radius=given["radius"],
-        enforce=_enforced(given["enforce"]),
-        exact=given["exact"],
-        method=given["method"],
-        timeout_s=given["timeout"],
-        budget=given["budget"],
-        ignore_params=DEFAULTS.ignore_params.union(_names(given["ignore_params"])),
-    )
-    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches")
-    return QueryOptions(match=options, version=read_version(given["scenic"]), **{name: given[name] for name in same})
+    return read_options(**{name: given[name] for name in OptionTexts.__annotations__ if name in given})

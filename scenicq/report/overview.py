@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
@@ -11,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, cast
 
 from scenicq import __version__
+from scenicq.match.tolerance import Tolerance
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
 from scenicq.report.frames import table
@@ -24,7 +24,7 @@ _PACKAGES = ("duckdb", "numpy", "pyarrow", "shapely", "highspy", "dreal")
 
 _NAMES = {"version": "scenic", "every": "all", "timeout_s": "timeout"}
 """Options that the command line calls otherwise."""
-_UNITS = {"tolerance.x": "m", "tolerance.y": "m", "tolerance.position": "m", "radius": "m", "timeout_s": "s"}
+_UNITS = {"radius": "m", "timeout_s": "s"}
 
 
 def _bar(share: float, told: str) -> str:
@@ -97,7 +97,12 @@ def funnel_section(funnel: Funnel, total: int) -> str:
         for name, count in steps
     ]
     stopped = f"Stopped after {funnel.frames:,} of {total:,} frames (--limit)." if funnel.frames < total else ""
-    warnings = [element("li", escape(each.message)) for each in funnel.warnings]
+    told = [f"{each.message}{f' ({each.span.place})' if each.span is not None else ''}" for each in funnel.warnings]
+    told += [
+        f"`{what}` is missing in {count:,} frames of the dataset, and not compared there"
+        for what, count in sorted(funnel.missing.items())
+    ]
+    warnings = [element("li", escape(each)) for each in told]
     failed = [
         (escape(what), f"{count:,}", f"{count / funnel.frames:.1%}")
         for what, count in sorted(funnel.excluded.items(), key=lambda item: (-item[1], item[0]))
@@ -125,7 +130,7 @@ def versions() -> dict[str, str]:
 
 
 def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
-    if is_dataclass(value):
+    if is_dataclass(value) and not isinstance(value, Tolerance):
         return [
             row
             for each in fields(value)
@@ -142,8 +147,6 @@ def _shown(name: str, value: Any) -> str:
             return "not given"
         case bool():
             return "yes" if value else "no"
-        case float() if name == "tolerance.heading":
-            return f"{math.degrees(value):z.6g}\N{DEGREE SIGN}"
         case float() if name in _UNITS:
             return f"{value:g} {_UNITS[name]}"
         case frozenset():

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scenicq.forest.groups import Comparison, Constraint
-from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
-from scenicq.match.decide.evaluation import replay
 from scenicq.match.fields.field_solver import repaired
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.smt.answer import Sat, Solver, Unknown, Unsat
 from scenicq.smt.case_split import check_by_cases
 from scenicq.smt.encode import Encoding, Target, UnsupportedError, encode
@@ -77,13 +77,11 @@ def target_of(constraint: Constraint, options: MatchOptions) -> Target:
     """How a constraint's expression is compared with the label."""
     if not isinstance(constraint, Comparison):
         return Target(None, 0.0, 0.0)
-    tolerance = options.tolerance
-    match constraint.property:
-        case "position" if tolerance.x is not None and tolerance.y is not None:
-            return Target("box", tolerance.x, tolerance.y)
-        case "position":
-            return Target("disc", tolerance.position, 0.0)
-        case "heading":
-            return Target("angle", tolerance.heading, 0.0)
-        case _:
-            return Target("disc", tolerance.other, 0.0)
+    margin = options.tolerance.of(constraint.object, constraint.property)
+    match margin.kind:
+        case "box":
+            return Target("box", margin.size, margin.y)
+        case "arc":
+            return Target("angle", margin.size, 0.0)
+        case "disc" | "interval":
+            return Target("disc", margin.size, 0.0)

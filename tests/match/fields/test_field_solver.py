@@ -9,28 +9,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conditioned_groups import groups
+from hidden_roads import CHAIN
 from scenes import STREET, compiled, drawn, label_of
 
 from scenicq.forest.nodes import PointIn
 from scenicq.forest.walk import leaves
-from scenicq.match.decide.cascade import Satisfied
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.decide.evaluation import replay
 from scenicq.match.fields import interval_domain
 from scenicq.match.fields.field_solver import repaired
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.verdict import Match, NoMatch
 
-CHAIN = """
-ego = new Car on intersection
-shift = Range(-0.5, 0.5)
-last = ego
-for i in range({cars}):
-    center = follow roadDirection from (front of last) for Range(2, 8)
-    spot = new OrientedPoint right of center by shift, facing Range(-5, 5) deg relative to roadDirection
-    last = new Car ahead of spot
-"""
 CASES = 400
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any
 
-from scenicq.match.decide.affine_forms import Affine, Variable
+from scenicq.match.linear.affine_forms import Affine, Variable
 
 __all__ = ["LinearSystem", "NotSolved", "Row"]
 
