@@ -156,7 +156,8 @@ def plain_module(name: str, span: Span) -> Module:
             nearest = (f"`{close[0]}` is the nearest that is known",) if close else ()
             raise fail("unknown-model", f"`{name}` is not a model or module known here", span, "not found",
                        (*nearest,
-                        "known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, and `math`",
+                        "known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "
+                        "and `math`",
                         "a scenario never imports Python code: write what it needs in Scenic"))  # fmt: skip
 
 

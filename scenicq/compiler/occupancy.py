@@ -89,7 +89,8 @@ class Occupancy:
             first, second = first[apart], second[apart]
             overlap = shapes.shared_areas(areas[first], areas[second]) > _OVERLAP
             shared: dict[int, set[int]] = {}
-            for one, other in zip(first[overlap].tolist(), second[overlap].tolist(), strict=True):
+            pairs: list[tuple[int, int]] = list(zip(first[overlap].tolist(), second[overlap].tolist(), strict=True))
+            for one, other in pairs:
                 shared.setdefault(one, set()).add(layer[other][2])
                 shared.setdefault(other, set()).add(layer[one][2])
             most = max(most, 1 + max(map(len, shared.values()), default=0))

@@ -150,7 +150,7 @@ def intersection(a: Shape, b: Shape) -> Shape:
 
 def shared_areas(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
     """What each pair of polygons has in common, in square metres."""
-    return cast("NDArray[np.float64]", shapely.area(shapely.intersection(a, b)))
+    return shapely.area(shapely.intersection(a, b))
 
 
 def intersections(geometries: Sequence[Shape], window: Shape) -> list[Shape]:
