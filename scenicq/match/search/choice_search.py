@@ -1,0 +1,430 @@
+"""Groups with random choices: their outcomes are searched as roles are, and what is left is decided without choices.
+
+Each tree of choices is a slot whose candidates are its outcomes. Constraints on one slot alone leave it few of them (by
+boxes, for all outcomes together); choices that several slots share must come out the same in all; then the search of
+`backtracking` goes through what is left, fewest candidates first, and goes back to what is to blame. A look-up at a hidden
+place is a choice, too: that the place has the element is one more constraint.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.forest import build
+from scenicq.forest.groups import Comparison
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import (
+    CompareOp,
+    Constant,
+    Identity,
+    Index,
+    Logic,
+    LogicOp,
+    Node,
+    Select,
+    Value,
+)
+from scenicq.forest.walk import is_leaf, leaves
+from scenicq.match.linear.linear_program import LINEAR_SLACK
+from scenicq.match.options import Exhausted, Tolerance
+from scenicq.match.problem.bipartite_matching import Slot
+from scenicq.match.problem.conditioned import Item, conditioned, fact
+from scenicq.match.problem.evaluation import ground_cause, holds, replay
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.search.backtracking import Answer, find_assignments
+from scenicq.match.search.outcome_bounds import possible_outcomes
+from scenicq.match.search.outcome_tables import (
+    ChoiceTree,
+    Outcomes,
+    TooManyOutcomesError,
+    Variable,
+    above_choices,
+    tree_of,
+)
+
+__all__ = ["decide_with_choices"]
+
+_MOST_TRIES = 20_000
+"""Outcomes of choices that are tried for one group of one label."""
+
+Decide = Callable[[list[Item]], Outcome]
+"""Decides constraints that hold no choices."""
+
+
+Ask = Callable[[Sequence[Sequence[Item]]], Outcome]
+"""Asks a solver about constraints that hold no choices."""
+
+
+def decide_with_choices(
+    items: Sequence[Item], tolerance: Tolerance, decide: Decide, ask: Ask | None = None
+) -> Outcome | None:
+    """Decide a group that random choices are part of; None if there are none.
+
+    Args:
+        items: The group's constraints, conditioned.
+        tolerance: Per feature.
+        decide: Decides what is left when all choices have come out.
+        ask: The same by a solver, where nothing else decides it.
+    """
+    parts = [part for item in items for part in _conjuncts(item)]
+    try:
+        found = [_Part(item) for item in parts]
+    except TooManyOutcomesError:
+        return Undecided(items[0][0], "budget")
+    if not any(part.trees for part in found):
+        return None
+    for constraint, node, seen in parts:
+        if isinstance(node, Constant) and not holds(constraint, node.value, seen, tolerance):
+            return Refuted(constraint, ground_cause((constraint, node, seen)))
+    return _ChoiceSearch(list(items), found, tolerance, decide, ask).solve()
+
+
+def _conjuncts(item: Item) -> list[Item]:
+    """A constraint as several that all hold; of alternatives, which one holds is a choice."""
+    constraint, root, seen = item
+    if isinstance(constraint, Comparison):
+        return [item]
+    found: list[Item] = []
+    todo: list[tuple[Node, bool]] = [(root, True)]
+    while todo:
+        node, wanted = todo.pop()
+        if not isinstance(node, Logic):
+            holding = node if wanted else build.logic(LogicOp.NOT, node, span=node.span)
+            found.append((constraint, holding, seen))
+        elif node.op is LogicOp.NOT:
+            todo.append((node.args[0], not wanted))
+        elif (node.op is LogicOp.AND) is wanted:
+            todo += [(arg, wanted) for arg in reversed(node.args)]
+        else:
+            args = tuple(arg if wanted else build.logic(LogicOp.NOT, arg, span=arg.span) for arg in node.args)
+            index = Index((1.0,) * len(args), span=node.span)
+            found.append((constraint, Select(index, args, span=node.span), seen))
+    return found
+
+
+class _Part:
+    """A constraint with the choices in it.
+
+    Attributes:
+        item: The constraint.
+        trees: Its outermost choices, by the ids of their nodes.
+        others: The random variables, other than choices, that it depends on.
+    """
+
+    def __init__(self, item: Item) -> None:
+        self.item = item
+        self.trees: dict[int, ChoiceTree] = {}
+        others: set[Identity] = set()
+        for node, _ in above_choices(item[1]):
+            if isinstance(node, Select):
+                tree = self.trees[id(node)] = tree_of(node)
+                others |= tree.others
+            elif is_leaf(node) and not isinstance(node, Index):
+                others.add(node.identity)  # type: ignore[union-attr]
+        self.others = others
+        self.slots: frozenset[int] = frozenset()
+
+
+@dataclass(slots=True)
+class _Domain:
+    """A slot: what its choices may come out as.
+
+    Attributes:
+        outcomes: All that there are.
+        rows: Those that are left.
+        first: The number of the first outcome among the candidates of all slots.
+    """
+
+    outcomes: Outcomes
+    rows: NDArray[np.intp]
+    first: int
+
+
+@dataclass(slots=True)
+class _Lookup:
+    """A choice that an expression makes: what its point has to satisfy."""
+
+    variable: Node
+    slots: frozenset[int]
+
+
+@dataclass(slots=True)
+class _Component:
+    """Constraints that share random variables, and the slots on which they hang."""
+
+    parts: list[_Part] = field(default_factory=list[_Part])
+    lookups: list[_Lookup] = field(default_factory=list[_Lookup])
+    slots: set[int] = field(default_factory=set[int])
+    others: set[Identity] = field(default_factory=set[Identity])
+
+
+class _ChoiceSearch:
+    """The search for one group and one label."""
+
+    def __init__(
+        self, items: list[Item], parts: list[_Part], tolerance: Tolerance, decide: Decide, ask: Ask | None
+    ) -> None:
+        self.items = items
+        self.parts = parts
+        self.tolerance = tolerance
+        self.decide = decide
+        self.ask = ask
+        self.asking = False
+        self.blamed: tuple[int, Refuted] | None = None
+        self.doubt: Undecided | None = None
+        self.known: dict[tuple[int, tuple[int, ...]], Outcome] = {}
+        self.domains: list[_Domain] = []
+        numbers: dict[int, int] = {}
+        for part in parts:
+            own: set[int] = set()
+            for tree in part.trees.values():
+                key = id(tree.outcomes)
+                if key not in numbers:
+                    numbers[key] = len(self.domains)
+                    count = len(tree.outcomes.picks)
+                    first = self.domains[-1].first + len(self.domains[-1].outcomes.picks) if self.domains else 0
+                    self.domains.append(_Domain(tree.outcomes, np.arange(count), first))
+                own.add(numbers[key])
+            part.slots = frozenset(own)
+        self.columns: dict[Variable, list[tuple[int, int]]] = {}
+        for slot, domain in enumerate(self.domains):
+            for column, variable in enumerate(domain.outcomes.variables):
+                self.columns.setdefault(variable, []).append((slot, column))
+        self.components = self._components()
+
+    def _components(self) -> list[_Component]:
+        found: list[_Component] = []
+        pieces: list[_Component] = [_Component([part], [], set(part.slots), set(part.others)) for part in self.parts]
+        for variable, places in self.columns.items():
+            if not isinstance(variable, Identity):
+                slots = frozenset(slot for slot, _ in places)
+                below = {leaf.identity for leaf in leaves(variable) if not isinstance(leaf, Index)}
+                pieces.append(_Component([], [_Lookup(variable, slots)], set(slots), below))
+        for piece in pieces:
+            for other in [each for each in found if each.others & piece.others]:
+                found.remove(other)
+                piece = _Component(
+                    other.parts + piece.parts,
+                    other.lookups + piece.lookups,
+                    other.slots | piece.slots,
+                    other.others | piece.others,
+                )
+            found.append(piece)
+        return found
+
+    def solve(self) -> Outcome:
+        """Decide the group."""
+        values: dict[Identity, Value] = {}
+        for component in self.components:
+            if not component.slots:
+                outcome = self.decide([part.item for part in component.parts])
+                if isinstance(outcome, Refuted):
+                    return outcome
+                if isinstance(outcome, Undecided):
+                    self.doubt = outcome
+                else:
+                    values.update(outcome.values)
+        excluded = self._narrow()
+        if excluded is not None:
+            return excluded
+        if self.doubt is not None:
+            return self.doubt
+        try:
+            for assignment in self._assignments():
+                found = self._values(assignment, values)
+                if found is not None:
+                    return found
+            if self.doubt is not None and self.ask is not None:
+                # nothing else matches: now a solver is worth its time
+                self.asking, self.doubt = True, None
+                for assignment in self._assignments():
+                    found = self._values(assignment, values)
+                    if found is not None:
+                        return found
+        except Exhausted:
+            return Undecided(self.items[0][0], "budget")
+        if self.doubt is not None:
+            return self.doubt
+        return Refuted(self.items[0][0]) if self.blamed is None else self.blamed[1]
+
+    # --- domains
+
+    def _narrow(self) -> Refuted | None:
+        """Leave out outcomes that a constraint excludes by itself, or that do not agree with what is left elsewhere."""
+        for part in sorted(self.parts, key=lambda part: len(part.trees)):
+            if len(part.slots) != 1:
+                continue
+            (slot,) = part.slots
+            domain = self.domains[slot]
+            domain.rows = domain.rows[possible_outcomes(part.item, part.trees, domain.rows, self.tolerance)]
+            if not len(domain.rows):
+                return Refuted(part.item[0])
+        changed = True
+        while changed:
+            changed = False
+            for places in self.columns.values():
+                for (one, column), (other, place) in itertools.permutations(places, 2):
+                    mine, theirs = self.domains[one], self.domains[other]
+                    allowed = theirs.outcomes.picks[theirs.rows, place]
+                    if (allowed < 0).any():
+                        continue
+                    own = mine.outcomes.picks[mine.rows, column]
+                    kept = (own < 0) | np.isin(own, allowed)
+                    if not kept.all():
+                        changed = True
+                        mine.rows = mine.rows[kept]
+                        if not len(mine.rows):
+                            return Refuted(self._about(one) or self.items[0][0])
+        return None
+
+    def _about(self, slot: int):
+        return next((part.item[0] for part in self.parts if slot in part.slots), None)
+
+    # --- the search
+
+    def _assignments(self):
+        slots = [
+            Slot(number, tuple((domain.rows + domain.first).tolist())) for number, domain in enumerate(self.domains)
+        ]
+        together = [part.slots for part in self.parts] + [
+            frozenset(slot for slot, _ in places) for places in self.columns.values()
+        ]
+        links: dict[int, set[int]] = {}
+        for group in together:
+            for slot in group:
+                links.setdefault(slot, set()).update(group - {slot})
+        return find_assignments(slots, self._check, links=links, budget=_MOST_TRIES)
+
+    def _check(self, slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+        domain = self.domains[slot]
+        picks = domain.outcomes.picks[assignment[slot] - domain.first]
+        for variable, pick in zip(domain.outcomes.variables, picks.tolist(), strict=True):
+            if pick < 0:
+                continue
+            for other, column in self.columns[variable]:
+                if other != slot and other in assignment:
+                    theirs = self.domains[other]
+                    own = theirs.outcomes.picks[assignment[other] - theirs.first, column]
+                    if own >= 0 and own != pick:
+                        return Answer.NO, frozenset((slot, other))
+        answer = Answer.YES
+        assigned = assignment.keys()
+        for number, part in enumerate(self.parts):
+            if slot in part.slots and part.slots <= assigned:
+                outcome = self._of(number, [part], [], part.slots, assignment)
+                if isinstance(outcome, Refuted):
+                    return self._refuted(outcome, part.slots, assignment)
+        for number, component in enumerate(self.components):
+            if slot in component.slots and component.slots <= assigned:
+                if len(component.parts) == 1 and not component.lookups:
+                    number = self.parts.index(component.parts[0])
+                else:
+                    number += len(self.parts)
+                outcome = self._of(number, component.parts, component.lookups, component.slots, assignment)
+                if isinstance(outcome, Refuted):
+                    return self._refuted(outcome, frozenset(component.slots), assignment)
+                if isinstance(outcome, Undecided):
+                    self.doubt = self.doubt or outcome
+                    answer = Answer.NO
+        return answer, frozenset(assigned)
+
+    def _refuted(
+        self, outcome: Refuted, slots: frozenset[int], assignment: Mapping[int, int]
+    ) -> tuple[Answer, frozenset[int]]:
+        if self.blamed is None or len(assignment) > self.blamed[0]:
+            self.blamed = (len(assignment), outcome)
+        return Answer.NO, slots
+
+    def _of(
+        self,
+        number: int,
+        parts: Sequence[_Part],
+        lookups: Sequence[_Lookup],
+        slots: frozenset[int] | set[int],
+        assignment: Mapping[int, int],
+    ) -> Outcome:
+        """What is decided of constraints for the outcomes of their slots, once."""
+        key = (number, tuple([assignment[slot] for slot in sorted(slots)]))
+        if key not in self.known:
+            self.known[key] = self._decided(parts, lookups, slots, assignment, self.decide)
+        found = self.known[key]
+        if self.asking and isinstance(found, Undecided):
+            found = self.known[key] = self._decided(parts, lookups, slots, assignment, self._by_solver)
+        return found
+
+    def _by_solver(self, items: list[Item]) -> Outcome:
+        outcome = self.decide(items)
+        return self.ask([items]) if isinstance(outcome, Undecided) and self.ask is not None else outcome
+
+    def _decided(
+        self,
+        parts: Sequence[_Part],
+        lookups: Sequence[_Lookup],
+        slots: frozenset[int] | set[int],
+        assignment: Mapping[int, int],
+        decide: Decide,
+    ) -> Outcome:
+        given, taken = self._given(slots, assignment)
+        asked = {id(lookup.variable) for lookup in lookups}
+        memo = {id(node): Constant(float(pick), span=node.span) for node, pick in taken}
+        left = conditioned([part.item for part in parts], given, memo=dict(memo))
+        for node, pick in taken:
+            if id(node) in asked:
+                inner = {key: value for key, value in memo.items() if key != id(node)}
+                (placed,) = conditioned([fact(_is(node, pick))], given, memo=inner)
+                left.append(placed)
+        for constraint, node, seen in left:
+            if isinstance(node, Constant) and not holds(constraint, node.value, seen, self.tolerance):
+                return Refuted(constraint, ground_cause((constraint, node, seen)))
+        left = [item for item in left if not isinstance(item[1], Constant)]
+        if not left:
+            return Satisfied({})
+        deeper = decide_with_choices(left, self.tolerance, decide)
+        return decide(left) if deeper is None else deeper
+
+    def _given(
+        self, slots: frozenset[int] | set[int], assignment: Mapping[int, int]
+    ) -> tuple[dict[Identity, Value], list[tuple[Node, int]]]:
+        """Values of random choices, and the options that expressions take."""
+        given: dict[Identity, Value] = {}
+        taken: dict[int, tuple[Node, int]] = {}
+        for slot in slots:
+            domain = self.domains[slot]
+            for variable, pick in domain.outcomes.given(assignment[slot] - domain.first):
+                if isinstance(variable, Identity):
+                    given[variable] = float(pick)
+                else:
+                    taken[id(variable)] = (variable, pick)
+        return given, list(taken.values())
+
+    def _values(self, assignment: Mapping[int, int], values: Mapping[Identity, Value]) -> Satisfied | None:
+        """Values of all random variables, if they hold when they are put in."""
+        found = dict(values)
+        for number, component in enumerate(self.components):
+            if not component.slots:
+                continue
+            if len(component.parts) == 1 and not component.lookups:
+                number = self.parts.index(component.parts[0])
+            else:
+                number += len(self.parts)
+            outcome = self._of(number, component.parts, component.lookups, component.slots, assignment)
+            if isinstance(outcome, Satisfied):
+                found.update(outcome.values)
+        given, _ = self._given(frozenset(range(len(self.domains))), assignment)
+        found.update(given)
+        if replay(conditioned(self.items, given), found, self.tolerance, LINEAR_SLACK):
+            return Satisfied(found)
+        self.doubt = self.doubt or Undecided(self.items[0][0], "precision")
+        return None
+
+
+def _is(index: Node, pick: int) -> Node:
+    """That an expression takes an option."""
+    if kind_of(index) == "boolean":
+        return index if pick else build.logic(LogicOp.NOT, index, span=index.span)
+    return build.compare(CompareOp.EQ, index, Constant(float(pick), span=index.span), index.span)
