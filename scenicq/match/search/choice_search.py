@@ -21,6 +21,7 @@ from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     CompareOp,
     Constant,
+    DirectionAt,
     Identity,
     Index,
     Logic,
@@ -29,12 +30,11 @@ from scenicq.forest.nodes import (
     Select,
     Value,
 )
-from scenicq.forest.walk import is_leaf, leaves
-from scenicq.match.linear.linear_program import LINEAR_SLACK
+from scenicq.forest.walk import is_leaf, leaves, postorder
 from scenicq.match.options import Exhausted, Tolerance
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact
-from scenicq.match.problem.evaluation import ground_cause, holds, replay
+from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Answer, find_assignments
 from scenicq.match.search.outcome_bounds import possible_outcomes
@@ -179,7 +179,8 @@ class _ChoiceSearch:
         self.doubt: Undecided | None = None
         self.known: dict[tuple[int, tuple[int, ...]], Outcome] = {}
         self.domains: list[_Domain] = []
-        numbers: dict[int, int] = {}
+        self.slot_of: dict[int, int] = {}
+        numbers = self.slot_of
         for part in parts:
             own: set[int] = set()
             for tree in part.trees.values():
@@ -236,16 +237,12 @@ class _ChoiceSearch:
             return self.doubt
         try:
             for assignment in self._assignments():
-                found = self._values(assignment, values)
-                if found is not None:
-                    return found
+                return self._values(assignment, values)
             if self.doubt is not None and self.ask is not None:
                 # nothing else matches: now a solver is worth its time
                 self.asking, self.doubt = True, None
                 for assignment in self._assignments():
-                    found = self._values(assignment, values)
-                    if found is not None:
-                        return found
+                    return self._values(assignment, values)
         except Exhausted:
             return Undecided(self.items[0][0], "budget")
         if self.doubt is not None:
@@ -256,14 +253,17 @@ class _ChoiceSearch:
 
     def _narrow(self) -> Refuted | None:
         """Leave out outcomes that a constraint excludes by itself, or that do not agree with what is left elsewhere."""
-        for part in sorted(self.parts, key=lambda part: len(part.trees)):
-            if len(part.slots) != 1:
-                continue
-            (slot,) = part.slots
-            domain = self.domains[slot]
-            domain.rows = domain.rows[possible_outcomes(part.item, part.trees, domain.rows, self.tolerance)]
-            if not len(domain.rows):
-                return Refuted(part.item[0])
+        for part in sorted(self.parts, key=lambda part: len(part.slots)):
+            for slot in part.slots:
+                domain = self.domains[slot]
+                chosen = {
+                    key: (tree, domain.rows, True) if self.slot_of[id(tree.outcomes)] == slot
+                    else (tree, self.domains[self.slot_of[id(tree.outcomes)]].rows, False)
+                    for key, tree in part.trees.items()
+                }  # fmt: skip
+                domain.rows = domain.rows[possible_outcomes(part.item, chosen, len(domain.rows), self.tolerance)]
+                if not len(domain.rows):
+                    return Refuted(part.item[0])
         changed = True
         while changed:
             changed = False
@@ -316,16 +316,12 @@ class _ChoiceSearch:
         assigned = assignment.keys()
         for number, part in enumerate(self.parts):
             if slot in part.slots and part.slots <= assigned:
-                outcome = self._of(number, [part], [], part.slots, assignment)
+                outcome = self._of(number, [part], [], part.slots, assignment, whole=False)
                 if isinstance(outcome, Refuted):
                     return self._refuted(outcome, part.slots, assignment)
         for number, component in enumerate(self.components):
             if slot in component.slots and component.slots <= assigned:
-                if len(component.parts) == 1 and not component.lookups:
-                    number = self.parts.index(component.parts[0])
-                else:
-                    number += len(self.parts)
-                outcome = self._of(number, component.parts, component.lookups, component.slots, assignment)
+                outcome = self._of(number + len(self.parts), component.parts, component.lookups, component.slots, assignment)
                 if isinstance(outcome, Refuted):
                     return self._refuted(outcome, frozenset(component.slots), assignment)
                 if isinstance(outcome, Undecided):
@@ -347,15 +343,23 @@ class _ChoiceSearch:
         lookups: Sequence[_Lookup],
         slots: frozenset[int] | set[int],
         assignment: Mapping[int, int],
+        *,
+        whole: bool = True,
     ) -> Outcome:
-        """What is decided of constraints for the outcomes of their slots, once."""
+        """What is decided of constraints for the outcomes of their slots, once; of a part only what is cheap."""
         key = (number, tuple([assignment[slot] for slot in sorted(slots)]))
         if key not in self.known:
-            self.known[key] = self._decided(parts, lookups, slots, assignment, self.decide)
+            self.known[key] = self._decided(parts, lookups, slots, assignment, self.decide if whole else self._cheaply)
         found = self.known[key]
-        if self.asking and isinstance(found, Undecided):
+        if whole and self.asking and isinstance(found, Undecided):
             found = self.known[key] = self._decided(parts, lookups, slots, assignment, self._by_solver)
         return found
+
+    def _cheaply(self, items: list[Item]) -> Outcome:
+        """What is decided of a constraint that others share random variables with."""
+        if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in items])):
+            return Undecided(items[0][0], "nonlinear")
+        return self.decide(items)
 
     def _by_solver(self, items: list[Item]) -> Outcome:
         outcome = self.decide(items)
@@ -402,25 +406,17 @@ class _ChoiceSearch:
                     taken[id(variable)] = (variable, pick)
         return given, list(taken.values())
 
-    def _values(self, assignment: Mapping[int, int], values: Mapping[Identity, Value]) -> Satisfied | None:
-        """Values of all random variables, if they hold when they are put in."""
+    def _values(self, assignment: Mapping[int, int], values: Mapping[Identity, Value]) -> Satisfied:
+        """Values of all random variables."""
         found = dict(values)
         for number, component in enumerate(self.components):
             if not component.slots:
                 continue
-            if len(component.parts) == 1 and not component.lookups:
-                number = self.parts.index(component.parts[0])
-            else:
-                number += len(self.parts)
-            outcome = self._of(number, component.parts, component.lookups, component.slots, assignment)
+            outcome = self._of(number + len(self.parts), component.parts, component.lookups, component.slots, assignment)
             if isinstance(outcome, Satisfied):
                 found.update(outcome.values)
         given, _ = self._given(frozenset(range(len(self.domains))), assignment)
-        found.update(given)
-        if replay(conditioned(self.items, given), found, self.tolerance, LINEAR_SLACK):
-            return Satisfied(found)
-        self.doubt = self.doubt or Undecided(self.items[0][0], "precision")
-        return None
+        return Satisfied({**found, **given})
 
 
 def _is(index: Node, pick: int) -> Node:

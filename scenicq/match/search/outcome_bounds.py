@@ -61,25 +61,26 @@ _EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
 
 def possible_outcomes(
-    item: Item, trees: Mapping[int, ChoiceTree], rows: NDArray[np.intp], tolerance: Tolerance
+    item: Item, trees: Mapping[int, tuple[ChoiceTree, NDArray[np.intp], bool]], count: int, tolerance: Tolerance
 ) -> NDArray[np.bool_]:
     """For which outcomes a constraint may be satisfiable.
 
     Args:
         item: The constraint, conditioned.
-        trees: The outermost choices in it, by the ids of their nodes, all with the same outcomes.
-        rows: The outcomes in question.
+        trees: The outermost choices in it, by the ids of their nodes, with the outcomes that are left, and whether
+            these are those in question: of the others any may come out.
+        count: How many outcomes are in question.
         tolerance: Per feature.
 
     Returns:
-        One truth value a row; false only where no solution exists.
+        One truth value for each; false only where no solution exists.
     """
     constraint, root, seen = item
     known: dict[int, Any] = {}
     with np.errstate(all="ignore"):
         for node, below in above_choices(root):
             if isinstance(node, Select):
-                known[id(node)] = _chosen(trees[id(node)], rows)
+                known[id(node)] = _chosen(*trees[id(node)])
             else:
                 known[id(node)] = _value(node, [known[id(child)] for child in below])
         value, kind = known[id(root)], kind_of(root)
@@ -99,21 +100,22 @@ def possible_outcomes(
                 near = ~np.isfinite(width) | (np.mod(seen - low + allowed, math.tau) <= width)
             else:
                 near = (low - tolerance.other - SLACK <= seen) & (seen <= high + tolerance.other + SLACK)
-        return np.broadcast_to(np.asarray(near, dtype=bool), rows.shape)
+        return np.broadcast_to(np.asarray(near, dtype=bool), (count,))
 
 
-def _chosen(tree: ChoiceTree, rows: NDArray[np.intp]) -> Any:
-    """Bounds of what is chosen."""
+def _chosen(tree: ChoiceTree, rows: NDArray[np.intp], each: bool) -> Any:  # noqa: FBT001 - unpacked
+    """Bounds of what is chosen, for each outcome or for all together."""
     match tree.kind:
         case "scalar":
-            return tuple(tree.spans[rows].T)
-        case "vector":
+            low, high = tree.spans[rows].T
+            return (low, high) if each else (low.min(), high.max())
+        case "vector" | "region":
             west, south, east, north = tree.boxes[rows].T
-            return ((west, east), (south, north))
-        case "region":
-            return tuple(tree.boxes[rows].T)
+            if not each:
+                west, south, east, north = west.min(), south.min(), east.max(), north.max()
+            return ((west, east), (south, north)) if tree.kind == "vector" else (west, south, east, north)
         case "boolean":
-            return tree.truths[rows]
+            return tree.truths[rows] if each else tree.truths[rows].any()
         case _:
             return None
 
