@@ -18,6 +18,7 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     Arithmetic,
+    ArithmeticOp,
     Bearing,
     Compare,
     CompareOp,
@@ -140,6 +141,8 @@ def _value(node: Node, args: list[Any]) -> Any:
         case PointIn():
             west, south, east, north = args[0]
             return ((west, east), (south, north))
+        case Arithmetic(ArithmeticOp.DIV, (_, Constant(value=float() as divisor))) if divisor:
+            return multiply(args[0], (1 / divisor, 1 / divisor))
         case Arithmetic() if all(kind_of(arg) == "scalar" for arg in node.args):
             return arithmetic(node.op, args)
         case Coordinate():
