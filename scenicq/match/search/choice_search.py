@@ -2,35 +2,40 @@
 
 Each tree of choices is a slot whose candidates are its outcomes. Constraints on one slot alone leave it few of them (by
 boxes, for all outcomes together); choices that several slots share must come out the same in all; then the search of
-`backtracking` goes through what is left, fewest candidates first, and goes back to what is to blame. A look-up at a hidden
-place is a choice, too: that the place has the element is one more constraint.
+`backtracking` goes through what is left, fewest candidates first, and goes back to what is to blame. A look-up at a
+hidden place is a choice, too: that the place has the element is one more constraint.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest import build
-from scenicq.forest.groups import Comparison
+from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     CompareOp,
     Constant,
     DirectionAt,
+    DiscreteRange,
     Identity,
     Index,
     Logic,
     LogicOp,
     Node,
+    Normal,
+    PointIn,
+    Range,
     Select,
+    TruncatedNormal,
     Value,
 )
-from scenicq.forest.walk import is_leaf, leaves, postorder
+from scenicq.forest.walk import leaves, postorder
 from scenicq.match.options import Exhausted, Tolerance
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact
@@ -78,6 +83,9 @@ def decide_with_choices(
         return Undecided(items[0][0], "budget")
     if not any(part.trees for part in found):
         return None
+    for part in found:
+        if any(not tree.results for tree in part.trees.values()):
+            return Refuted(part.item[0])
     for constraint, node, seen in parts:
         if isinstance(node, Constant) and not holds(constraint, node.value, seen, tolerance):
             return Refuted(constraint, ground_cause((constraint, node, seen)))
@@ -113,21 +121,24 @@ class _Part:
     Attributes:
         item: The constraint.
         trees: Its outermost choices, by the ids of their nodes.
+        inner: Choices in what its outermost choices lead to.
         others: The random variables, other than choices, that it depends on.
+        slots: On which it hangs.
     """
 
     def __init__(self, item: Item) -> None:
         self.item = item
         self.trees: dict[int, ChoiceTree] = {}
-        others: set[Identity] = set()
+        self.inner: set[Variable] = set()
+        self.others: set[Variable] = set()
+        self.slots: frozenset[int] = frozenset()
         for node, _ in above_choices(item[1]):
             if isinstance(node, Select):
                 tree = self.trees[id(node)] = tree_of(node)
-                others |= tree.others
-            elif is_leaf(node) and not isinstance(node, Index):
-                others.add(node.identity)  # type: ignore[union-attr]
-        self.others = others
-        self.slots: frozenset[int] = frozenset()
+                self.inner |= tree.inner
+                self.others |= tree.others
+            elif isinstance(node, Range | Normal | TruncatedNormal | DiscreteRange | PointIn):
+                self.others.add(node.identity)
 
 
 @dataclass(slots=True)
@@ -160,7 +171,7 @@ class _Component:
     parts: list[_Part] = field(default_factory=list[_Part])
     lookups: list[_Lookup] = field(default_factory=list[_Lookup])
     slots: set[int] = field(default_factory=set[int])
-    others: set[Identity] = field(default_factory=set[Identity])
+    others: set[Variable] = field(default_factory=set["Variable"])
 
 
 class _ChoiceSearch:
@@ -170,6 +181,7 @@ class _ChoiceSearch:
         self, items: list[Item], parts: list[_Part], tolerance: Tolerance, decide: Decide, ask: Ask | None
     ) -> None:
         self.items = items
+        self.constraints = [constraint for constraint, _, _ in items]
         self.parts = parts
         self.tolerance = tolerance
         self.decide = decide
@@ -196,6 +208,10 @@ class _ChoiceSearch:
         for slot, domain in enumerate(self.domains):
             for column, variable in enumerate(domain.outcomes.variables):
                 self.columns.setdefault(variable, []).append((slot, column))
+        for part in parts:
+            # a choice deeper in an expression comes out as it does elsewhere
+            part.slots |= {slot for variable in part.inner for slot, _ in self.columns.get(variable, ())}
+            part.others |= part.inner - self.columns.keys()
         self.components = self._components()
 
     def _components(self) -> list[_Component]:
@@ -204,45 +220,42 @@ class _ChoiceSearch:
         for variable, places in self.columns.items():
             if not isinstance(variable, Identity):
                 slots = frozenset(slot for slot, _ in places)
-                below = {leaf.identity for leaf in leaves(variable) if not isinstance(leaf, Index)}
+                below: set[Variable] = {leaf.identity for leaf in leaves(variable) if not isinstance(leaf, Index)}
                 pieces.append(_Component([], [_Lookup(variable, slots)], set(slots), below))
         for piece in pieces:
             for other in [each for each in found if each.others & piece.others]:
                 found.remove(other)
-                piece = _Component(
-                    other.parts + piece.parts,
-                    other.lookups + piece.lookups,
-                    other.slots | piece.slots,
-                    other.others | piece.others,
-                )
+                piece.parts[:0] = other.parts
+                piece.lookups[:0] = other.lookups
+                piece.slots |= other.slots
+                piece.others |= other.others
             found.append(piece)
         return found
 
     def solve(self) -> Outcome:
         """Decide the group."""
-        values: dict[Identity, Value] = {}
-        for component in self.components:
-            if not component.slots:
-                outcome = self.decide([part.item for part in component.parts])
-                if isinstance(outcome, Refuted):
-                    return outcome
-                if isinstance(outcome, Undecided):
-                    self.doubt = outcome
-                else:
-                    values.update(outcome.values)
         excluded = self._narrow()
         if excluded is not None:
             return excluded
-        if self.doubt is not None:
-            return self.doubt
+        values: dict[Identity, Value] = {}
+        unsettled: Undecided | None = None
+        for component in self.components:
+            if not component.slots:
+                outcome = self._by_solver([part.item for part in component.parts])
+                if isinstance(outcome, Refuted):
+                    return outcome
+                if isinstance(outcome, Undecided):
+                    unsettled = outcome
+                else:
+                    values.update(outcome.values)
         try:
             for assignment in self._assignments():
-                return self._values(assignment, values)
+                return unsettled or self._values(assignment, values)
             if self.doubt is not None and self.ask is not None:
                 # nothing else matches: now a solver is worth its time
                 self.asking, self.doubt = True, None
                 for assignment in self._assignments():
-                    return self._values(assignment, values)
+                    return unsettled or self._values(assignment, values)
         except Exhausted:
             return Undecided(self.items[0][0], "budget")
         if self.doubt is not None:
@@ -254,7 +267,7 @@ class _ChoiceSearch:
     def _narrow(self) -> Refuted | None:
         """Leave out outcomes that a constraint excludes by itself, or that do not agree with what is left elsewhere."""
         for part in sorted(self.parts, key=lambda part: len(part.slots)):
-            for slot in part.slots:
+            for slot in {self.slot_of[id(tree.outcomes)] for tree in part.trees.values()}:
                 domain = self.domains[slot]
                 chosen = {
                     key: (tree, domain.rows, True) if self.slot_of[id(tree.outcomes)] == slot
@@ -279,15 +292,16 @@ class _ChoiceSearch:
                         changed = True
                         mine.rows = mine.rows[kept]
                         if not len(mine.rows):
-                            return Refuted(self._about(one) or self.items[0][0])
+                            return Refuted(self._about(one))
         return None
 
-    def _about(self, slot: int):
-        return next((part.item[0] for part in self.parts if slot in part.slots), None)
+    def _about(self, slot: int) -> Constraint:
+        """A constraint that hangs on a slot."""
+        return next((part.item[0] for part in self.parts if slot in part.slots), self.items[0][0])
 
     # --- the search
 
-    def _assignments(self):
+    def _assignments(self) -> Iterator[dict[int, int]]:
         slots = [
             Slot(number, tuple((domain.rows + domain.first).tolist())) for number, domain in enumerate(self.domains)
         ]
@@ -321,7 +335,9 @@ class _ChoiceSearch:
                     return self._refuted(outcome, part.slots, assignment)
         for number, component in enumerate(self.components):
             if slot in component.slots and component.slots <= assigned:
-                outcome = self._of(number + len(self.parts), component.parts, component.lookups, component.slots, assignment)
+                outcome = self._of(
+                    number + len(self.parts), component.parts, component.lookups, component.slots, assignment
+                )
                 if isinstance(outcome, Refuted):
                     return self._refuted(outcome, frozenset(component.slots), assignment)
                 if isinstance(outcome, Undecided):
@@ -375,7 +391,7 @@ class _ChoiceSearch:
     ) -> Outcome:
         given, taken = self._given(slots, assignment)
         asked = {id(lookup.variable) for lookup in lookups}
-        memo = {id(node): Constant(float(pick), span=node.span) for node, pick in taken}
+        memo: dict[int, Node] = {id(node): Constant(float(pick), span=node.span) for node, pick in taken}
         left = conditioned([part.item for part in parts], given, memo=dict(memo))
         for node, pick in taken:
             if id(node) in asked:
@@ -384,12 +400,15 @@ class _ChoiceSearch:
                 left.append(placed)
         for constraint, node, seen in left:
             if isinstance(node, Constant) and not holds(constraint, node.value, seen, self.tolerance):
-                return Refuted(constraint, ground_cause((constraint, node, seen)))
+                blamed = constraint if constraint in self.constraints else self.items[0][0]
+                return Refuted(blamed, ground_cause((constraint, node, seen)))
         left = [item for item in left if not isinstance(item[1], Constant)]
         if not left:
             return Satisfied({})
-        deeper = decide_with_choices(left, self.tolerance, decide)
-        return decide(left) if deeper is None else deeper
+        found = decide_with_choices(left, self.tolerance, decide) or decide(left)
+        if isinstance(found, Satisfied) or found.constraint in self.constraints:
+            return found
+        return replace(found, constraint=self.items[0][0] if not parts else parts[0].item[0])
 
     def _given(
         self, slots: frozenset[int] | set[int], assignment: Mapping[int, int]
@@ -412,7 +431,9 @@ class _ChoiceSearch:
         for number, component in enumerate(self.components):
             if not component.slots:
                 continue
-            outcome = self._of(number + len(self.parts), component.parts, component.lookups, component.slots, assignment)
+            outcome = self._of(
+                number + len(self.parts), component.parts, component.lookups, component.slots, assignment
+            )
             if isinstance(outcome, Satisfied):
                 found.update(outcome.values)
         given, _ = self._given(frozenset(range(len(self.domains))), assignment)

@@ -1,14 +1,14 @@
 """Necessary conditions of one constraint, for all outcomes of a choice at once: interval analysis over arrays.
 
-A lane of a thousand that must hold a car is one of those whose box does; a row of a table of outcomes that no value of the
-other random variables can save is left out before anything is evaluated for it.
+A lane of a thousand that must hold a car is one of those whose box does; a row of a table of outcomes that no value of
+the other random variables can save is left out before anything is evaluated for it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +91,7 @@ def possible_outcomes(
         elif isinstance(seen, tuple) and constraint.property == "position":
             (x0, x1), (y0, y1) = value
             reach = tolerance.reach + SLACK
-            x, y = cast("tuple[float, float]", seen)
+            x, y = seen
             near = (x0 - reach <= x) & (x <= x1 + reach) & (y0 - reach <= y) & (y <= y1 + reach)
         elif isinstance(seen, float) and kind == "scalar":
             low, high = value
@@ -104,7 +104,7 @@ def possible_outcomes(
         return np.broadcast_to(np.asarray(near, dtype=bool), (count,))
 
 
-def _chosen(tree: ChoiceTree, rows: NDArray[np.intp], each: bool) -> Any:  # noqa: FBT001 - unpacked
+def _chosen(tree: ChoiceTree, rows: NDArray[np.intp], each: bool) -> Any:
     """Bounds of what is chosen, for each outcome or for all together."""
     match tree.kind:
         case "scalar":
@@ -129,7 +129,7 @@ def _value(node: Node, args: list[Any]) -> Any:
         case Constant(value=float() as value):
             return (value, value)
         case Constant(value=tuple() as value):
-            return tuple((part, part) for part in cast("tuple[float, float]", value))
+            return tuple((part, part) for part in value)
         case Constant(value=value) if isinstance(value, Region):
             return region_bounds(value)
         case Constant(value=bool() as value):

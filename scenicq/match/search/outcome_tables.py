@@ -1,8 +1,8 @@
 """Random choices as finite-domain variables: the outcomes of nested choices as one table.
 
-`Uniform(*intersections)`, then a lane of it, then a maneuver of that: each is a variable whose domain is the options, and
-the variables below depend on which option lies above. A table has one row for each outcome of such a tree. Trees with the
-same outcomes share one table, so that a lane, its centreline and its last point are chosen at once.
+`Uniform(*intersections)`, then a lane of it, then a maneuver of that: each is a variable whose domain is the options,
+and the variables below depend on which option lies above. A table has one row for each outcome of such a tree. Trees
+with the same outcomes share one table, so that a lane, its centreline and its last point are chosen at once.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scenicq.forest.bounds import scalar_bounds, vector_bounds
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Constant, Identity, Index, Kind, Node, Select, Undefined
-from scenicq.forest.walk import children, leaves
+from scenicq.forest.walk import children, leaves, postorder
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
 
@@ -69,14 +69,26 @@ class ChoiceTree:
     def others(self) -> frozenset[Identity]:
         """The random variables, other than choices, on which the results and the choices depend."""
         roots = [result for result in self.results if not isinstance(result, Constant)]
-        roots += [cast(Node, variable) for variable in self.outcomes.variables if not isinstance(variable, Identity)]
+        roots += [variable for variable in self.outcomes.variables if not isinstance(variable, Identity)]
         return frozenset(leaf.identity for leaf in leaves(*roots) if not isinstance(leaf, Index))
+
+    @cached_property
+    def inner(self) -> frozenset[Variable]:
+        """Further choices inside of the results, which come out when it is known which result is chosen."""
+        found: set[Variable] = set()
+        for node in postorder([result for result in self.results if not isinstance(result, Constant)]):
+            if isinstance(node, Index):
+                found.add(node.identity)
+            elif isinstance(node, Select) and not isinstance(node.index, Index | Select):
+                found.add(node.index)
+        return frozenset(found)
 
     @cached_property
     def kind(self) -> Kind:
         """The kind of the results that have a value."""
-        kinds = {kind_of(result) for result in self.results} - {"other"}
-        return kinds.pop() if len(kinds) == 1 else "other"
+        kinds: list[Kind] = list(dict.fromkeys(kind_of(result) for result in self.results))
+        kinds = [kind for kind in kinds if kind != "other"]
+        return kinds[0] if len(kinds) == 1 else "other"
 
     @cached_property
     def truths(self) -> NDArray[np.bool_]:
