@@ -15,6 +15,7 @@ from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Node, Ra
 from scenicq.forest.walk import leaves, postorder, transform
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.case_split import Picked, picked
+from scenicq.match.decide.hidden_distances import with_areas
 from scenicq.match.fields.field_solver import decide_directions
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.linear.linear_program import LINEAR_SLACK
@@ -49,6 +50,12 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
     alone = _components(left, used, None)
     if len(alone) > 1:
         return _all(alone, items, tolerance)
+    outlined = with_areas(left, tolerance)
+    if outlined is not None:
+        found = decide_decomposed(outlined, tolerance)
+        if not isinstance(found, Satisfied) or replay(items, found.values, tolerance, LINEAR_SLACK):
+            return found
+        return Undecided(items[0][0], "nonlinear")
     cases = picked(left, tolerance)
     if cases is not None:
         return _any(cases, items, tolerance)
