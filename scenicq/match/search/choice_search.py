@@ -189,7 +189,7 @@ class _ChoiceSearch:
         self.asking = False
         self.blamed: tuple[int, Refuted] | None = None
         self.doubt: Undecided | None = None
-        self.known: dict[tuple[int, tuple[int, ...]], Outcome] = {}
+        self.known: dict[tuple[int, tuple[tuple[int, int], ...]], Outcome] = {}
         self.domains: list[_Domain] = []
         self.slot_of: dict[int, int] = {}
         numbers = self.slot_of
@@ -334,7 +334,9 @@ class _ChoiceSearch:
                 if isinstance(outcome, Refuted):
                     return self._refuted(outcome, part.slots, assignment)
         for number, component in enumerate(self.components):
-            if slot in component.slots and component.slots <= assigned:
+            if slot not in component.slots:
+                continue
+            if component.slots <= assigned:
                 outcome = self._of(
                     number + len(self.parts), component.parts, component.lookups, component.slots, assignment
                 )
@@ -343,6 +345,14 @@ class _ChoiceSearch:
                 if isinstance(outcome, Undecided):
                     self.doubt = self.doubt or outcome
                     answer = Answer.NO
+                continue
+            # what already hangs on nothing open may be unsatisfiable together
+            ready = [part for part in component.parts if part.slots <= assigned]
+            if len(ready) > 1 and any(slot in part.slots for part in ready):
+                slots = frozenset(each for part in ready for each in part.slots)
+                outcome = self._of(number + len(self.parts) + len(self.components), ready, [], slots, assignment)
+                if isinstance(outcome, Refuted):
+                    return self._refuted(outcome, slots, assignment)
         return answer, frozenset(assigned)
 
     def _refuted(
@@ -363,7 +373,7 @@ class _ChoiceSearch:
         whole: bool = True,
     ) -> Outcome:
         """What is decided of constraints for the outcomes of their slots, once; of a part only what is cheap."""
-        key = (number, tuple([assignment[slot] for slot in sorted(slots)]))
+        key = (number, tuple([(slot, assignment[slot]) for slot in sorted(slots)]))
         if key not in self.known:
             self.known[key] = self._decided(parts, lookups, slots, assignment, self.decide if whole else self._cheaply)
         found = self.known[key]
