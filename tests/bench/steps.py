@@ -40,6 +40,7 @@ from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Tolerance  # noqa: E402
 from scenicq.match.problem.outcome import Undecided  # noqa: E402
 from scenicq.match.search import group_plan, label_search  # noqa: E402
+from scenicq.match.search.first_fit import FirstFit  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
 
 MAP = ROOT.parent / "shared" / "data" / "boston" / "maps" / "boston-seaport.geojson"
@@ -84,8 +85,8 @@ def _undecided(parts: Sequence[Sequence[Any]], *_: object) -> Undecided:
 
 
 STEPS: dict[str, Off] = {
-    "first fit": _set(Matcher, "_direct_for", lambda *_: None),
-    "closed forms": _set(group_plan, "closed_form_of", lambda group: None),
+    "first fit": _set(FirstFit, "fill", lambda *_: iter(())),
+    "closed forms": _set(group_plan, "closed_form_of", lambda *_: None),
     "arc consistency": _set(label_search, "thinned", lambda plan, candidates, *_: (candidates, None)),
     "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),

@@ -93,7 +93,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
     nearest = closest(matcher, label)
     if nearest is None or not isinstance(nearest.finding.verdict, Match):
         return _without_match(matcher, label, finding, formulas=formulas)
-    found = replace(nearest.finding, attempt=_again(matcher, nearest.finding))
+    found = replace(nearest.finding, search=_again(matcher, nearest.finding))
     return Explanation(
         label.frame,
         finding.verdict,
@@ -106,7 +106,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
 
 def _again(matcher: Matcher, finding: Finding) -> LabelSearch | None:
     """The search of a finding with the matcher's own options."""
-    old = finding.attempt
+    old = finding.search
     return None if old is None else LabelSearch(matcher.scenario, matcher.options, old.cast, matcher.ask)
 
 
@@ -119,10 +119,10 @@ def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas
             cause, shown = finding.verdict.cause, finding.verdict.correspondence
         case Match():
             raise AssertionError("a match is explained by its witness")
-    failure = finding.attempt.failure if finding.attempt is not None else None
+    failure = finding.search.failure if finding.search is not None else None
     found: tuple[Violation, ...] = ()
-    if failure is not None and finding.attempt is not None and isinstance(finding.verdict, NoMatch):
-        found = violations(matcher, finding.attempt, failure.group, failure.assignment)
+    if failure is not None and finding.search is not None and isinstance(finding.verdict, NoMatch):
+        found = violations(matcher, finding.search, failure.group, failure.assignment)
     if not found:
         told = "is not met" if isinstance(finding.verdict, NoMatch) else "is not decided"
         found = (Violation(cause.what, told, cause.detail, cause.span),)
@@ -130,11 +130,11 @@ def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas
 
 
 def _proofs(finding: Finding) -> tuple[Proof, ...]:
-    assert finding.attempt is not None
+    assert finding.search is not None
     assert finding.plan is not None
     found: list[Proof] = []
     for plan in finding.plan.groups:
-        outcome = finding.attempt.decide(plan, finding.assignment)
+        outcome = finding.search.decide(plan, finding.assignment)
         if isinstance(outcome, Satisfied):
             for leaf in plan.group.variables:
                 value = outcome.values.get(leaf.identity)
@@ -146,7 +146,7 @@ def _proofs(finding: Finding) -> tuple[Proof, ...]:
 
 
 def _violations(matcher: Matcher, finding: Finding) -> tuple[Violation, ...]:
-    attempt, plan = finding.attempt, finding.plan
+    attempt, plan = finding.search, finding.plan
     assert attempt is not None
     assert plan is not None
     found: list[Violation] = []
@@ -161,7 +161,7 @@ def _violations(matcher: Matcher, finding: Finding) -> tuple[Violation, ...]:
 
 
 def _formulas(matcher: Matcher, finding: Finding) -> tuple[Formula, ...]:
-    attempt, plan = finding.attempt, finding.plan
+    attempt, plan = finding.search, finding.plan
     assert attempt is not None
     assert plan is not None
     return tuple(
