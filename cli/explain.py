@@ -49,7 +49,7 @@ def find_label(dataset: Dataset, frame: str) -> Label:
     topics={"What counts as a match": SHARED},
     epilog="\b\nExamples:\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c\n"
-    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.25,heading=5deg --smt2 formulas",
+    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.5,heading=5deg --smt2 formulas",
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.argument("dataset", type=click.Path())

@@ -52,7 +52,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
     exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
     topics=TOPICS,
     epilog="\b\nExamples:\n"
-    "  scenicq match crossing.scenic dataset --tolerance position=0.25,heading=5deg\n"
+    "  scenicq match crossing.scenic dataset --tolerance position=0.5,ego.heading=15deg\n"
     "  scenicq match crossing.scenic dataset --format ids | head\n"
     "  scenicq match crossing.scenic dataset -o matches.parquet --summary\n"
     "  seq 16 | xargs -P 4 -I{} scenicq match crossing.scenic dataset --shard {}/16 -o pieces --exit-zero"
@@ -60,8 +60,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.argument("dataset", type=click.Path())
 @click.option("--tolerance", metavar="LIST",
-              help="How far labels may be off: position=0.25,heading=5deg, or x=, y=, heading=. Lengths in metres, "
-              "angles in deg or rad.  [default: 1e-3 m, 1e-3 rad]")
+              help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
+              "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
+              "[default: position=0.25,heading=5deg]")
 @click.option("--classes", type=click.Choice(["fine", "coarse"]), default="fine",
               help="coarse folds all vehicles into Car and all people into Pedestrian.")
 @click.option("--ego", type=click.Choice(["label", "any"]), default="label",

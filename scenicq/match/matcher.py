@@ -12,7 +12,7 @@ that nothing decides leaves the label undecided unless another correspondence ma
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.solver_step import ask
@@ -73,8 +73,9 @@ class Matcher:
     _verdicts: VerdictBuilder = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Rewrite the scenario, and find out what matters of a label."""
+        """Rewrite the scenario, tie the tolerance to its objects, and find out what matters of a label."""
         self.scenario = ready(self.scenario)
+        self.options = replace(self.options, tolerance=self.options.tolerance.for_scenario(self.scenario))
         self._relevant = relevant_properties(self.scenario, self.options)
         self._verdicts = VerdictBuilder(self.scenario, self.options)
 
@@ -121,7 +122,14 @@ class Matcher:
         return next(self._findings(label, MapLookups(), None, {}, None))
 
     def relaxed(self, options: MatchOptions) -> Matcher:
-        """The same matcher with options that differ in tolerance and patience only; the analysis is shared."""
+        """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
+
+        Raises:
+            DataError: option-invalid: the tolerance names what the scenario does not have.
+        """
+        if not options.tolerance.for_scenario(self.scenario).same_scopes(self.options.tolerance):
+            # what may be swapped or decided once for many is what one scope compares
+            return Matcher(self.scenario, options, self.solver)
         return Matcher(self.scenario, options, self.solver, self._plans, self._kinds, self._fits)
 
     def plan(self, signature: Signature) -> MatchPlan:

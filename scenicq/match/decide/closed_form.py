@@ -46,15 +46,14 @@ from scenicq.match.decide.compiled_expressions import (
     truth,
     turned,
 )
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
 from scenicq.match.problem.map_lookups import XY, MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied
+from scenicq.match.tolerance import SLACK, Margin
 
 __all__ = ["ClosedForm", "Evaluated", "closed_form_of"]
 
-_MARGIN = 1e-7
-"""Metres or radians from a boundary within which nothing is decided here."""
 _MOST_CHOICES = 8
 
 
@@ -189,7 +188,7 @@ def _known_position(item: Comparison) -> ClosedForm | None:
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, "position"))
-        return _close(x - px, y - py, options.tolerance, {})
+        return _close(x - px, y - py, options.tolerance.of(index, "position"), {})
 
     def detail(get: Get, lookups: MapLookups) -> str:
         return unlike("position", cast(XY, exact(get)), cast(XY, get(index, "position")))
@@ -197,11 +196,15 @@ def _known_position(item: Comparison) -> ClosedForm | None:
     return ClosedForm(item, evaluate, detail=detail)
 
 
-def _close(dx: float, dy: float, tolerance: Tolerance, values: Mapping[Identity, Value]) -> Evaluated:
+def _close(dx: float, dy: float, margin: Margin, values: Mapping[Identity, Value]) -> Evaluated:
     """Whether a position that is off by a vector is within tolerance, whatever the direction; of columns, each."""
-    sure = tolerance.position if tolerance.x is None or tolerance.y is None else min(tolerance.x, tolerance.y)
     off = _length(dx, dy)
-    return Evaluated(off <= max(0.0, sure - _MARGIN), (off > tolerance.reach + _MARGIN) & (off < math.inf), values)
+    return Evaluated(off <= _sure(margin), (off > margin.reach + SLACK) & (off < math.inf), values)
+
+
+def _sure(margin: Margin) -> float:
+    """How far off a value is within tolerance whatever the direction and the rounding."""
+    return max(0.0, margin.sure - SLACK)
 
 
 def _length(x: float, y: float) -> float:
@@ -221,7 +224,7 @@ def _point(item: Comparison, node: PointIn, ego: int) -> ClosedForm | None:
         places = _each(get(index, "position"))
         holds = [lookups.within(region, place) for place in places]
         if options.radius is not None:
-            near, centres = options.radius - _MARGIN, _each(get(ego, "position"))
+            near, centres = options.radius - SLACK, _each(get(ego, "position"))
             distances = itertools.starmap(math.dist, zip(places, centres, strict=True))
             holds = [held and distance <= near for held, distance in zip(holds, distances, strict=True)]
         if isinstance(get, Columns):
@@ -274,7 +277,8 @@ def _offset(item: Comparison) -> ClosedForm | None:
                 px, py = px * c + py * s, py * c - px * s
         a, b = x.known(get), y.known(get)
         u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
-        return _close(u - px, v - py, options.tolerance, {**spread(x, u - a), **spread(y, v - b)})
+        margin = options.tolerance.of(index, "position")
+        return _close(u - px, v - py, margin, {**spread(x, u - a), **spread(y, v - b)})
 
     return ClosedForm(item, evaluate)
 
@@ -306,7 +310,7 @@ def _heading(item: Comparison) -> ClosedForm | None:
         return [lookups.allowed(flow, place) for place in _each(get(where, "position"))]
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
-        many, heading = isinstance(get, Columns), options.tolerance.heading
+        many, margin = isinstance(get, Columns), options.tolerance.of(index, "heading")
         if many and len(choices) > 1:
             raise UnclearError
         fails = True
@@ -316,11 +320,11 @@ def _heading(item: Comparison) -> ClosedForm | None:
             half = (form.high - form.low) / 2
             rest = cast(float, get(index, "heading")) - form.known(get) - middle
             rests: list[float] = cast(Column, rest).tolist() if isinstance(rest, np.ndarray) else [rest]
-            sure = max(0.0, heading - _MARGIN)
+            sure = _sure(margin)
             offs = [_turn(*each, half, sure) for each in zip(rests, allowed, strict=True)]
             off = cast(float, np.array(offs)) if many else offs[0]
             beyond = abs(off) - half
-            holds, misses = beyond <= sure, beyond > heading + _MARGIN
+            holds, misses = beyond <= sure, beyond > margin.reach + SLACK
             if many or holds:
                 values = spread(form, middle + clipped(off, -half, half))
                 return Evaluated(holds, misses, {**chosen, **values})

@@ -14,11 +14,10 @@ from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.case_split import Picked, picked
 from scenicq.match.fields.field_solver import decide_directions
 from scenicq.match.linear.affine_reach import ends
-from scenicq.match.linear.linear_program import LINEAR_SLACK
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["decide_decomposed"]
 
@@ -64,7 +63,7 @@ def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance) -
             values.update(outcome.values)
     if doubt is not None:
         return doubt
-    return Satisfied(values) if replay(items, values, tolerance, LINEAR_SLACK) else Undecided(items[0][0], "nonlinear")
+    return Satisfied(values) if replay(items, values, tolerance, SLACK) else Undecided(items[0][0], "nonlinear")
 
 
 def _any(cases: Sequence[Picked], items: list[Item], tolerance: Tolerance) -> Outcome:
@@ -75,7 +74,7 @@ def _any(cases: Sequence[Picked], items: list[Item], tolerance: Tolerance) -> Ou
         outcome = decide_decomposed(case.items, tolerance)
         if isinstance(outcome, Satisfied):
             values = {**case.given, **outcome.values}
-            if replay(items, values, tolerance, LINEAR_SLACK):
+            if replay(items, values, tolerance, SLACK):
                 return Satisfied(values)
         if not isinstance(outcome, Refuted):
             blamed = Undecided(first, "nonlinear")

@@ -10,7 +10,8 @@ from typing import Any, cast
 
 from scenicq.errors import DataError, Diagnostic, Source, Span
 from scenicq.forest.scenario import BuiltIn
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.partitions import fingerprint
 from scenicq.query.execution.results import Result
@@ -113,8 +114,9 @@ def _file(folder: Path, question: str) -> Path:
 def _options(fields: dict[str, Any]) -> QueryOptions:
     match: dict[str, Any] = fields.pop("match")
     tolerance, enforce, ignored = (match.pop(name) for name in ("tolerance", "enforce", "ignore_params"))
+    rules = tuple([(scope, name, size) for scope, name, size in tolerance["rules"]])
     options = MatchOptions(
-        tolerance=Tolerance(**tolerance),
+        tolerance=Tolerance(**tolerance | {"rules": rules, "scopes": ()}),
         enforce=frozenset(map(BuiltIn, enforce)),
         ignore_params=frozenset(ignored),
         **match,

@@ -20,7 +20,7 @@ from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
 from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
-from scenicq.query.explain.nearest_miss import Closest, closest, show_tolerance
+from scenicq.query.explain.nearest_miss import Closest, closest
 from scenicq.query.explain.violations import Violation, violations
 from scenicq.smt.encode import UnsupportedError
 from scenicq.smt.smtlib import to_smtlib
@@ -202,7 +202,7 @@ def show_explanation(explanation: Explanation) -> str:
     for violation in explanation.violations:
         lines += ["", _show_violation(violation)]
     if explanation.closest is not None:
-        lines += ["", f"it would match with --tolerance {show_tolerance(explanation.closest.tolerance)}"]
+        lines += ["", f"it would match with --tolerance {explanation.closest.tolerance}"]
     elif not isinstance(verdict, Match):
         lines += ["", "no tolerance would make it match"]
     return "\n".join(lines)

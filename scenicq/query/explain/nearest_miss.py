@@ -16,7 +16,7 @@ from itertools import islice
 
 from scenicq.errors import ScenarioError
 from scenicq.match.matcher import Finding, Matcher
-from scenicq.match.options import Tolerance
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
@@ -25,7 +25,7 @@ from scenicq.query.prefilter.executor import names, run_prefilter
 from scenicq.query.prefilter.plan import Plan, make_plan
 from scenicq.store.labels import Label
 
-__all__ = ["Closest", "closest", "nearest_misses", "show_tolerance", "widened"]
+__all__ = ["Closest", "closest", "nearest_misses", "widened"]
 
 MOST_M = 100.0
 """Metres beyond which a tolerance is not widened."""
@@ -57,26 +57,7 @@ class Closest:
 
 def widened(tolerance: Tolerance, widening_m: float) -> Tolerance:
     """A tolerance widened by so many metres, in the sense of this module."""
-    return replace(
-        tolerance,
-        x=None if tolerance.x is None else tolerance.x + widening_m,
-        y=None if tolerance.y is None else tolerance.y + widening_m,
-        position=tolerance.position + widening_m,
-        heading=min(math.pi, tolerance.heading + widening_m * _HEADING_PER_M),
-        other=tolerance.other + widening_m,
-    )
-
-
-def show_tolerance(tolerance: Tolerance) -> str:
-    """A tolerance as the option takes it, rounded up so that it is not too small."""
-
-    def up(value: float, digits: int) -> str:
-        return f"{math.ceil(value * 10**digits - 1e-9) / 10**digits:g}"
-
-    heading = f"heading={up(min(180.0, math.degrees(tolerance.heading)), 2)}deg"
-    if tolerance.x is not None and tolerance.y is not None:
-        return f"x={up(tolerance.x, 3)},y={up(tolerance.y, 3)},{heading}"
-    return f"position={up(tolerance.position, 3)},{heading}"
+    return tolerance.widened(widening_m, widening_m * _HEADING_PER_M)
 
 
 def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest | None:
@@ -178,7 +159,7 @@ def nearest_misses(
         found = closest(matcher, label, bound)
         if found is None or found.widening_m == 0 or not isinstance(found.finding.verdict, Match):
             continue
-        cause = Cause("tolerance", f"would match with {show_tolerance(found.tolerance)}")
+        cause = Cause("tolerance", f"would match with {found.tolerance}")
         verdict = NoMatch(cause, found.finding.verdict.correspondence)
         entry = (
             -found.widening_m,

@@ -17,12 +17,12 @@ from scenicq.forest.walk import features, leaves
 from scenicq.geometry.angles import normalize
 from scenicq.match.decide.cascade import decide
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.constraints import describe_constraint
 from scenicq.match.problem.evaluation import show_value
 from scenicq.match.problem.outcome import Refuted, Satisfied
 from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.tolerance import Tolerance
 
 __all__ = ["Violation", "choices", "violations"]
 
@@ -159,7 +159,7 @@ def _off(constraint: Comparison, node: Node, observed: Value) -> str:
     high = math.pi if heading else _FAR_M
 
     def reached(size: float) -> bool:
-        wide = Tolerance(None, None, size, size, size)
+        wide = Tolerance(position=size, heading=size, other=size)
         return isinstance(decide([(constraint, node, observed)], wide), Satisfied)
 
     if not reached(high):

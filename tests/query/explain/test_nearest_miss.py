@@ -10,7 +10,8 @@ from dataclasses import replace
 import pytest
 
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.query.explain.nearest_miss import closest, nearest_misses
