@@ -25,12 +25,13 @@ from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
 from .funnel import show_funnel
-from .main import NOTHING
+from .main import INTERRUPTS, NOTHING
 from .manual import Manual
 from .options import DEFAULTS, TOPICS, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
+from .remarks import remarks, show_remarks
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -111,6 +112,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
 @click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")
+@click.option("--strict", is_flag=True, help="What the program sets and no label has is an error, not a warning; so is "
+              "all that `scenicq check` warns of.")
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches.")
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
@@ -134,11 +137,18 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     if explain:
         show_plan(query)
         return
+    with ProgressBar(query.dataset.manifest.total.frames, quiet=quiet) as bar:
+        told = remarks(query)
+        with bar.aside():
+            show_remarks(query, *told)
     if shard is not None:
         _in_shard(ctx, query, shard, file, quiet=quiet)
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
     pieces = None
+    if file is not None:
+        again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
+        INTERRUPTS.advice = f"  = hint: {again}"
     if resume:
         if file is None:
             raise click.UsageError("--resume needs -o FILE, beside which it keeps what is done", ctx)

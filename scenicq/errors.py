@@ -70,6 +70,16 @@ CODES: dict[str, str] = {
     "solver-failed": "the solver cannot be started",
     # the answers
     "frame-excluded": "what a frame shows is not what the program allows",
+    "never-compared": "the program sets what no label of the dataset has",
+    # what compiles but cannot be meant
+    "angle-without-deg": "an angle of more than a full turn, which may be meant in degrees",
+    "range-reversed": "a range whose first end is above its second",
+    "requirement-always": "a requirement that holds in every scene",
+    "requirement-never": "a requirement that holds in no scene",
+    "box-cannot-fit": "a region that is too small for the object that must lie in it",
+    "class-folded": "a class that coarse classes do not tell from others",
+    "unknown-property": "a property that no class has and nothing reads",
+    "unused-variable": "a variable that nothing reads",
 }
 """Every diagnostic code with its meaning."""
 
@@ -85,6 +95,11 @@ class Source:
 
     name: str
     text: str
+
+    @property
+    def file_name(self) -> str:
+        """The name without folders."""
+        return self.name.replace("\\", "/").rpartition("/")[2]
 
     @cached_property
     def line_starts(self) -> tuple[int, ...]:
@@ -120,6 +135,12 @@ class Span:
         """`file:line:column` of the start."""
         line, column = self.source.position(self.start)
         return f"{self.source.name}:{line}:{column}"
+
+    @property
+    def mark(self) -> str:
+        """The same without the file's folder: what results call the place, wherever one stands."""
+        line, column = self.source.position(self.start)
+        return f"{self.source.file_name}:{line}:{column}"
 
     @property
     def text(self) -> str:

@@ -99,7 +99,7 @@ class VerdictBuilder:
         for leaf in variables:
             key = self._keys.get(leaf)
             if key is None:
-                key = self._keys[leaf] = leaf.span.place if leaf.span else type(leaf).__name__
+                key = self._keys[leaf] = leaf.span.mark if leaf.span else type(leaf).__name__
             counts[key] = counts.get(key, 0) + 1
             keys.append(key if counts[key] == 1 else f"{key}#{counts[key]}")
         return keys
