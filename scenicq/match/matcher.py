@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.solver_step import ask
+from scenicq.match.explanation import Finding
 from scenicq.match.options import Exhausted, MatchOptions
 from scenicq.match.problem.candidates import Candidates, candidates_of, egos, find_candidates
 from scenicq.match.problem.conditioned import Item
@@ -33,24 +34,7 @@ from scenicq.match.verdict import Cause, Match, Verdict
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 
-__all__ = ["Finding", "Matcher"]
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A verdict with what it rests on, for explanations.
-
-    Attributes:
-        verdict: The verdict.
-        search: The search that led to it; None if there were no candidates to search among.
-        plan: The scenario's groups for what was observed; None without a match.
-        assignment: The correspondence, numbers of label objects by index of the object; partial without a match.
-    """
-
-    verdict: Verdict
-    search: LabelSearch | None = None
-    plan: MatchPlan | None = None
-    assignment: Mapping[int, int] = field(default_factory=dict[int, int])
+__all__ = ["Matcher"]
 
 
 @dataclass(eq=False)
