@@ -15,28 +15,26 @@ from scenicq.query.execution.run import Query, read_program
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.frame_names import find_frame
 from scenicq.store.labels import Label
 
 from .main import NOTHING
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
-from .remarks import show_remarks
+from .remarks import remarks, show_remarks
 from .report import plain
 
 __all__ = ["explain", "find_label"]
 
 
 def find_label(dataset: Dataset, frame: str) -> Label:
-    """The label of a frame.
+    """The label of a frame, which may be named by as much of its name as no other frame has.
 
     Raises:
-        DataError: option-invalid: there is no such frame.
+        DataError: option-invalid: there is no such frame, or there are several.
     """
-    for label in dataset.labels([frame]):
-        return label
-    hint = "`scenicq match SCENARIO DATASET --all` lists the frames"
-    raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{frame}`", hints=(hint,)))
+    return next(dataset.labels([find_frame(dataset, frame)]))
 
 
 @click.command(
@@ -44,13 +42,13 @@ def find_label(dataset: Dataset, frame: str) -> Label:
     arguments={
         "SCENARIO": "A Scenic program, as a file.",
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has.",
     },
     exits={0: "the frame matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
     topics={"What counts as a match": SHARED},
     epilog="\b\nExamples:\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c\n"
-    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.25,heading=5deg --smt2 formulas",
+    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.5,heading=5deg --smt2 formulas",
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.argument("dataset", type=click.Path())
@@ -68,7 +66,7 @@ def explain(
     """
     query = Query(open_dataset(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
     label = find_label(query.dataset, frame)
-    show_remarks(query, [label.map])
+    show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)

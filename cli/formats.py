@@ -9,10 +9,14 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, BinaryIO, Protocol
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+
+from scenicq.store.dataset import Dataset
+from scenicq.store.frame_names import shortened
 
 from .table import Table, Text
 
@@ -107,19 +111,20 @@ class _Parquet:
         self._file.close()
 
 
-def make_writer(name: str, sink: BinaryIO) -> Writer:
+def make_writer(name: str, sink: BinaryIO, dataset: Dataset | None = None) -> Writer:
     """The writer of a format.
 
     Args:
         name: One of `FORMATS`.
         sink: Where to; it stays open.
+        dataset: Whose frames are told; a table cuts their names short where it would not fit.
     """
     if name == "parquet":
         return _Parquet(sink)
     text = Text(sink)
     match name:
         case "table":
-            return Table(text)
+            return Table(text, None if dataset is None else partial(shortened, dataset))
         case "csv":
             return _Csv(text)
         case "ids":

@@ -25,13 +25,13 @@ from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
 from .funnel import show_funnel
-from .main import NOTHING
+from .main import INTERRUPTS, NOTHING
 from .manual import Manual
 from .options import DEFAULTS, TOPICS, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
-from .remarks import show_remarks
+from .remarks import remarks, show_remarks
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -53,7 +53,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
     exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
     topics=TOPICS,
     epilog="\b\nExamples:\n"
-    "  scenicq match crossing.scenic dataset --tolerance position=0.25,heading=5deg\n"
+    "  scenicq match crossing.scenic dataset --tolerance position=0.5,ego.heading=15deg\n"
     "  scenicq match crossing.scenic dataset --format ids | head\n"
     "  scenicq match crossing.scenic dataset -o matches.parquet --summary\n"
     "  seq 16 | xargs -P 4 -I{} scenicq match crossing.scenic dataset --shard {}/16 -o pieces --exit-zero"
@@ -61,8 +61,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.argument("dataset", type=click.Path())
 @click.option("--tolerance", metavar="LIST",
-              help="How far labels may be off: position=0.25,heading=5deg, or x=, y=, heading=. Lengths in metres, "
-              "angles in deg or rad.  [default: 1e-3 m, 1e-3 rad]")
+              help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
+              "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
+              "[default: position=0.25,heading=5deg]")
 @click.option("--classes", type=click.Choice(["fine", "coarse"]), default="fine",
               help="coarse folds all vehicles into Car and all people into Pedestrian.")
 @click.option("--ego", type=click.Choice(["label", "any"]), default="label",
@@ -136,12 +137,18 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     if explain:
         show_plan(query)
         return
-    show_remarks(query)
+    with ProgressBar(query.dataset.manifest.total.frames, quiet=quiet) as bar:
+        told = remarks(query)
+        with bar.aside():
+            show_remarks(query, *told)
     if shard is not None:
         _in_shard(ctx, query, shard, file, quiet=quiet)
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
     pieces = None
+    if file is not None:
+        again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
+        INTERRUPTS.advice = f"  = hint: {again}"
     if resume:
         if file is None:
             raise click.UsageError("--resume needs -o FILE, beside which it keeps what is done", ctx)

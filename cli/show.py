@@ -27,7 +27,7 @@ from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
-from .remarks import show_remarks
+from .remarks import remarks, show_remarks
 from .sources import SENSORS, sensor_root
 
 __all__ = ["show"]
@@ -51,7 +51,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     if scenario is None:
         return Shot(label), Backdrop(dataset.network(label.map))
     query = Query(dataset, read_program(scenario), query_options({**given, **ONE_FRAME}))
-    show_remarks(query, [label.map])
+    show_remarks(query, *remarks(query, [label.map]))
     compiled, network = query.compile(label.map)
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(compiled, query.options.match, solver)
@@ -64,7 +64,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     cls=Manual,
     arguments={
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has.",
     },
     topics={"What counts as a match, with --scenario": SHARED},
     epilog="\b\nExamples:\n"

@@ -96,6 +96,11 @@ class Source:
     name: str
     text: str
 
+    @property
+    def file_name(self) -> str:
+        """The name without folders."""
+        return self.name.replace("\\", "/").rpartition("/")[2]
+
     @cached_property
     def line_starts(self) -> tuple[int, ...]:
         """Offsets at which the lines start."""
@@ -130,6 +135,12 @@ class Span:
         """`file:line:column` of the start."""
         line, column = self.source.position(self.start)
         return f"{self.source.name}:{line}:{column}"
+
+    @property
+    def mark(self) -> str:
+        """The same without the file's folder: what results call the place, wherever one stands."""
+        line, column = self.source.position(self.start)
+        return f"{self.source.file_name}:{line}:{column}"
 
     @property
     def text(self) -> str:

@@ -42,13 +42,13 @@ class GroupCache:
         options: The options.
         cast: The label and who may play whom.
         ask: The solver.
-        places: What is known of places of the map.
+        lookups: What is known of the map.
     """
 
     options: MatchOptions
     cast: Cast
     ask: Asker
-    places: MapLookups
+    lookups: MapLookups
     _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
         default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
     )
@@ -67,24 +67,22 @@ class GroupCache:
         return items if self.cast.disc is None else within_radius(items, *self.cast.disc)
 
     def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
-        """What is decided for the things in a group's roles, said of a group of the same shape (see `translated`)."""
+        """What is decided for the label objects in a group's roles, said of a group of its shape (see `translated`)."""
         key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
         known = self._known.get(key)
         if known is None:
-            outcome = self._in_closed_form(plan, assignment) or self._by_ladder(plan.group, assignment)
+            outcome = self._in_closed_form(plan, assignment) or self._by_cascade(plan.group, assignment)
             known = self._known[key] = (plan.group, outcome)
         return known
 
     def _in_closed_form(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
         """What a closed form says, if it is clear."""
-        if plan.quick is None or self.options.method != "auto":
+        if plan.closed_form is None or self.options.method != "auto":
             return None
         seen = self.cast.seen
-        return plan.quick.decide(
-            lambda index, name: seen[assignment[index]][name], self.cast.disc, self.options.tolerance, self.places
-        )
+        return plan.closed_form.decide(lambda index, name: seen[assignment[index]][name], self.options, self.lookups)
 
-    def _by_ladder(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
+    def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
         try:
             items = self.items(group, assignment)
             if self.options.method == "smt":

@@ -16,7 +16,6 @@ from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
-from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.verdict import Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
@@ -128,21 +127,20 @@ class Decider:
         size = _FIRST_BATCH
         while batch := list(islice(left, size)):
             labels = [(each.label, each.among) for each in batch]
-            places = matcher.look_up(labels)
             verdicts: Iterator[list[Verdict]]
             if self.all_matches:
-                verdicts = (_every_match(matcher, label, among, places) for label, among in labels)
+                verdicts = (_every_match(matcher, label, among) for label, among in labels)
             else:
-                verdicts = ([verdict] for verdict in matcher.match_all(labels, places))
+                verdicts = ([verdict] for verdict in matcher.match_all(labels))
             for (label, _), found in zip(labels, verdicts, strict=True):
                 yield [Result(label.frame, label.recording, label.timestamp_us, each, label.sensors) for each in found]
             size = _BATCH
 
 
-def _every_match(matcher: Matcher, label: Label, among: Candidates | None, places: MapLookups) -> list[Verdict]:
+def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> list[Verdict]:
     """Every correspondence by which a label matches, or else why none does."""
-    matches: list[Verdict] = [*matcher.matches(label, among=among, places=places)]
-    return matches or [matcher.match(label, among=among, places=places)]
+    matches: list[Verdict] = [*matcher.matches(label, among=among)]
+    return matches or [matcher.match(label, among=among)]
 
 
 def every_label(dataset: Dataset, block: Block) -> Iterator[Label]:

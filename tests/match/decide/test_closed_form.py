@@ -13,13 +13,14 @@ from scenes import STREET, compiled, drawn, label_of
 from scenicq.forest.walk import leaves
 from scenicq.match.decide.cascade import decide
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import find_candidates
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Refuted, Satisfied
 from scenicq.match.search import label_search
 from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, NoMatch
 
 OPTIONS = (
@@ -74,17 +75,16 @@ def test_a_clear_answer_is_that_of_the_ladder(name):
                 tried = LabelSearch(scenario, options, replace(cast, disc=disc), matcher.ask)
                 for signature, candidates in cast.signatures(matcher._relevant):
                     for group in matcher.plan(signature).groups:
-                        if group.quick is None:
+                        if group.closed_form is None:
                             continue
                         for _ in range(3):
                             ways = {index: rng.choice(candidates[index]) for index in group.roles}
                             assignment = {scenario.ego: 0, **ways}
                             if len(set(assignment.values())) < len(assignment):
                                 continue
-                            answer = group.quick.decide(
+                            answer = group.closed_form.decide(
                                 lambda index, key, a=assignment, seen=cast.seen: seen[a[index]][key],
-                                disc,
-                                options.tolerance,
+                                options,
                                 MapLookups(),
                             )
                             if answer is None:
@@ -130,8 +130,7 @@ def test_a_label_with_known_candidates_has_the_verdict_that_a_search_finds(name)
                 among = getattr(cast, "candidates", None)
                 if among is None:
                     continue
-                places = matcher.look_up([(label, among)])
-                short = matcher.match(label, among=among, places=places)
+                (short,) = matcher.match_all([(label, among)])
                 assert type(short) is type(full)
                 assert getattr(short, "correspondence", None) == getattr(full, "correspondence", None)
 

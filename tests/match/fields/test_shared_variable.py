@@ -14,14 +14,13 @@ from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.condition import condition
 from scenicq.forest.nodes import ArithmeticOp
 from scenicq.forest.walk import leaves
-from scenicq.match.decide import decomposition
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.fields import field_solver
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.linear.linear_relaxation import extent_affine
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied
+from scenicq.match.tolerance import Tolerance
 
 CROSSING = """
 ego = new Car on intersection
@@ -64,8 +63,6 @@ def asked(monkeypatch):
         return find_shared_value(parts, *rest)
 
     monkeypatch.setattr(field_solver, "find_shared_value", counted)
-    # where the parts together are not decided, going through all cells takes minutes
-    monkeypatch.setattr(decomposition, "_FEW", 0)
     return counts
 
 
