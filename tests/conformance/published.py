@@ -29,7 +29,8 @@ from run_conformance import SCENIC, read_map
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import Solver, open_solver
 from scenicq.store.labels import Label

@@ -22,13 +22,11 @@ from scenicq.geometry.membership import distance
 from scenicq.geometry.regions import Nowhere, PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.geometry.shapes import Bounds, Shape
 from scenicq.match.linear.linear_relaxation import position_boxes
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
+from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["with_areas"]
 
-_SLACK = 1e-6
-"""Metres by which areas are too large rather than too small."""
 _WIDEST = 500.0
 """Metres along a box beyond which no area is outlined."""
 _AROUND = 1 / math.cos(math.pi / (4 * shapes.QUARTER_SEGMENTS))
@@ -120,14 +118,14 @@ def _area_of(asked: _Asked, box: Box) -> Region | None:
         return None
     if x0 > x1 or y0 > y1:
         return Nowhere()
-    away, half = distance(region, (x0 + x1) / 2, (y0 + y1) / 2), math.hypot(x1 - x0, y1 - y0) / 2 + _SLACK
-    window = shapes.box(x0 - _SLACK, y0 - _SLACK, x1 + _SLACK, y1 + _SLACK)
+    away, half = distance(region, (x0 + x1) / 2, (y0 + y1) / 2), math.hypot(x1 - x0, y1 - y0) / 2 + SLACK
+    window = shapes.box(x0 - SLACK, y0 - SLACK, x1 + SLACK, y1 + SLACK)
     if away + half < limit or away - half > limit:
         # the point may occur nowhere else, and still needs a value
         return _set((window,)) if (away < limit) is most else Nowhere()
     if limit < 0 or max(x1 - x0, y1 - y0) > _WIDEST:
         return None
-    reach = limit * _AROUND + _SLACK if most else max(0.0, limit - _SLACK)
+    reach = limit * _AROUND + SLACK if most else max(0.0, limit - SLACK)
     near = _pieces(region, (x0 - reach, y0 - reach, x1 + reach, y1 + reach))
     if near is None:
         return None

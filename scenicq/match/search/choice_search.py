@@ -36,7 +36,7 @@ from scenicq.forest.nodes import (
     Value,
 )
 from scenicq.forest.walk import leaves, postorder
-from scenicq.match.options import Exhausted, Tolerance
+from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact
 from scenicq.match.problem.evaluation import ground_cause, holds
@@ -51,6 +51,7 @@ from scenicq.match.search.outcome_tables import (
     above_choices,
     tree_of,
 )
+from scenicq.match.tolerance import Tolerance
 
 __all__ = ["decide_with_choices"]
 

@@ -42,10 +42,8 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.search.interval_arrays import (
-    SLACK,
     add,
     arithmetic,
     largest,
@@ -54,6 +52,7 @@ from scenicq.match.search.interval_arrays import (
     rotated,
 )
 from scenicq.match.search.outcome_tables import ChoiceTree, above_choices
+from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["possible_outcomes"]
 
@@ -90,17 +89,18 @@ def possible_outcomes(
             near = value
         elif isinstance(seen, tuple) and constraint.property == "position":
             (x0, x1), (y0, y1) = value
-            reach = tolerance.reach + SLACK
+            reach = tolerance.of(constraint.object, "position").reach + SLACK
             x, y = seen
             near = (x0 - reach <= x) & (x <= x1 + reach) & (y0 - reach <= y) & (y <= y1 + reach)
         elif isinstance(seen, float) and kind == "scalar":
             low, high = value
-            if constraint.property == "heading":
-                allowed = tolerance.heading + SLACK
+            margin = tolerance.of(constraint.object, constraint.property)
+            allowed = margin.size + SLACK
+            if margin.kind == "arc":
                 width = high - low + 2 * allowed
                 near = ~np.isfinite(width) | (np.mod(seen - low + allowed, math.tau) <= width)
             else:
-                near = (low - tolerance.other - SLACK <= seen) & (seen <= high + tolerance.other + SLACK)
+                near = (low - allowed <= seen) & (seen <= high + allowed)
         return np.broadcast_to(np.asarray(near, dtype=bool), (count,))
 
 
