@@ -64,6 +64,7 @@ CODES: dict[str, str] = {
     "store-damaged": "a file of the dataset is missing or changed",
     "target-exists": "the target is there already",
     "target-unwritable": "the target cannot be written",
+    "deadline-passed": "the time that a run may take was over before all frames were decided",
     "engine-failed": "what runs a query on other processes or machines is not there, or stopped",
     # the solvers
     "solver-missing": "the solver cannot be loaded",
