@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scenicq.forest import build
 from scenicq.forest.bounds import Box
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import CompareOp, Constant, Identity, Index, Node, PointIn, Select, Undefined, Value
-from scenicq.forest.walk import leaves
+from scenicq.forest.nodes import CompareOp, Constant, DirectionAt, Identity, Index, Node, PointIn, Select, Undefined, Value
+from scenicq.forest.walk import deciding_first, leaves, postorder
 from scenicq.geometry import shapes
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.proximity import meets
@@ -28,10 +28,10 @@ from scenicq.match.linear.linear_relaxation import position_boxes
 from scenicq.match.problem.conditioned import Item, conditioned, fact
 from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["Picked", "picked"]
+__all__ = ["Picked", "field_options", "picked"]
 
 _MOST = 16
-"""Regions that are tried one by one."""
+"""Regions, or options of a choice, that are tried one by one."""
 """Metres by which boxes are grown, so that rounding loses nothing."""
 
 
@@ -68,6 +68,21 @@ def picked(items: Sequence[Item], tolerance: Tolerance) -> list[Picked] | None:
         if len(numbers) <= _MOST and (best is None or len(numbers) < len(best[1])):
             best = pick, numbers
     return None if best is None else [_with(items, best[0].index, number) for number in best[1]]
+
+
+def field_options(items: Sequence[Item]) -> list[Picked] | None:
+    """The constraints once for each option of a choice on which a vector field hangs, None if there is no such choice.
+
+    Args:
+        items: The constraints, conditioned.
+    """
+    nodes = postorder([node for _, node, _ in items])
+    fields = [node.field for node in nodes if isinstance(node, DirectionAt) and not isinstance(node.field, Constant)]
+    choice = next((leaf for leaf in deciding_first(fields) if isinstance(leaf, Index)), None)
+    if choice is None or len(choice.weights) > _MOST:
+        return None
+    given: list[dict[Identity, Value]] = [{choice.identity: float(option)} for option in range(len(choice.weights))]
+    return [Picked(conditioned(items, chosen), chosen) for chosen in given]
 
 
 def _is_plain(pick: Select) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Range, TruncatedNormal, Value
 from scenicq.forest.walk import leaves, postorder
 from scenicq.match.decide.cascade import decide
-from scenicq.match.decide.case_split import Picked, picked
+from scenicq.match.decide.case_split import Picked, field_options, picked
 from scenicq.match.fields.field_solver import decide_directions
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.problem.conditioned import Item
@@ -40,6 +40,8 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
     if len(alone) > 1:
         return _all(alone, items, tolerance)
     cases = picked(left, tolerance)
+    if cases is None:
+        cases = field_options(left)
     if cases is not None:
         return _any(cases, items, tolerance)
     if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in left])):
