@@ -18,7 +18,9 @@ README = (LIBRARY / "README.md").read_text()
 RECURSIVE: dict[str, str] = {}
 """Functions that call themselves, with what bounds their depth."""
 
-DATASETS = re.compile(r"nuscenes|argoverse|waymo|lyft|kitti|carla|lgsvl|opendrive|openlabel|boston|singapore", re.IGNORECASE)
+DATASETS = re.compile(
+    r"nuscenes|argoverse|waymo|lyft|kitti|carla|lgsvl|opendrive|openlabel|boston|singapore", re.IGNORECASE
+)
 
 
 @cache

@@ -18,7 +18,18 @@ from numpy.typing import NDArray
 from scenicq.forest import build
 from scenicq.forest.bounds import Box
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import CompareOp, Constant, DirectionAt, Identity, Index, Node, PointIn, Select, Undefined, Value
+from scenicq.forest.nodes import (
+    CompareOp,
+    Constant,
+    DirectionAt,
+    Identity,
+    Index,
+    Node,
+    PointIn,
+    Select,
+    Undefined,
+    Value,
+)
 from scenicq.forest.walk import deciding_first, leaves, postorder
 from scenicq.geometry import shapes
 from scenicq.geometry.membership import bounds as region_bounds
