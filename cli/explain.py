@@ -11,36 +11,27 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
-from scenicq.store.dataset import Dataset, open_dataset
-from scenicq.store.frame_names import find_frame
-from scenicq.store.labels import Label
+from scenicq.store.dataset import open_dataset
+from scenicq.store.frame_names import find_label
 
 from .main import NOTHING
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
+from .programs import SCENARIO, read_scenario
 from .remarks import remarks, show_remarks
 from .report import plain
 
-__all__ = ["explain", "find_label"]
-
-
-def find_label(dataset: Dataset, frame: str) -> Label:
-    """The label of a frame, which may be named by as much of its name as no other frame has.
-
-    Raises:
-        DataError: option-invalid: there is no such frame, or there are several.
-    """
-    return next(dataset.labels([find_frame(dataset, frame)]))
+__all__ = ["explain"]
 
 
 @click.command(
     cls=Manual,
     arguments={
-        "SCENARIO": "A Scenic program, as a file.",
+        "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
         "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has.",
     },
@@ -64,7 +55,7 @@ def explain(
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
-    query = Query(open_dataset(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
+    query = Query(open_dataset(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
     label = find_label(query.dataset, frame)
     show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:

@@ -9,9 +9,9 @@ from itertools import groupby
 from typing import Literal, cast
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.query.execution.result_files import Record
 from scenicq.report.frames import table
 from scenicq.report.page import page
-from scenicq.report.result_files import Record
 from scenicq.report.svg import element, escape
 
 __all__ = ["Change", "changes", "changes_page", "changes_text", "check_datasets"]

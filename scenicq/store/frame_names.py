@@ -13,8 +13,9 @@ import duckdb
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.dataset import Dataset
+from scenicq.store.labels import Label
 
-__all__ = ["find_frame", "shortened"]
+__all__ = ["find_frame", "find_label", "shortened"]
 
 _SHORTEST = 6
 _SHOWN = 5
@@ -47,6 +48,19 @@ def find_frame(dataset: Dataset, text: str) -> str:
     more = ", ..." if len(found) > _SHOWN else ""
     hint = f"these begin so: {', '.join(found[:_SHOWN])}{more}"
     raise DataError(Diagnostic("option-invalid", f"several frames begin with `{text}`", hints=(hint,)))
+
+
+def find_label(dataset: Dataset, text: str) -> Label:
+    """The label of a frame.
+
+    Args:
+        dataset: The dataset.
+        text: As of `find_frame`.
+
+    Raises:
+        DataError: option-invalid: there is no such frame, or there are several.
+    """
+    return next(dataset.labels([find_frame(dataset, text)]))
 
 
 def shortened(dataset: Dataset) -> Callable[[str], str]:
