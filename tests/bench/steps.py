@@ -67,8 +67,10 @@ ON_MAP = {
     "figure 6, curb": PROGRAMS["figure 6"].replace("network.laneRegion", "curb"),
     "lane of a spot": "ego = new Car\nspot = new OrientedPoint in visible network.laneRegion\n"
     "other = new Car on network.laneAt(spot)",
+    "right edge": "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car on lane.centerline\n"
+    "spot = new OrientedPoint on lane.rightEdge\nother = new Car left of spot by 0.5, facing roadDirection",
     "one lane of many": "ego = new Car on Uniform(*network.lanes)\nother = new Car ahead of ego by Range(4, 10)",
-} | {name: CHAINS[name] for name in ("row of 12, one shift", "platoon", "platoon, one shift")} | {
+} | {name: CHAINS[name] for name in ("row of 12, one shift", "platoon")} | {
     name: PROGRAMS[name] for name in ("facing field", "badly parked", "follow", "figure 3")
 }  # fmt: skip
 TOLERANCE = Tolerance(position=0.25, heading=0.0873)
@@ -92,9 +94,10 @@ STEPS: dict[str, Off] = {
     "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
     "decomposition": _set(label_search, "decide_decomposed", cascade.decide),
-    "case split": _set(decomposition, "picked", lambda *_: None),
+    "case split by regions": _set(decomposition, "picked", lambda *_: None),
+    "case split by fields": _set(decomposition, "field_options", lambda *_: None),
     "heading propagation": _set(decomposition, "decide_directions", _undecided),
-    "one shared number": _set(decomposition, "_shared", lambda *_: None),
+    "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
 }
 
 

@@ -3,8 +3,8 @@
 Most of what a prefilter leaves matches in the first way that is tried. Where all groups of a plan have closed forms,
 the labels that share it are a batch: role by role, in the order of the program, each label gives its next free
 candidate, and the closed forms are computed once for the whole batch. Labels whose candidate fails form a batch of
-their own with their next one. Whoever is not surely satisfied, or runs out of candidates, is left to `LabelSearch`,
-which finds the same correspondence where it is the first in the order of the program. One label is a batch of one.
+their own with their next one, or with the next of an earlier role. Whoever is not surely decided, or runs out of
+candidates, is left to `LabelSearch`. One label is a batch of one.
 """
 
 from __future__ import annotations
@@ -114,14 +114,13 @@ class FirstFit:
         while todo:
             batch = todo.pop()
             for group in self.due[batch.depth]:
-                found = batch.decide(group, options, lookups)
-                if not all(_listed(found.holds, len(batch.rows))):
-                    refuted = _listed(found.fails, len(batch.rows))
-                    if batch.depth and any(refuted):
-                        todo += batch.where(refuted).with_next_candidate()
-                    batch = batch.where(_listed(found.holds, len(batch.rows)))
-                if not batch.rows:
-                    break
+                found, size = batch.decide(group, options, lookups), len(batch.rows)
+                holds, fails = _listed(found.holds, size), _listed(found.fails, size)
+                if not all(holds):
+                    todo += batch.where(fails).with_next_candidate()
+                    batch = batch.where(holds)
+                    if not batch.rows:
+                        break
             if batch.rows and batch.depth + 1 == len(self.order):
                 yield batch.filled()
             elif batch.rows:
@@ -138,6 +137,7 @@ class _Batch:
         numbers: Of each, who plays the first objects of the order.
         values: By group, the values of its random variables, a column each.
         decisions: How many groups were decided for these labels.
+        columns: What is observed of the label objects in the roles.
     """
 
     fit: FirstFit
@@ -147,7 +147,7 @@ class _Batch:
         default_factory=dict["GroupPlan", "Mapping[Identity, Column | list[Value]]"]
     )
     decisions: int = 0
-    _columns: Columns | None = None
+    columns: Columns | None = None
 
     @property
     def depth(self) -> int:
@@ -167,9 +167,9 @@ class _Batch:
                 return Evaluated(False, outcome is not None, {})
             self.values[group] = {identity: [value] for identity, value in outcome.values.items()}
             return Evaluated(True, False, outcome.values)
-        if self._columns is None:
-            self._columns = Columns(size, self._column)
-        found = form.decide_many(self._get, self._columns, options, lookups)
+        if self.columns is None:
+            self.columns = Columns(size, self._column)
+        found = form.decide_many(self._get, self.columns, options, lookups)
         self.values[group] = {
             identity: column if isinstance(column, np.ndarray | list) else [cast(Value, column)] * size
             for identity, column in found.values.items()
@@ -178,40 +178,54 @@ class _Batch:
 
     def where(self, kept: Sequence[bool]) -> _Batch:
         """The labels of which something is true."""
+        if all(kept):
+            return self
         mask = np.array(kept, dtype=bool)
-        values: dict[GroupPlan, Mapping[Identity, Column | list[Value]]] = {
-            group: {
-                identity: column[mask] if isinstance(column, np.ndarray) else list(itertools.compress(column, kept))
-                for identity, column in found.items()
-            }
-            for group, found in self.values.items()
-        }
+        values: dict[GroupPlan, Mapping[Identity, Column | list[Value]]] = {}
+        if mask.any():
+            for group, found in self.values.items():
+                values[group] = {
+                    identity: column[mask] if isinstance(column, np.ndarray) else list(itertools.compress(column, kept))
+                    for identity, column in found.items()
+                }
         rows, numbers = itertools.compress(self.rows, kept), itertools.compress(self.numbers, kept)
         return _Batch(self.fit, [*rows], [*numbers], values, self.decisions)
 
     def with_next_role(self) -> list[_Batch]:
-        """The labels with the first free candidate for the next role, as far as they have one."""
+        """The labels with the first free candidate for the next role; without one, with the next for an earlier one."""
         index = self.fit.order[self.depth + 1]
         numbers = [
             next(((*taken, one) for one in row.candidates[index] if one not in taken), None)
             for row, taken in zip(self.rows, self.numbers, strict=True)
         ]
         kept = [each is not None for each in numbers]
-        batch = self if all(kept) else self.where(kept)
+        stuck = [] if all(kept) else self.where([not each for each in kept]).with_next_candidate()
+        batch = self.where(kept)
         # the columns of the roles before stay what they are
         batch.numbers = [each for each in numbers if each is not None]
-        return [batch] if batch.numbers else []
+        return [*stuck, batch] if batch.numbers else stuck
 
     def with_next_candidate(self) -> list[_Batch]:
-        """The labels with the next free candidate for the newest role, as far as they have one."""
-        index, numbers = self.fit.order[self.depth], list[tuple[int, ...] | None]()
-        for row, (*taken, tried) in zip(self.rows, self.numbers, strict=True):
-            options = row.candidates[index]
-            left = options[options.index(tried) + 1 :]
-            numbers.append(next(((*taken, one) for one in left if one not in taken), None))
-        batch = self.where([each is not None for each in numbers])
-        batch.numbers = [each for each in numbers if each is not None]
-        return [batch] if batch.numbers else []
+        """The labels with the next free candidate for the newest role that has one left, by how many are filled."""
+        numbers = [self._next(row, taken) for row, taken in zip(self.rows, self.numbers, strict=True)]
+        lengths = [0 if each is None else len(each) for each in numbers]
+        found: list[_Batch] = []
+        for length in sorted(set(lengths) - {0}):
+            kept = [each == length for each in lengths]
+            batch = self.where(kept)
+            batch.numbers, batch.columns = [each for each in numbers if each is not None and len(each) == length], None
+            found.append(batch)
+        return found
+
+    def _next(self, row: Row, numbers: Sequence[int]) -> tuple[int, ...] | None:
+        taken = list(numbers)
+        while len(taken) > 1:
+            tried = taken.pop()
+            options = row.candidates[self.fit.order[len(taken)]]
+            for one in options[options.index(tried) + 1 :]:
+                if one not in taken:
+                    return (*taken, one)
+        return None
 
     def filled(self) -> FilledBatch:
         """The labels with their witnesses."""

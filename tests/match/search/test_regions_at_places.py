@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import pytest
-from scenes import STREET, compiled
+from scenes import STREET, compiled, drawn, label_of
 from shapely import Point, union_all
 
 from scenicq.match.matcher import Matcher
@@ -65,3 +66,19 @@ def test_what_lies_at_a_free_place_where_elements_overlap_is_decided_without_a_s
     for element in rng.sample(list(elements), 3):
         assert isinstance(matcher.match(label((0.0, 0.0), inside(rng, element.polygon))), Match)
     assert isinstance(matcher.match(label((0.0, 0.0), (900.0, 900.0))), NoMatch)
+
+
+def test_a_field_that_hangs_on_a_choice_is_decided_option_by_option():
+    scenario = compiled(
+        "model scenic.domains.driving.model\nroad = Uniform(*network.roads)\nlane = Uniform(*road.lanes)\n"
+        "ego = new Car on lane.centerline\nspot = new OrientedPoint on lane.rightEdge\n"
+        "other = new Car left of spot by 0.5, facing roadDirection\n",
+        STREET,
+    )
+    matcher = Matcher(scenario)
+    for seed in range(2):
+        drawn_label = label_of(scenario, drawn(scenario, seed), random.Random(seed))
+        assert isinstance(matcher.match(drawn_label), Match)
+        (car,) = drawn_label.objects
+        turned = replace(car, heading=car.heading + 1.0)
+        assert isinstance(matcher.match(replace(drawn_label, objects=(turned,))), NoMatch)
