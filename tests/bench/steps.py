@@ -39,7 +39,7 @@ from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
 from scenicq.match.problem.outcome import Undecided  # noqa: E402
-from scenicq.match.search import group_plan, label_search  # noqa: E402
+from scenicq.match.search import group_cache, group_plan, label_search  # noqa: E402
 from scenicq.match.search.first_fit import FirstFit  # noqa: E402
 from scenicq.match.tolerance import Tolerance  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
@@ -94,8 +94,8 @@ STEPS: dict[str, Off] = {
     "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
     "decomposition": _set(label_search, "decide_decomposed", cascade.decide),
-    "case split by regions": _set(decomposition, "picked", lambda *_: None),
-    "case split by fields": _set(decomposition, "field_options", lambda *_: None),
+    "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
+    "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
     "heading propagation": _set(decomposition, "decide_directions", _undecided),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
 }

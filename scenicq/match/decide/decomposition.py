@@ -44,7 +44,9 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
         found = decide_decomposed(outlined, tolerance)
         if not isinstance(found, Satisfied) or replay(items, found.values, tolerance, SLACK):
             return found
-        return Undecided(items[0][0], "nonlinear")
+        found = decide_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance)
+        sure = isinstance(found, Satisfied) and replay(items, found.values, tolerance, SLACK)
+        return found if sure else Undecided(items[0][0], "nonlinear")
     if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in left])):
         shared = _shared(left, used)
         parts, number = ([left], None) if shared is None else (shared[2], shared[0].identity)

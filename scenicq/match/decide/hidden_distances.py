@@ -33,14 +33,13 @@ _AROUND = 1 / math.cos(math.pi / (4 * shapes.QUARTER_SEGMENTS))
 """A polygon around a circle is that much larger than the one inside of it with as many corners."""
 
 
-def with_areas(items: Sequence[Item], tolerance: Tolerance) -> list[Item] | None:
+def with_areas(items: Sequence[Item], tolerance: Tolerance, *, outer: bool = True) -> list[Item] | None:
     """Constraints with areas in place of distances of hidden points; None if there are no such distances.
-
-    What satisfies the given constraints satisfies these; the reverse holds but for what the polygons are too large.
 
     Args:
         items: The constraints, conditioned.
         tolerance: Per feature.
+        outer: Whether areas leave out no point that satisfies the constraints; else they have no other points.
     """
     parts = [part for item in items for part in _conjuncts(item)]
     compared = [_distance_of(node) for constraint, node, _ in parts if not isinstance(constraint, Comparison)]
@@ -51,7 +50,7 @@ def with_areas(items: Sequence[Item], tolerance: Tolerance) -> list[Item] | None
     changed = False
     for constraint, node, seen in parts:
         asked = None if isinstance(constraint, Comparison) else _distance_of(node)
-        area = None if asked is None else _area_of(asked, vector_bounds(asked.point, boxes))
+        area = None if asked is None else _area_of(asked, vector_bounds(asked.point, boxes), outer=outer)
         if asked is None or area is None:
             found.append((constraint, node, seen))
             continue
@@ -110,7 +109,7 @@ def _distance_of(node: Node) -> _Asked | None:
     return _Asked(value, point, op in (CompareOp.LT, CompareOp.LE), limit)
 
 
-def _area_of(asked: _Asked, box: Box) -> Region | None:
+def _area_of(asked: _Asked, box: Box, *, outer: bool) -> Region | None:
     """Where in a box a distance is at most, or at least, a limit; None if that is not known."""
     region, most, limit = asked.region, asked.most, asked.limit
     (x0, x1), (y0, y1) = box
@@ -125,7 +124,8 @@ def _area_of(asked: _Asked, box: Box) -> Region | None:
         return _set((window,)) if (away < limit) is most else Nowhere()
     if limit < 0 or max(x1 - x0, y1 - y0) > _WIDEST:
         return None
-    reach = limit * _AROUND + SLACK if most else max(0.0, limit - SLACK)
+    # polygons around circles for the largest area within a distance, and for the smallest beyond it
+    reach = limit * _AROUND + SLACK if most is outer else max(0.0, limit - SLACK)
     near = _pieces(region, (x0 - reach, y0 - reach, x1 + reach, y1 + reach))
     if near is None:
         return None

@@ -159,22 +159,23 @@ def tree_of(root: Select) -> ChoiceTree:
 
 def _options(node: Select, path: dict[Variable, int]) -> Iterator[tuple[Node, dict[Variable, int]]]:
     """What a choice may lead to, with what is then known of all choices."""
-    index = node.index
-    if isinstance(index, Constant):
-        if not isinstance(index.value, Undefined):
-            yield node.options[int(cast(float, index.value))], path
-        return
-    if isinstance(index, Select):
-        # which of several elements that overlap is meant is a choice of its own
-        for below, known in _options(index, path):
-            yield Select(below, node.options, span=node.span), known
-        return
-    variable: Variable = index.identity if isinstance(index, Index) else index
-    if variable in path:
-        yield node.options[path[variable]], path
-        return
-    for number, option in enumerate(node.options):
-        yield option, {**path, variable: number}
+    todo: list[tuple[Node, dict[Variable, int]]] = [(node.index, path)]
+    while todo:
+        index, known = todo.pop()
+        if isinstance(index, Constant):
+            if not isinstance(index.value, Undefined):
+                yield node.options[int(cast(float, index.value))], known
+            continue
+        # of an index that is chosen itself, such as which of several elements that overlap is meant, that comes first
+        asked = index.index if isinstance(index, Select) else index
+        variable: Variable = asked.identity if isinstance(asked, Index) else asked
+        options = index.options if isinstance(index, Select) else node.options
+        numbers = [known[variable]] if variable in known else range(len(options))
+        found = [(options[number], {**known, variable: number}) for number in numbers]
+        if isinstance(index, Select):
+            todo += reversed(found)
+        else:
+            yield from found
 
 
 def above_choices(root: Node) -> Iterator[tuple[Node, tuple[Node, ...]]]:
