@@ -6,7 +6,7 @@ choices for which it was found.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -52,7 +52,7 @@ class Exclusions:
         self._assumed: list[tuple[Node, int, int]] = []
 
     @contextmanager
-    def assuming(self, index: Node, option: int, count: int) -> Iterator[None]:
+    def assuming(self, index: Node, option: int, count: int) -> Generator[None]:
         """What is excluded meanwhile is so only where a choice comes out as an option of `count`."""
         self._assumed.append((index, option, count))
         try:

@@ -1,8 +1,8 @@
 """How many steps it takes to follow a field over a distance, as a choice of its own where the distance is random.
 
-The number of steps is a function of the distance, a whole number that picks one of several ways. For matching it becomes
-a choice between them, each of which requires the distance to be in its range: the same outcomes, and nothing is left
-that is not affine in the distance. Scenes are drawn by the function.
+The number of steps is a function of the distance, a whole number that picks one of several ways. For matching it
+becomes a choice between them, each of which requires the distance to be in its range: the same outcomes, and nothing is
+left that is not affine in the distance. Scenes are drawn by the function.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from scenicq.forest.nodes import (
     ArithmeticOp,
     CompareOp,
     Constant,
+    DiscreteRange,
     Index,
     LogicOp,
     Node,
@@ -24,7 +25,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.simplify import rebuilt
-from scenicq.forest.walk import transform
+from scenicq.forest.walk import leaves, transform
 
 __all__ = ["FEWEST", "LONGEST", "StepCount", "choose_steps"]
 
@@ -100,6 +101,11 @@ def _read(index: Node) -> StepCount | None:
             return None
 
 
+def _is_finite(length: Node) -> bool:
+    """Whether a distance hangs on finite choices alone: with these made, it is known, and so is its number of steps."""
+    return all(isinstance(leaf, Index | DiscreteRange) for leaf in leaves(length))
+
+
 def choose_steps(scenario: Scenario) -> Scenario:
     """The scenario with choices in place of numbers of steps, and with what each of them requires of its distance."""
     picks: dict[int, tuple[Node, Index]] = {}
@@ -111,7 +117,7 @@ def choose_steps(scenario: Scenario) -> Scenario:
         index = node.index
         if id(index) not in picks:
             count = _read(index)
-            if count is None or index.span is None:
+            if count is None or index.span is None or _is_finite(count.length):
                 return node
             pick = Index((1.0,) * len(node.options), span=index.span)
             picks[id(index)] = index, pick
