@@ -10,47 +10,32 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenicq.forest import build
-from scenicq.forest.groups import Comparison, Constraint
+from scenicq.forest.groups import Constraint
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     CompareOp,
     Constant,
     DirectionAt,
-    DiscreteRange,
     Identity,
-    Index,
-    Logic,
     LogicOp,
     Node,
-    Normal,
-    PointIn,
-    Range,
-    Select,
-    TruncatedNormal,
     Value,
 )
-from scenicq.forest.walk import leaves, postorder
+from scenicq.forest.walk import postorder
 from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact
 from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Answer, find_assignments
+from scenicq.match.search.choice_problem import ChoiceProblem, Lookup, Part, conjuncts
 from scenicq.match.search.outcome_bounds import possible_outcomes
-from scenicq.match.search.outcome_tables import (
-    ChoiceTree,
-    Outcomes,
-    TooManyOutcomesError,
-    Variable,
-    above_choices,
-    tree_of,
-)
+from scenicq.match.search.outcome_tables import TooManyOutcomesError
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["decide_with_choices"]
@@ -77,9 +62,9 @@ def decide_with_choices(
         decide: Decides what is left when all choices have come out.
         ask: The same by a solver, where nothing else decides it.
     """
-    parts = [part for item in items for part in _conjuncts(item)]
+    parts = [part for item in items for part in conjuncts(item)]
     try:
-        found = [_Part(item) for item in parts]
+        found = [Part(item) for item in parts]
     except TooManyOutcomesError:
         return Undecided(items[0][0], "budget")
     if not any(part.trees for part in found):
@@ -93,93 +78,11 @@ def decide_with_choices(
     return _ChoiceSearch(list(items), found, tolerance, decide, ask).solve()
 
 
-def _conjuncts(item: Item) -> list[Item]:
-    """A constraint as several that all hold; of alternatives, which one holds is a choice."""
-    constraint, root, seen = item
-    if isinstance(constraint, Comparison):
-        return [item]
-    found: list[Item] = []
-    todo: list[tuple[Node, bool]] = [(root, True)]
-    while todo:
-        node, wanted = todo.pop()
-        if not isinstance(node, Logic):
-            holding = node if wanted else build.logic(LogicOp.NOT, node, span=node.span)
-            found.append((constraint, holding, seen))
-        elif node.op is LogicOp.NOT:
-            todo.append((node.args[0], not wanted))
-        elif (node.op is LogicOp.AND) is wanted:
-            todo += [(arg, wanted) for arg in reversed(node.args)]
-        else:
-            args = tuple(arg if wanted else build.logic(LogicOp.NOT, arg, span=arg.span) for arg in node.args)
-            index = Index((1.0,) * len(args), span=node.span)
-            found.append((constraint, Select(index, args, span=node.span), seen))
-    return found
-
-
-class _Part:
-    """A constraint with the choices in it.
-
-    Attributes:
-        item: The constraint.
-        trees: Its outermost choices, by the ids of their nodes.
-        inner: Choices in what its outermost choices lead to.
-        others: The random variables, other than choices, that it depends on.
-        slots: On which it hangs.
-    """
-
-    def __init__(self, item: Item) -> None:
-        self.item = item
-        self.trees: dict[int, ChoiceTree] = {}
-        self.inner: set[Variable] = set()
-        self.others: set[Variable] = set()
-        self.slots: frozenset[int] = frozenset()
-        for node, _ in above_choices(item[1]):
-            if isinstance(node, Select):
-                tree = self.trees[id(node)] = tree_of(node)
-                self.inner |= tree.inner
-                self.others |= tree.others
-            elif isinstance(node, Range | Normal | TruncatedNormal | DiscreteRange | PointIn):
-                self.others.add(node.identity)
-
-
-@dataclass(slots=True)
-class _Domain:
-    """A slot: what its choices may come out as.
-
-    Attributes:
-        outcomes: All that there are.
-        rows: Those that are left.
-        first: The number of the first outcome among the candidates of all slots.
-    """
-
-    outcomes: Outcomes
-    rows: NDArray[np.intp]
-    first: int
-
-
-@dataclass(slots=True)
-class _Lookup:
-    """A choice that an expression makes: what its point has to satisfy."""
-
-    variable: Node
-    slots: frozenset[int]
-
-
-@dataclass(slots=True)
-class _Component:
-    """Constraints that share random variables, and the slots on which they hang."""
-
-    parts: list[_Part] = field(default_factory=list[_Part])
-    lookups: list[_Lookup] = field(default_factory=list[_Lookup])
-    slots: set[int] = field(default_factory=set[int])
-    others: set[Variable] = field(default_factory=set["Variable"])
-
-
 class _ChoiceSearch:
     """The search for one group and one label."""
 
     def __init__(
-        self, items: list[Item], parts: list[_Part], tolerance: Tolerance, decide: Decide, ask: Ask | None
+        self, items: list[Item], parts: list[Part], tolerance: Tolerance, decide: Decide, ask: Ask | None
     ) -> None:
         self.items = items
         self.constraints = [constraint for constraint, _, _ in items]
@@ -191,47 +94,11 @@ class _ChoiceSearch:
         self.blamed: tuple[int, Refuted] | None = None
         self.doubt: Undecided | None = None
         self.known: dict[tuple[int, tuple[tuple[int, int], ...]], Outcome] = {}
-        self.domains: list[_Domain] = []
-        self.slot_of: dict[int, int] = {}
-        numbers = self.slot_of
-        for part in parts:
-            own: set[int] = set()
-            for tree in part.trees.values():
-                key = id(tree.outcomes)
-                if key not in numbers:
-                    numbers[key] = len(self.domains)
-                    count = len(tree.outcomes.picks)
-                    first = self.domains[-1].first + len(self.domains[-1].outcomes.picks) if self.domains else 0
-                    self.domains.append(_Domain(tree.outcomes, np.arange(count), first))
-                own.add(numbers[key])
-            part.slots = frozenset(own)
-        self.columns: dict[Variable, list[tuple[int, int]]] = {}
-        for slot, domain in enumerate(self.domains):
-            for column, variable in enumerate(domain.outcomes.variables):
-                self.columns.setdefault(variable, []).append((slot, column))
-        for part in parts:
-            # a choice deeper in an expression comes out as it does elsewhere
-            part.slots |= {slot for variable in part.inner for slot, _ in self.columns.get(variable, ())}
-            part.others |= part.inner - self.columns.keys()
-        self.components = self._components()
-
-    def _components(self) -> list[_Component]:
-        found: list[_Component] = []
-        pieces: list[_Component] = [_Component([part], [], set(part.slots), set(part.others)) for part in self.parts]
-        for variable, places in self.columns.items():
-            if not isinstance(variable, Identity):
-                slots = frozenset(slot for slot, _ in places)
-                below: set[Variable] = {leaf.identity for leaf in leaves(variable) if not isinstance(leaf, Index)}
-                pieces.append(_Component([], [_Lookup(variable, slots)], set(slots), below))
-        for piece in pieces:
-            for other in [each for each in found if each.others & piece.others]:
-                found.remove(other)
-                piece.parts[:0] = other.parts
-                piece.lookups[:0] = other.lookups
-                piece.slots |= other.slots
-                piece.others |= other.others
-            found.append(piece)
-        return found
+        problem = ChoiceProblem(parts)
+        self.domains = problem.domains
+        self.slot_of = problem.slot_of
+        self.columns = problem.columns
+        self.components = problem.components
 
     def solve(self) -> Outcome:
         """Decide the group."""
@@ -366,8 +233,8 @@ class _ChoiceSearch:
     def _of(
         self,
         number: int,
-        parts: Sequence[_Part],
-        lookups: Sequence[_Lookup],
+        parts: Sequence[Part],
+        lookups: Sequence[Lookup],
         slots: frozenset[int] | set[int],
         assignment: Mapping[int, int],
         *,
@@ -394,8 +261,8 @@ class _ChoiceSearch:
 
     def _decided(
         self,
-        parts: Sequence[_Part],
-        lookups: Sequence[_Lookup],
+        parts: Sequence[Part],
+        lookups: Sequence[Lookup],
         slots: frozenset[int] | set[int],
         assignment: Mapping[int, int],
         decide: Decide,
