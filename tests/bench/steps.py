@@ -16,6 +16,7 @@ import argparse
 import json
 import platform
 import random
+import signal
 import sys
 import time
 from collections import Counter
@@ -73,6 +74,8 @@ ON_MAP = {
 } | {name: CHAINS[name] for name in ("row of 12, one shift", "platoon")} | {
     name: PROGRAMS[name] for name in ("facing field", "badly parked", "follow", "figure 3")
 }  # fmt: skip
+LIMIT_S = 3.0
+"""Processor time after which a label is given up: "late"."""
 TOLERANCE = Tolerance(position=0.25, heading=0.0873)
 
 Off = Callable[[ExitStack], object]
@@ -123,11 +126,29 @@ def decided(
             off(stack)
         for name, (scenario, labels) in scenarios.items():
             matcher = Matcher(scenario, MatchOptions(tolerance=TOLERANCE))
-            matcher.match(labels[0])
+            _verdict(matcher, labels[0])
             started = time.process_time()
-            verdicts = [type(matcher.match(label)).__name__ for label in labels]
+            verdicts = [_verdict(matcher, label) for label in labels]
             found[name] = time.process_time() - started, verdicts
     return found
+
+
+class LateError(Exception):
+    """A label took all the time that it may."""
+
+
+def _verdict(matcher: Matcher, label: Label) -> str:
+    def late(*_: object) -> None:
+        raise LateError
+
+    signal.signal(signal.SIGVTALRM, late)
+    signal.setitimer(signal.ITIMER_VIRTUAL, LIMIT_S)
+    try:
+        return type(matcher.match(label)).__name__
+    except LateError:
+        return "late"
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
 
 
 def main() -> None:
