@@ -60,6 +60,8 @@ CHAINS = {
     "platoon, one shift": "shift = Range(-0.5, 0.5)\nego = new Car on road\nlast = ego\nfor i in range(3):\n"
     "    center = new OrientedPoint following roadDirection from (front of last) for Range(2, 8)\n"
     "    last = new Car right of center by shift",
+    "right edge": "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car on lane.centerline\n"
+    "spot = new OrientedPoint on lane.rightEdge\nother = new Car left of spot by 0.5, facing roadDirection",
     "crowd of 24": "ego = new Car on road\nfor i in range(24):\n"
     "    new Pedestrian offset by (Range(-5, 5), Range(2, 60)), facing Range(-120, 120) deg relative to ego.heading",
 }
@@ -68,8 +70,6 @@ ON_MAP = {
     "figure 6, curb": PROGRAMS["figure 6"].replace("network.laneRegion", "curb"),
     "lane of a spot": "ego = new Car\nspot = new OrientedPoint in visible network.laneRegion\n"
     "other = new Car on network.laneAt(spot)",
-    "right edge": "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car on lane.centerline\n"
-    "spot = new OrientedPoint on lane.rightEdge\nother = new Car left of spot by 0.5, facing roadDirection",
     "one lane of many": "ego = new Car on Uniform(*network.lanes)\nother = new Car ahead of ego by Range(4, 10)",
 } | {name: CHAINS[name] for name in ("row of 12, one shift", "platoon")} | {
     name: PROGRAMS[name] for name in ("facing field", "badly parked", "follow", "figure 3")

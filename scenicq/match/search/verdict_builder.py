@@ -55,7 +55,7 @@ class VerdictBuilder:
 
     def without_match(self, label: Label, search: LabelSearch, *, exhausted: bool) -> tuple[int, Verdict]:
         """The verdict of a search without a match, and its weight: an unknown outweighs every no."""
-        ego, failure = {self.scenario.ego: search.cast.ego}, search.failure
+        ego, failure = {self.scenario.ego: search.problem.ego}, search.failure
         if search.undecided is not None:
             found = search.undecided
             reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
@@ -65,7 +65,7 @@ class VerdictBuilder:
             return _EXHAUSTED, Unknown("budget", cause)
         if failure is None:
             return 0, self.excluded(
-                label, search.cast.ego, Cause("correspondence", "no distinct label objects for all objects")
+                label, search.problem.ego, Cause("correspondence", "no distinct label objects for all objects")
             )
         return failure.depth, NoMatch(self._cause(failure), self.names(label, ego | dict(failure.assignment)))
 
