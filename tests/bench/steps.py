@@ -159,7 +159,7 @@ def main() -> None:
     parser.add_argument("--program", action="append", help="default: all")
     given = parser.parse_args()
     texts = [(f"{name}", text, STREET) for name, text in (PROGRAMS | CHAINS).items()]
-    if MAP.exists():
+    if MAP.exists() and given.program is None:
         network = Network(MAP.stem, read_geojson(MAP, lambda identifier, message: None))
         texts += [(f"{name} (Boston)", text, network) for name, text in ON_MAP.items()]
     scenarios: dict[str, tuple[Scenario, list[Label]]] = {}
