@@ -40,7 +40,7 @@ from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
 from scenicq.match.problem.outcome import Undecided  # noqa: E402
-from scenicq.match.search import group_plan, label_search  # noqa: E402
+from scenicq.match.search import group_cache, group_plan, label_search  # noqa: E402
 from scenicq.match.search.first_fit import FirstFit  # noqa: E402
 from scenicq.match.tolerance import Tolerance  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
@@ -96,7 +96,7 @@ STEPS: dict[str, Off] = {
     "arc consistency": _set(label_search, "thinned", lambda plan, candidates, *_: (candidates, None)),
     "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
-    "decomposition": _set(label_search, "decide_decomposed", cascade.decide),
+    "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
     "case split by regions": _set(decomposition, "picked", lambda *_: None),
     "case split by fields": _set(decomposition, "field_options", lambda *_: None),
     "heading propagation": _set(decomposition, "decide_directions", _undecided),
