@@ -64,17 +64,17 @@ class MatchPlan:
 
 def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[frozenset[str], ...]:
     """For each object, the properties for which it matters whether a label observes them."""
-    used: dict[int, set[str]] = {thing.index: {"position", "heading"} for thing in scenario.objects}
-    roots = [given.value for thing in scenario.objects for given in thing.properties.values()]
+    used: dict[int, set[str]] = {owner.index: {"position", "heading"} for owner in scenario.objects}
+    roots = [given.value for owner in scenario.objects for given in owner.properties.values()]
     roots += [requirement.condition for requirement in scenario.requirements]
     roots += [given.value for given in scenario.params.values()]
     for index, name in features(*roots):
         used[index].add(name)
-    for thing in scenario.objects:
-        used[thing.index].update(name for name, given in thing.properties.items() if given.explicit)
+    for owner in scenario.objects:
+        used[owner.index].update(name for name, given in owner.properties.items() if given.explicit)
         if BuiltIn.COLLISION in options.enforce:
-            used[thing.index].update(("width", "length"))
-    return tuple(frozenset(used[thing.index]) for thing in scenario.objects)
+            used[owner.index].update(("width", "length"))
+    return tuple(frozenset(used[owner.index]) for owner in scenario.objects)
 
 
 def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, kinds: dict[Hashable, int]) -> MatchPlan:

@@ -65,7 +65,7 @@ class VerdictBuilder:
             search: Its search.
             ended: What ended the search before all candidates were tried.
         """
-        ego, failure = {self.scenario.ego: search.cast.ego}, search.failure
+        ego, failure = {self.scenario.ego: search.problem.ego}, search.failure
         if search.undecided is not None:
             found = search.undecided
             reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
@@ -75,7 +75,7 @@ class VerdictBuilder:
             return _EXHAUSTED, Unknown(ended, Cause("correspondence search", f"more than {limit}"))
         if failure is None:
             return 0, self.excluded(
-                label, search.cast.ego, Cause("correspondence", "no distinct label objects for all objects")
+                label, search.problem.ego, Cause("correspondence", "no distinct label objects for all objects")
             )
         return failure.depth, NoMatch(self._cause(failure), self.names(label, ego | dict(failure.assignment)))
 
