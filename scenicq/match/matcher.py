@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from scenicq.budget import TimeIsUp, limited
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.solver_step import ask
 from scenicq.match.explanation import Finding
@@ -92,18 +93,25 @@ class Matcher:
     def matches(self, label: Label, *, among: Candidates | None = None) -> Iterator[Match]:
         """Every correspondence by which a label matches; of interchangeable objects, one order only.
 
-        Stops early where the budget of the options is used up.
+        Stops early where the budget of the options is used up, or one takes too long to be found.
 
         Args:
             label: The label.
             among: As of `match`.
         """
-        found = (finding.verdict for finding in self._findings(label, MapLookups(), None, {}, among))
-        return (verdict for verdict in found if isinstance(verdict, Match))
+        findings = self._findings(label, MapLookups(), None, {}, among)
+        while True:
+            with limited(self.options.timeout_s):
+                finding = next(findings, None)
+            if finding is None:
+                return
+            if isinstance(finding.verdict, Match):
+                yield finding.verdict
 
     def examine(self, label: Label) -> Finding:
         """Decide one label and keep what the verdict rests on."""
-        return next(self._findings(label, MapLookups(), None, {}, None))
+        with limited(self.options.timeout_s):
+            return next(self._findings(label, MapLookups(), None, {}, None))
 
     def relaxed(self, options: MatchOptions) -> Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
@@ -139,8 +147,11 @@ class Matcher:
             for batch in fit.fill(rows, self.options, lookups):
                 found.update(self._verdicts.matches(fit, batch))
         for place, (label, among) in enumerate(labels):
-            match = found.get(place)
-            yield match or next(self._findings(label, lookups, reporter, given, among)).verdict
+            verdict: Verdict | None = found.get(place)
+            if verdict is None:
+                with limited(self.options.timeout_s):
+                    verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
+            yield verdict
 
     def _batches(
         self, labels: Iterable[tuple[Label, Candidates | None]], given: Mapping[str, str]
@@ -182,16 +193,16 @@ class Matcher:
                 rest.append((0, Finding(self._verdicts.excluded(label, ego, roles))))
                 continue
             search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups)
-            exhausted = False
+            exhausted: Exhausted | TimeIsUp | None = None
             try:
                 for signature, candidates in roles.signatures(self._relevant):
                     plan = self.plan(signature)
                     for solution in search.solutions(plan, candidates):
                         matched = True
                         yield Finding(self._verdicts.match(label, solution), search, plan, solution.assignment)
-            except Exhausted:
-                exhausted = True
-            weight, verdict = self._verdicts.without_match(label, search, exhausted=exhausted)
+            except (Exhausted, TimeIsUp) as error:
+                exhausted = error
+            weight, verdict = self._verdicts.without_match(label, search, exhausted)
             rest.append((weight, Finding(verdict, search)))
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from scenicq.budget import TimeIsUp
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Leaf, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.match.options import MatchOptions
+from scenicq.match.options import Exhausted, MatchOptions
 from scenicq.match.problem.constraints import describe_constraint
 from scenicq.match.problem.outcome import Refuted
 from scenicq.match.search.first_fit import FilledBatch, FirstFit
@@ -53,14 +54,19 @@ class VerdictBuilder:
             names = self.names(row.label, dict(zip(fit.order, numbers, strict=True)))
             yield row.place, Match(names, _witness(keys, values))
 
-    def without_match(self, label: Label, search: LabelSearch, *, exhausted: bool) -> tuple[int, Verdict]:
+    def without_match(
+        self, label: Label, search: LabelSearch, exhausted: Exhausted | TimeIsUp | None
+    ) -> tuple[int, Verdict]:
         """The verdict of a search without a match, and its weight: an unknown outweighs every no."""
         ego, failure = {self.scenario.ego: search.problem.ego}, search.failure
         if search.undecided is not None:
             found = search.undecided
             reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
             return _UNDECIDED, Unknown(reason, self._cause(found), self.names(label, ego | dict(found.assignment)))
-        if exhausted:
+        if isinstance(exhausted, TimeIsUp):
+            cause = Cause("correspondence search", f"more than {self.options.timeout_s:g} s")
+            return _EXHAUSTED, Unknown("timeout", cause)
+        if exhausted is not None:
             cause = Cause("correspondence search", f"more than {self.options.budget:,} steps")
             return _EXHAUSTED, Unknown("budget", cause)
         if failure is None:
