@@ -12,6 +12,7 @@ that nothing decides leaves the label undecided unless another correspondence ma
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from scenicq.budget import TimeIsUp, limited
@@ -144,8 +145,10 @@ class Matcher:
         """The verdicts of labels: by first fit side by side, else each by a search of its own."""
         found: dict[int, Match] = {}
         for fit, rows in self._batches(labels, given).items():
-            for batch in fit.fill(rows, self.options, lookups):
-                found.update(self._verdicts.matches(fit, batch))
+            # labels that are left when the time is up are searched for, each on a clock of its own
+            with suppress(TimeIsUp), limited(self.options.timeout_s * len(rows)):
+                for batch in fit.fill(rows, self.options, lookups):
+                    found.update(self._verdicts.matches(fit, batch))
         for place, (label, among) in enumerate(labels):
             verdict: Verdict | None = found.get(place)
             if verdict is None:

@@ -17,6 +17,7 @@ from typing import TypeVar, cast
 
 import numpy as np
 
+from scenicq.budget import look
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.closed_form import Evaluated
@@ -109,9 +110,13 @@ class FirstFit:
             rows: Labels of the plan.
             options: Tolerance and radius.
             lookups: What is known of the map.
+
+        Raises:
+            TimeIsUp: The time is used up.
         """
         todo = [_Batch(self, rows, [(0,)] * len(rows))]
         while todo:
+            look()
             batch = todo.pop()
             for group in self.due[batch.depth]:
                 found, size = batch.decide(group, options, lookups), len(batch.rows)
