@@ -9,6 +9,8 @@ hidden place is a choice, too: that the place has the element is one more constr
 from __future__ import annotations
 
 import itertools
+import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -52,7 +54,12 @@ Ask = Callable[[Sequence[Sequence[Item]]], Outcome]
 
 
 def decide_with_choices(
-    items: Sequence[Item], tolerance: Tolerance, decide: Decide, ask: Ask | None = None
+    items: Sequence[Item],
+    tolerance: Tolerance,
+    decide: Decide,
+    ask: Ask | None = None,
+    *,
+    timeout_s: float = math.inf,
 ) -> Outcome | None:
     """Decide a group that random choices are part of; None if there are none.
 
@@ -61,6 +68,7 @@ def decide_with_choices(
         tolerance: Per feature.
         decide: Decides what is left when all choices have come out.
         ask: The same by a solver, where nothing else decides it.
+        timeout_s: Seconds of processor time after which the group is undecided.
     """
     parts = [part for item in items for part in conjuncts(item)]
     try:
@@ -75,14 +83,21 @@ def decide_with_choices(
     for constraint, node, seen in parts:
         if isinstance(node, Constant) and not holds(constraint, node.value, seen, tolerance):
             return Refuted(constraint, ground_cause((constraint, node, seen)))
-    return _ChoiceSearch(list(items), found, tolerance, decide, ask).solve()
+    until = time.process_time() + timeout_s
+    return _ChoiceSearch(list(items), found, tolerance, decide, ask, until).solve()
 
 
 class _ChoiceSearch:
     """The search for one group and one label."""
 
     def __init__(
-        self, items: list[Item], parts: list[Part], tolerance: Tolerance, decide: Decide, ask: Ask | None
+        self,
+        items: list[Item],
+        parts: list[Part],
+        tolerance: Tolerance,
+        decide: Decide,
+        ask: Ask | None,
+        until: float,
     ) -> None:
         self.items = items
         self.constraints = [constraint for constraint, _, _ in items]
@@ -91,6 +106,7 @@ class _ChoiceSearch:
         self.decide = decide
         self.ask = ask
         self.asking = False
+        self.until = until
         self.blamed: tuple[int, Refuted] | None = None
         self.doubt: Undecided | None = None
         self.known: dict[tuple[int, tuple[tuple[int, int], ...]], Outcome] = {}
@@ -125,7 +141,8 @@ class _ChoiceSearch:
                 for assignment in self._assignments():
                     return unsettled or self._values(assignment, values)
         except Exhausted:
-            return Undecided(self.items[0][0], "budget")
+            late = time.process_time() > self.until
+            return Undecided(self.items[0][0], "timeout" if late else "budget")
         if self.doubt is not None:
             return self.doubt
         return Refuted(self.items[0][0]) if self.blamed is None else self.blamed[1]
@@ -183,6 +200,8 @@ class _ChoiceSearch:
         return find_assignments(slots, self._check, links=links, budget=_MOST_TRIES)
 
     def _check(self, slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+        if time.process_time() > self.until:
+            raise Exhausted
         domain = self.domains[slot]
         picks = domain.outcomes.picks[assignment[slot] - domain.first]
         for variable, pick in zip(domain.outcomes.variables, picks.tolist(), strict=True):
@@ -283,7 +302,8 @@ class _ChoiceSearch:
         left = [item for item in left if not isinstance(item[1], Constant)]
         if not left:
             return Satisfied({})
-        found = decide_with_choices(left, self.tolerance, decide) or decide(left)
+        left_s = self.until - time.process_time()
+        found = decide_with_choices(left, self.tolerance, decide, timeout_s=left_s) or decide(left)
         if isinstance(found, Satisfied) or found.constraint in self.constraints:
             return found
         return replace(found, constraint=self.items[0][0] if not parts else parts[0].item[0])

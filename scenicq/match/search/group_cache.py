@@ -88,7 +88,13 @@ class GroupCache:
             if self.options.method == "smt":
                 return self.ask([items])
             tolerance = self.options.tolerance
-            chosen = decide_with_choices(items, tolerance, lambda left: decide_decomposed(left, tolerance), self.ask)
+            chosen = decide_with_choices(
+                items,
+                tolerance,
+                lambda left: decide_decomposed(left, tolerance),
+                self.ask,
+                timeout_s=self.options.timeout_s,
+            )
             if chosen is not None:
                 return chosen
             outcome = decide_decomposed(items, tolerance)
