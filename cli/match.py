@@ -20,9 +20,10 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
-from scenicq.store.dataset import open_dataset
+from scenicq.store.atomic_files import sole_writer
 
 from .advise import advise, is_nearly_empty
+from .datasets import open_checked
 from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
@@ -89,7 +90,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--jobs", metavar="N", type=click.IntRange(1), help="Processes that match.  [default: one a processor, "
               "at most 8, once it is clear that it takes long; with --shard 1]")
 @click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULTS.timeout_s,
-              help="Seconds for one question to the solver; then the frame is unknown.")
+              help="Seconds for one frame, the solver's included; then it is unknown.")
 @click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
               help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
 @click.option("--limit", metavar="N", type=click.IntRange(1), help="Stop after so many matches.")
@@ -148,7 +149,7 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     options = query_options({**given, "model": model})
     if deadline is not None:
         options = replace(options, until=time.time() + deadline)
-    query = Query(open_dataset(target), source, options)
+    query = Query(open_checked(target), source, options)
     if explain:
         show_plan(query)
         return
@@ -172,17 +173,18 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         engine = kept(engine or run_here, pieces)
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
     results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
-    try:
-        deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
-    except BaseException:
-        if pieces is not None:
-            with contextlib.suppress(OSError):
-                pieces.rmdir()  # if nothing is done yet
-        raise
+    with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
+        try:
+            deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
+        except BaseException:
+            if pieces is not None:
+                with contextlib.suppress(OSError):
+                    pieces.rmdir()  # if nothing is done yet
+            raise
+        if pieces is not None and not query.funnel.cut:
+            shutil.rmtree(pieces, ignore_errors=True)
     if query.funnel.cut:
         _tell_cut(query, resume=resume)
-    elif pieces is not None:
-        shutil.rmtree(pieces, ignore_errors=True)
     whole = query.options.limit is None and not query.funnel.cut
     if advised or (not quiet and whole and is_nearly_empty(query)):
         advise(query, asked=advised)

@@ -12,8 +12,10 @@ that nothing decides leaves the label undecided unless another correspondence ma
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
+from scenicq.budget import TimeIsUp, limited
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.solver_step import ask
 from scenicq.match.explanation import Finding
@@ -29,7 +31,7 @@ from scenicq.match.search.batch_lookups import look_up_positions
 from scenicq.match.search.first_fit import FirstFit, Row, first_fit_of, signature_of
 from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
 from scenicq.match.search.label_search import LabelSearch
-from scenicq.match.search.verdict_builder import VerdictBuilder
+from scenicq.match.search.verdict_builder import Ended, VerdictBuilder
 from scenicq.match.verdict import Cause, Match, Verdict
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -92,18 +94,25 @@ class Matcher:
     def matches(self, label: Label, *, among: Candidates | None = None) -> Iterator[Match]:
         """Every correspondence by which a label matches; of interchangeable objects, one order only.
 
-        Stops early where the budget of the options is used up.
+        Stops early where the budget of the options is used up, or one takes too long to be found.
 
         Args:
             label: The label.
             among: As of `match`.
         """
-        found = (finding.verdict for finding in self._findings(label, MapLookups(), None, {}, among))
-        return (verdict for verdict in found if isinstance(verdict, Match))
+        found = self._findings(label, MapLookups(), None, {}, among)
+        while True:
+            with limited(self.options.timeout_s):
+                finding = next(found, None)
+            if finding is None:
+                return
+            if isinstance(finding.verdict, Match):
+                yield finding.verdict
 
     def examine(self, label: Label) -> Finding:
         """Decide one label and keep what the verdict rests on."""
-        return next(self._findings(label, MapLookups(), None, {}, None))
+        with limited(self.options.timeout_s):
+            return next(self._findings(label, MapLookups(), None, {}, None))
 
     def relaxed(self, options: MatchOptions) -> Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
@@ -135,12 +144,17 @@ class Matcher:
     ) -> Iterator[Verdict]:
         """The verdicts of labels: by first fit side by side, else each by a search of its own."""
         found: dict[int, Match] = {}
-        for fit, rows in self._batches(labels, given).items():
-            for batch in fit.fill(rows, self.options, lookups):
-                found.update(self._verdicts.matches(fit, batch))
+        with suppress(TimeIsUp), limited(self.options.timeout_s):
+            for fit, rows in self._batches(labels, given).items():
+                for batch in fit.fill(rows, self.options, lookups):
+                    found.update(self._verdicts.matches(fit, batch))
         for place, (label, among) in enumerate(labels):
-            match = found.get(place)
-            yield match or next(self._findings(label, lookups, reporter, given, among)).verdict
+            if place in found:
+                yield found[place]
+                continue
+            with limited(self.options.timeout_s):
+                verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
+            yield verdict
 
     def _batches(
         self, labels: Iterable[tuple[Label, Candidates | None]], given: Mapping[str, str]
@@ -182,7 +196,7 @@ class Matcher:
                 rest.append((0, Finding(self._verdicts.excluded(label, ego, roles))))
                 continue
             search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups)
-            exhausted = False
+            ended: Ended | None = None
             try:
                 for signature, candidates in roles.signatures(self._relevant):
                     plan = self.plan(signature)
@@ -190,8 +204,10 @@ class Matcher:
                         matched = True
                         yield Finding(self._verdicts.match(label, solution), search, plan, solution.assignment)
             except Exhausted:
-                exhausted = True
-            weight, verdict = self._verdicts.without_match(label, search, exhausted=exhausted)
+                ended = "budget"
+            except TimeIsUp:
+                ended = "timeout"
+            weight, verdict = self._verdicts.without_match(label, search, ended)
             rest.append((weight, Finding(verdict, search)))
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest

@@ -17,6 +17,7 @@ from typing import TypeVar, cast
 
 import numpy as np
 
+from scenicq.budget import look
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.closed_form import Evaluated
@@ -112,6 +113,7 @@ class FirstFit:
         """
         todo = [_Batch(self, rows, [(0,)] * len(rows))]
         while todo:
+            look()
             batch = todo.pop()
             for group in self.due[batch.depth]:
                 found, size = batch.decide(group, options, lookups), len(batch.rows)
