@@ -52,7 +52,10 @@ Ask = Callable[[Sequence[Sequence[Item]]], Outcome]
 
 
 def decide_with_choices(
-    items: Sequence[Item], tolerance: Tolerance, decide: Decide, ask: Ask | None = None
+    items: Sequence[Item],
+    tolerance: Tolerance,
+    decide: Decide,
+    ask: Ask | None = None,
 ) -> Outcome | None:
     """Decide a group that random choices are part of; None if there are none.
 
@@ -61,6 +64,9 @@ def decide_with_choices(
         tolerance: Per feature.
         decide: Decides what is left when all choices have come out.
         ask: The same by a solver, where nothing else decides it.
+
+    Raises:
+        TimeIsUp: See `scenicq.budget`.
     """
     parts = [part for item in items for part in conjuncts(item)]
     try:
@@ -82,7 +88,12 @@ class _ChoiceSearch:
     """The search for one group and one label."""
 
     def __init__(
-        self, items: list[Item], parts: list[Part], tolerance: Tolerance, decide: Decide, ask: Ask | None
+        self,
+        items: list[Item],
+        parts: list[Part],
+        tolerance: Tolerance,
+        decide: Decide,
+        ask: Ask | None,
     ) -> None:
         self.items = items
         self.constraints = [constraint for constraint, _, _ in items]
