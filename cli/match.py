@@ -19,8 +19,10 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
-from scenicq.store.dataset import open_dataset
+from scenicq.store.atomic_files import sole_writer
 
+from .advise import advise, is_nearly_empty
+from .datasets import open_checked
 from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
@@ -86,7 +88,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--jobs", metavar="N", type=click.IntRange(1), help="Processes that match.  [default: one a processor, "
               "at most 8, once it is clear that it takes long; with --shard 1]")
 @click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULTS.timeout_s,
-              help="Seconds for one question to the solver; then the frame is unknown.")
+              help="Seconds for one frame, the solver's included; then it is unknown.")
 @click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
               help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
 @click.option("--limit", metavar="N", type=click.IntRange(1), help="Stop after so many matches.")
@@ -95,6 +97,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               "interchangeable objects in one order only.")
 @click.option("--near", metavar="K", type=click.IntRange(1), help="Show the K frames, too, that do not match but come "
               "closest, each with the tolerance under which it would.")
+@click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most, and how many frames each "
+              "single change of the program would leave. Without it, this is said where hardly any frame matches.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, parquet or ids.  [default: by the extension of FILE, else table on a terminal "
               "and jsonl in a pipe]")
@@ -124,7 +128,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.pass_context
 def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
           output: Path | None, export: tuple[str, Path] | None, near: int | None, report: Path | None,
-          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool,
+          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool, advised: bool,
           exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
@@ -138,7 +142,7 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
     source, target, model = given_program(ctx, program, scenario, dataset)
-    query = Query(open_dataset(target), source, query_options({**given, "model": model}))
+    query = Query(open_checked(target), source, query_options({**given, "model": model}))
     if explain:
         show_plan(query)
         return
@@ -162,15 +166,18 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         engine = kept(engine or run_here, pieces)
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
     results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
-    try:
-        deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
-    except BaseException:
+    with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
+        try:
+            deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
+        except BaseException:
+            if pieces is not None:
+                with contextlib.suppress(OSError):
+                    pieces.rmdir()  # if nothing is done yet
+            raise
         if pieces is not None:
-            with contextlib.suppress(OSError):
-                pieces.rmdir()  # if nothing is done yet
-        raise
-    if pieces is not None:
-        shutil.rmtree(pieces, ignore_errors=True)
+            shutil.rmtree(pieces, ignore_errors=True)
+    if advised or (not quiet and query.options.limit is None and is_nearly_empty(query)):
+        advise(query, asked=advised)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 

@@ -172,8 +172,8 @@ def _guarded(name: str, owner: ModelValue) -> Callable[..., ModelValue]:
         if name == "sort" and ("key" in named or not is_flat(owner)):
             raise fail("unsupported-construct", "`sort` of these values is not supported", span, "not plain values",
                        ("write `items = sorted(items, key=...)`",))  # fmt: skip
-        if name == "join" and args and isinstance(args[0], list | tuple):
-            held = cast("list[ModelValue]", args[0])
+        if name == "join" and args and isinstance(args[0], str | list | tuple | dict | set):
+            held = cast("list[ModelValue]", [*args[0]])
             _check_length(sum(len(owner) + len(each) for each in held if isinstance(each, str)), span)
         if isinstance(owner, dict | set) and name in _KEYED:
             args = (hashed(args[0], span), *args[1:]) if args else args

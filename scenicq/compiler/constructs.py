@@ -54,6 +54,7 @@ def construct(
         case ast.Vector():
             return lift(lambda x, y: to_vector((x, y), span), value(node.x), value(node.y))
         case ast.FieldAt():
+            run.budget.step(span, run.budget.LOOK_UP_STEPS)
             return _apply(
                 span, lambda f, p: operators.direction_at(f, p, span), value(node.field), value(node.position)
             )
@@ -65,6 +66,8 @@ def construct(
             operands = value(node.origin), value(node.direction), value(node.offset)
             return _apply(span, lambda o, d, by: operators.along(o, d, by, span), *operands)
         case ast.Follow():
+            # a hundred look-ups at most
+            run.budget.step(span, 100 * run.budget.LOOK_UP_STEPS)
             operands = value(node.field), origin(node.origin), value(node.distance)
             return _apply(span, lambda f, o, d: follow(run, f, o, d, span), *operands)
         case ast.PartOf():
@@ -94,6 +97,7 @@ def _measure(
                 span, lambda t, o: operators.apparent_heading(t, o, span), value(node.target), origin(node.origin)
             )
         case ast.Distance():
+            run.budget.step(span, run.budget.LOOK_UP_STEPS)
             return _apply(span, lambda t, o: operators.distance_to(t, o, span), value(node.target), origin(node.origin))
         case ast.DistancePast():
             return _apply(

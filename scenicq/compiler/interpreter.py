@@ -235,7 +235,11 @@ class Interpreter:
     def run(self, body: tuple[ast.Statement, ...], scope: Environment) -> None:
         """Run statements in order."""
         for statement in body:
-            self._execute(statement, scope)
+            try:
+                self._execute(statement, scope)
+            except ArithmeticError as error:
+                told = f"a number is too large, or not one: {error}"
+                raise fail("runtime-error", told, statement.span, "in this statement") from None
 
     def _execute(self, node: ast.Statement, scope: Environment) -> None:
         self.budget.step(node.span)

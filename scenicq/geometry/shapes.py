@@ -21,6 +21,8 @@ Shape: TypeAlias = BaseGeometry
 """Any shapely geometry."""
 XY: TypeAlias = tuple[float, float]
 """A point, in metres."""
+GeometryError = shapely.errors.ShapelyError
+"""Raised where shapes cannot be made or compared, such as those with coordinates that are not finite."""
 Bounds: TypeAlias = tuple[float, float, float, float]
 """A box: xmin, ymin, xmax, ymax."""
 Coordinates: TypeAlias = NDArray[np.float64]
