@@ -136,6 +136,8 @@ def _let_go_of_output() -> None:
 def _interrupted(ctx: click.Context) -> NoReturn:
     INTERRUPTS.done()
     click.echo("interrupted", err=True)
+    if INTERRUPTS.advice:
+        click.echo(INTERRUPTS.advice, err=True)
     ctx.exit(INTERRUPTED)
 
 

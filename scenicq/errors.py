@@ -49,6 +49,7 @@ CODES: dict[str, str] = {
     "runtime-error": "evaluating the program failed",
     "map-lacks": "the map of the dataset has no element of the needed kind",
     "option-invalid": "an option has a value that cannot be used",
+    "sql-invalid": "a question in SQL that the database refuses",
     # the data
     "unknown-class": "an object class that no taxonomy lists",
     "dataset-unrecognised": "no importer recognises the source",
@@ -103,6 +104,11 @@ class Source:
     name: str
     text: str
 
+    @property
+    def file_name(self) -> str:
+        """The name without folders."""
+        return self.name.replace("\\", "/").rpartition("/")[2]
+
     @cached_property
     def line_starts(self) -> tuple[int, ...]:
         """Offsets at which the lines start."""
@@ -137,6 +143,12 @@ class Span:
         """`file:line:column` of the start."""
         line, column = self.source.position(self.start)
         return f"{self.source.name}:{line}:{column}"
+
+    @property
+    def mark(self) -> str:
+        """The same without the file's folder: what results call the place, wherever one stands."""
+        line, column = self.source.position(self.start)
+        return f"{self.source.file_name}:{line}:{column}"
 
     @property
     def text(self) -> str:

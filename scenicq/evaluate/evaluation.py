@@ -24,8 +24,8 @@ from scenicq.evaluate.simulation import Simulated, read_simulated, verdict
 from scenicq.evaluate.slices import Slice, slices
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
+from scenicq.query.execution.result_files import read_records
 from scenicq.query.execution.results import Result, record
-from scenicq.report.result_files import read_records
 from scenicq.store.dataset import Dataset
 
 __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]

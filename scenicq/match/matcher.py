@@ -11,7 +11,7 @@ no: a group that nothing decides leaves the label undecided unless another corre
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 from scenicq.forest.groups import Comparison
@@ -77,8 +77,9 @@ class Matcher:
     _plain: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Rewrite the scenario, and find out what matters of a label."""
+        """Rewrite the scenario, tie the tolerance to its objects, and find out what matters of a label."""
         self.scenario = ready(self.scenario)
+        self.options = replace(self.options, tolerance=self.options.tolerance.for_scenario(self.scenario))
         self._relevant = relevant_properties(self.scenario, self.options)
         options = self.options
         self._plain = options.method == "auto" and not options.exact and options.ego == "label"
@@ -171,7 +172,15 @@ class Matcher:
         return next(self._findings(label, None, {}))
 
     def relaxed(self, options: MatchOptions) -> Matcher:
-        """The same matcher with options that differ in tolerance and patience only; the analysis is shared."""
+        """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
+
+        Raises:
+            DataError: option-invalid: the tolerance names what the scenario does not have.
+        """
+        bound = options.tolerance.for_scenario(self.scenario)
+        if not bound.same_scopes(self.options.tolerance):
+            # what may be swapped or decided once for many is what one scope compares
+            return Matcher(self.scenario, options, self.solver)
         return Matcher(self.scenario, options, self.solver, self._plans, self._kinds)
 
     def look_up(self, labels: Iterable[tuple[Label, Candidates | None]]) -> MapLookups:
@@ -320,7 +329,7 @@ class Matcher:
         for leaf in variables:
             place = self._places.get(leaf)
             if place is None:
-                place = self._places[leaf] = leaf.span.place if leaf.span else type(leaf).__name__
+                place = self._places[leaf] = leaf.span.mark if leaf.span else type(leaf).__name__
             counts[place] = counts.get(place, 0) + 1
             keys.append(place if counts[place] == 1 else f"{place}#{counts[place]}")
         return keys

@@ -77,13 +77,11 @@ def target_of(constraint: Constraint, options: MatchOptions) -> Target:
     """How a constraint's expression is compared with the label."""
     if not isinstance(constraint, Comparison):
         return Target(None, 0.0, 0.0)
-    tolerance = options.tolerance
-    match constraint.property:
-        case "position" if tolerance.x is not None and tolerance.y is not None:
-            return Target("box", tolerance.x, tolerance.y)
-        case "position":
-            return Target("disc", tolerance.position, 0.0)
-        case "heading":
-            return Target("angle", tolerance.heading, 0.0)
-        case _:
-            return Target("disc", tolerance.other, 0.0)
+    margin = options.tolerance.of(constraint.object, constraint.property)
+    match margin.kind:
+        case "box":
+            return Target("box", margin.size, margin.y)
+        case "arc":
+            return Target("angle", margin.size, 0.0)
+        case "disc" | "interval":
+            return Target("disc", margin.size, 0.0)

@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.query.execution.result_tables import read_row
 
 __all__ = ["Record", "read_records", "read_results"]
 
@@ -122,7 +123,7 @@ def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Ite
     except (pa.ArrowException, OSError) as error:
         raise _invalid(path, f"it is not Parquet with results: {str(error).partition(chr(10))[0]}") from None
     for number, row in enumerate(table.to_pylist(), 1):
-        yield f"row {number}", _row(path, f"row {number}", row)
+        yield f"row {number}", _row(path, f"row {number}", read_row(row))
 
 
 def _row(path: Path, where: str, row: Record) -> Record:
