@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, Protocol
 
 import pyarrow.parquet as pq
 
-from scenicq.query.execution.result_tables import result_schema, result_table
+from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
 from scenicq.store.dataset import Dataset
 from scenicq.store.frame_names import shortened
 
@@ -78,13 +78,13 @@ def _name(record: Mapping[str, Any]) -> str | None:
 
 
 class _Csv:
-    def __init__(self, text: Text) -> None:
-        self._text = text
-        self._rows = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
+    def __init__(self, text: Text, more: tuple[str, ...]) -> None:
+        self._text, self._more = text, more
+        self._rows = csv.DictWriter(text, (*_COLUMNS, *more), lineterminator="\n")
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.writerow(_flat(record))
+        self._rows.writerow(_flat(record) | {name: record.get(name) for name in self._more})
         self._text.flush()
 
     def finish(self) -> None:
@@ -92,8 +92,8 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, roles: Sequence[str]) -> None:
-        self._schema = result_schema(roles)
+    def __init__(self, sink: BinaryIO, roles: Sequence[str], *, ranked: bool) -> None:
+        self._schema = result_schema(roles, ranked=ranked)
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Mapping[str, Any]] = []
 
@@ -112,7 +112,12 @@ class _Parquet:
 
 
 def make_writer(
-    name: str, sink: BinaryIO, roles: Callable[[], Sequence[str]], dataset: Dataset | None = None
+    name: str,
+    sink: BinaryIO,
+    roles: Callable[[], Sequence[str]],
+    dataset: Dataset | None = None,
+    *,
+    ranked: bool = False,
 ) -> Writer:
     """The writer of a format.
 
@@ -121,15 +126,16 @@ def make_writer(
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
         dataset: Whose frames are told; a table cuts their names short where it would not fit.
+        ranked: Whether results have a density.
     """
     if name == "parquet":
-        return _Parquet(sink, roles())
+        return _Parquet(sink, roles(), ranked=ranked)
     text = Text(sink)
     match name:
         case "table":
             return Table(text, None if dataset is None else partial(shortened, dataset))
         case "csv":
-            return _Csv(text)
+            return _Csv(text, DENSITY_COLUMNS if ranked else ())
         case "ids":
             return _Lines(text, _name)
         case _:

@@ -23,7 +23,7 @@ from scenicq.query.execution.results import LogDensity, Result
 from scenicq.query.execution.run import Query
 from scenicq.store.labels import Label
 
-__all__ = ["densities", "log_densities", "rank", "sample_diverse", "sample_plain"]
+__all__ = ["densities", "log_densities", "rank_results", "sample_diverse", "sample_plain"]
 
 _DRAWS = 512
 
@@ -130,7 +130,7 @@ def _correspondence(result: Result) -> Mapping[str, str]:
     return result.verdict.correspondence if isinstance(result.verdict, Match) else {}
 
 
-def rank(query: Query, results: Iterable[Result]) -> list[Result]:
+def rank_results(query: Query, results: Iterable[Result]) -> list[Result]:
     """Results from typical to borderline, each with its log-density; what has none comes last, in its order.
 
     Args:

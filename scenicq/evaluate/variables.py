@@ -92,7 +92,7 @@ class Draws:
                 return np.minimum(low + np.floor((high - low + 1) * self._share(leaf)[0]), high)
             case Index():
                 sums = np.cumsum(leaf.weights)
-                found = np.searchsorted(sums, self._share(leaf)[0] * sums[-1], side="right")
+                found: Array = np.searchsorted(sums, self._share(leaf)[0] * sums[-1], side="right")
                 return np.minimum(found, len(sums) - 1).astype(np.float64)
             case PointIn():
                 return self._point(leaf, given[0])
@@ -125,7 +125,7 @@ class Draws:
         if region.which.shape != (1, self.count):
             raise UncomputedError("a point of a region that hangs on the label")
         x, y = np.empty((1, self.count)), np.empty((1, self.count))
-        for number in map(int, np.unique(region.which)):
+        for number in cast("list[int]", np.unique(region.which).astype(np.int64).tolist()):
             mine = region.which == number
             found: Pair = self._points_in(region.options[number], int(mine.sum()))
             x[mine], y[mine] = found[0][0], found[1][0]

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenicq.errors import render
+from scenicq.evaluate.detection import Missing
+from scenicq.evaluate.evaluation import Evaluation, evaluate
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.notebook.pictures import Picture, Text
@@ -227,6 +229,38 @@ class Matches(Sequence[FrameResult]):
         """
         results = [each.result for each in self._all()]
         return write_report(self.query, results, Path(folder), sensors=None if sensors is None else Path(sensors))
+
+    def evaluate(
+        self,
+        predictions: str | Path,
+        *,
+        distance_m: float = 2.0,
+        least_score: float = 0.0,
+        missing: Missing = "error",
+        simulated: str | Path | None = None,
+    ) -> Evaluation:
+        """Judge a model's detections on the frames that match, against the other frames.
+
+        Args:
+            predictions: A file of them; see `scenicq evaluate`.
+            distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4.
+            least_score: Score from which a detection counts, but for average precision.
+            missing: What a frame without detections is: an error, a frame in which nothing was found, or left out.
+            simulated: A CSV file of simulated runs.
+
+        Raises:
+            DataError: The file cannot be read, or does not fit the dataset.
+        """
+        results = [each.result for each in self._all()]
+        return evaluate(
+            {Path(self.query.source.name).stem: results},
+            self.query.dataset,
+            predictions,
+            distance_m=distance_m,
+            least_score=least_score,
+            missing=missing,
+            simulated=simulated,
+        )
 
     def __repr__(self) -> str:
         """What was asked and, once known, how many results there are."""
