@@ -111,15 +111,6 @@ class Evaluation:
     warnings: tuple[Diagnostic, ...]
     detection: Detection
 
-    def __str__(self) -> str:
-        """The answer for each scenario, a line each."""
-        lines: list[str] = []
-        for each in self.scenarios:
-            lines += (f"{each.name}: {role.sentence}" for role in each.headline)
-            if each.simulated is not None:
-                lines.append(f"{each.name}: {each.simulated.sentence}")
-        return "\n".join(lines)
-
 
 def evaluate(
     results: Results | Mapping[str, Results],
