@@ -91,8 +91,8 @@ class Draws:
                 low, high = np.ceil(given[0]), np.floor(given[1])
                 return np.minimum(low + np.floor((high - low + 1) * self._share(leaf)[0]), high)
             case Index():
-                sums = np.cumsum(leaf.weights)
-                found: Array = np.asarray(np.searchsorted(sums, self._share(leaf)[0] * sums[-1], side="right"))
+                sums = np.cumsum(np.array(leaf.weights, dtype=np.float64))
+                found = cast(Array, np.searchsorted(sums, self._share(leaf)[0] * sums[-1], side="right"))
                 return np.minimum(found, len(sums) - 1).astype(np.float64)
             case PointIn():
                 return self._point(leaf, given[0])
