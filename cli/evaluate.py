@@ -21,8 +21,9 @@ from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, tables
 from scenicq.report.write import check_target
-from scenicq.store.dataset import open_dataset
 
+from .datasets import open_checked
+from .formats import safe_cell
 from .manual import Manual
 from .output import choose_format, destination, writing
 from .report import columns, plain, show
@@ -89,7 +90,7 @@ def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, dist
         raise DataError(Diagnostic("option-invalid", message))
     if report is not None:
         check_target(report)
-    opened = open_dataset(dataset)
+    opened = open_checked(dataset)
     found = judge(
         dict(zip(names, results, strict=True)),
         opened,
@@ -123,7 +124,7 @@ def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
             lines = io.StringIO(newline="")
             rows = csv.DictWriter(lines, COLUMNS, lineterminator="\n")
             rows.writeheader()
-            rows.writerows(flat_rows(found))
+            rows.writerows({name: safe_cell(value) for name, value in row.items()} for row in flat_rows(found))
             text = lines.getvalue()
         case "parquet":
             _write_parquet(found, sink)

@@ -9,24 +9,25 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any, BinaryIO, Protocol
 
 import pyarrow.parquet as pq
 
 from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
-from scenicq.store.dataset import Dataset
-from scenicq.store.frame_names import shortened
 
+from .report import CONTROL as _CONTROL
+from .report import plain
 from .table import Table, Text
 
-__all__ = ["FORMATS", "Writer", "make_writer"]
+__all__ = ["FORMATS", "Writer", "make_writer", "safe_cell"]
 
 FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 """Names of the formats."""
 
 _json = json.JSONEncoder(ensure_ascii=False).encode
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What makes a spreadsheet take a cell for a formula."""
 _COLUMNS: tuple[str, ...] = (
     "frame",
     "recording",
@@ -74,7 +75,20 @@ def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _name(record: Mapping[str, Any]) -> str | None:
-    return record["frame"] if record["verdict"] == "match" else None
+    return plain(record["frame"]).replace("\n", "\\n") if record["verdict"] == "match" else None
+
+
+def _escaped(record: Mapping[str, Any]) -> str:
+    """JSON in which nothing moves a cursor or turns text round; what it says is the same."""
+    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", _json(record))
+
+
+def safe_cell(value: Any) -> Any:
+    """A text that a terminal shows as it is, and that no spreadsheet takes for a formula."""
+    if not isinstance(value, str):
+        return value
+    shown = plain(value)
+    return f"'{shown}" if shown.startswith(_FORMULA) else shown
 
 
 class _Csv:
@@ -84,7 +98,8 @@ class _Csv:
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.writerow(_flat(record) | {name: record.get(name) for name in self._more})
+        row = _flat(record) | {name: record.get(name) for name in self._more}
+        self._rows.writerow({name: safe_cell(value) for name, value in row.items()})
         self._text.flush()
 
     def finish(self) -> None:
@@ -115,7 +130,7 @@ def make_writer(
     name: str,
     sink: BinaryIO,
     roles: Callable[[], Sequence[str]],
-    dataset: Dataset | None = None,
+    shorten: Callable[[], Callable[[str], str]] | None = None,
     *,
     ranked: bool = False,
 ) -> Writer:
@@ -125,7 +140,7 @@ def make_writer(
         name: One of `FORMATS`.
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
-        dataset: Whose frames are told; a table cuts their names short where it would not fit.
+        shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
         ranked: Whether results have a density.
     """
     if name == "parquet":
@@ -133,10 +148,10 @@ def make_writer(
     text = Text(sink)
     match name:
         case "table":
-            return Table(text, None if dataset is None else partial(shortened, dataset))
+            return Table(text, shorten)
         case "csv":
             return _Csv(text, DENSITY_COLUMNS if ranked else ())
         case "ids":
             return _Lines(text, _name)
         case _:
-            return _Lines(text, _json)
+            return _Lines(text, _escaped)

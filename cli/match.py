@@ -20,8 +20,10 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
-from scenicq.store.dataset import open_dataset
+from scenicq.store.atomic_files import sole_writer
 
+from .advise import advise, is_nearly_empty
+from .datasets import open_checked
 from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
@@ -87,7 +89,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--jobs", metavar="N", type=click.IntRange(1), help="Processes that match.  [default: one a processor, "
               "at most 8, once it is clear that it takes long; with --shard 1]")
 @click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULTS.timeout_s,
-              help="Seconds for one question to the solver; then the frame is unknown.")
+              help="Seconds for one frame, the solver's included; then it is unknown.")
 @click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
               help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
 @click.option("--limit", metavar="N", type=click.IntRange(1), help="Stop after so many matches.")
@@ -101,6 +103,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--sample", metavar="N", type=click.IntRange(1), help="Show N of the matches, drawn at random.")
 @click.option("--diverse", is_flag=True, help="With --sample: matches that spread over recordings and over the "
               "program's random variables.")
+@click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most, and how many frames each "
+              "single change of the program would leave. Without it, this is said where hardly any frame matches.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, parquet or ids.  [default: by the extension of FILE, else table on a terminal "
               "and jsonl in a pipe]")
@@ -130,8 +134,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.pass_context
 def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
           output: Path | None, export: tuple[str, Path] | None, near: int | None, report: Path | None,
-          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool, rank: bool,
-          sample: int | None, diverse: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
+          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool, advised: bool,
+          rank: bool, sample: int | None, diverse: bool, exit_zero: bool, summary: bool, quiet: bool,
+          **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
 
@@ -146,7 +151,7 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     if diverse and sample is None:
         raise click.UsageError("--diverse needs --sample N", ctx)
     source, target, model = given_program(ctx, program, scenario, dataset)
-    query = Query(open_dataset(target), source, query_options({**given, "model": model}))
+    query = Query(open_checked(target), source, query_options({**given, "model": model}))
     if explain:
         show_plan(query)
         return
@@ -173,15 +178,18 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
     if rank or sample is not None:
         results = _selected(query, results, sample, rank=rank, diverse=diverse)
-    try:
-        deliver(query, results, _near(query, near), wanted, bar)
-    except BaseException:
+    with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
+        try:
+            deliver(query, results, _near(query, near), wanted, bar)
+        except BaseException:
+            if pieces is not None:
+                with contextlib.suppress(OSError):
+                    pieces.rmdir()  # if nothing is done yet
+            raise
         if pieces is not None:
-            with contextlib.suppress(OSError):
-                pieces.rmdir()  # if nothing is done yet
-        raise
-    if pieces is not None:
-        shutil.rmtree(pieces, ignore_errors=True)
+            shutil.rmtree(pieces, ignore_errors=True)
+    if advised or (not quiet and query.options.limit is None and is_nearly_empty(query)):
+        advise(query, asked=advised)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 
