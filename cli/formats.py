@@ -13,13 +13,13 @@ from typing import Any, BinaryIO, Protocol
 
 import pyarrow.parquet as pq
 
-from scenicq.query.execution.result_tables import result_schema, result_table
+from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
 
 from .report import CONTROL as _CONTROL
 from .report import plain
 from .table import Table, Text
 
-__all__ = ["FORMATS", "Writer", "make_writer"]
+__all__ = ["FORMATS", "Writer", "make_writer", "safe_cell"]
 
 FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 """Names of the formats."""
@@ -83,7 +83,7 @@ def _escaped(record: Mapping[str, Any]) -> str:
     return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", _json(record))
 
 
-def _cell(value: Any) -> Any:
+def safe_cell(value: Any) -> Any:
     """A text that a terminal shows as it is, and that no spreadsheet takes for a formula."""
     if not isinstance(value, str):
         return value
@@ -92,13 +92,14 @@ def _cell(value: Any) -> Any:
 
 
 class _Csv:
-    def __init__(self, text: Text) -> None:
-        self._text = text
-        self._rows = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
+    def __init__(self, text: Text, more: tuple[str, ...]) -> None:
+        self._text, self._more = text, more
+        self._rows = csv.DictWriter(text, (*_COLUMNS, *more), lineterminator="\n")
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.writerow({name: _cell(value) for name, value in _flat(record).items()})
+        row = _flat(record) | {name: record.get(name) for name in self._more}
+        self._rows.writerow({name: safe_cell(value) for name, value in row.items()})
         self._text.flush()
 
     def finish(self) -> None:
@@ -106,8 +107,8 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, roles: Sequence[str]) -> None:
-        self._schema = result_schema(roles)
+    def __init__(self, sink: BinaryIO, roles: Sequence[str], *, ranked: bool) -> None:
+        self._schema = result_schema(roles, ranked=ranked)
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Mapping[str, Any]] = []
 
@@ -130,6 +131,8 @@ def make_writer(
     sink: BinaryIO,
     roles: Callable[[], Sequence[str]],
     shorten: Callable[[], Callable[[str], str]] | None = None,
+    *,
+    ranked: bool = False,
 ) -> Writer:
     """The writer of a format.
 
@@ -138,15 +141,16 @@ def make_writer(
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
         shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
+        ranked: Whether results have a density.
     """
     if name == "parquet":
-        return _Parquet(sink, roles())
+        return _Parquet(sink, roles(), ranked=ranked)
     text = Text(sink)
     match name:
         case "table":
             return Table(text, shorten)
         case "csv":
-            return _Csv(text)
+            return _Csv(text, DENSITY_COLUMNS if ranked else ())
         case "ids":
             return _Lines(text, _name)
         case _:

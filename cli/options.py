@@ -25,8 +25,8 @@ TOPICS = {
     "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
-        "limit", "every", "all_matches", "near", "format_", "output", "report", "sensors", "export", "explain",
-        "advised",
+        "limit", "every", "all_matches", "near", "rank", "sample", "diverse", "advised",
+        "format_", "output", "report", "sensors", "export", "explain",
     },
     "Long runs": {"shard", "resume"},
     "Messages and exit code": {"strict", "exit_zero", "summary", "quiet", "help"},

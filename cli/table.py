@@ -167,7 +167,10 @@ def _wrapped(table: list[Row], kept: list[int], width: int) -> list[str]:
 def _cells(record: Mapping[str, Any]) -> Row:
     cause = record.get("cause", {})
     near = cause.get("what") == "tolerance"
-    why = cause.get("reason") or cause.get("detail" if near else "what", "")
+    density = record.get("log_density")
+    why = (
+        f"{density:.2f}" if density is not None else cause.get("reason") or cause.get("detail" if near else "what", "")
+    )
     objects = [f"{role}={label}" for role, label in record["correspondence"].items() if (role, label) != ("ego", "ego")]
     sensors = sorted(record["sensors"].items(), key=lambda item: (not item[0].startswith("CAM_FRONT"), item))
     return (

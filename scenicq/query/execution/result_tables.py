@@ -17,7 +17,7 @@ from typing import Any, cast
 
 import pyarrow as pa
 
-__all__ = ["read_row", "result_schema", "result_table", "roles_of"]
+__all__ = ["DENSITY_COLUMNS", "read_row", "result_schema", "result_table", "roles_of"]
 
 _CAUSE = ("what", "detail", "place", "reason")
 
@@ -27,13 +27,20 @@ def roles_of(records: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(("ego", *(role for each in records for role in each["correspondence"]))))
 
 
-def result_schema(roles: Sequence[str]) -> pa.Schema:
+DENSITY_COLUMNS = ("log_density", "log_density_error", "no_density")
+"""Columns of results that are ranked: numbers, and why there is none."""
+
+
+def result_schema(roles: Sequence[str], *, ranked: bool = False) -> pa.Schema:
     """The columns of results.
 
     Args:
         roles: Names of the scenario's objects, in its order.
+        ranked: Whether results have a density.
     """
     text = pa.string()
+    kinds = (pa.float64(), pa.float64(), text)
+    more = list(zip(DENSITY_COLUMNS, kinds, strict=True)) if ranked else []
     return pa.schema(
         [
             ("frame", text),
@@ -44,6 +51,7 @@ def result_schema(roles: Sequence[str]) -> pa.Schema:
             ("witness", pa.map_(text, pa.list_(pa.float64()))),
             ("cause", pa.struct([(name, text) for name in _CAUSE])),
             ("sensors", pa.map_(text, text)),
+            *more,
         ]
     )
 
