@@ -13,6 +13,7 @@ from scenicq.compiler.attributes import part_of
 from scenicq.compiler.choices import distribute
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.following import follow
 from scenicq.compiler.values import ModelValue, fail, lift
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -68,7 +69,7 @@ def construct(
             # a hundred look-ups at most
             run.budget.step(span, 100 * run.budget.LOOK_UP_STEPS)
             operands = value(node.field), origin(node.origin), value(node.distance)
-            return _apply(span, lambda f, o, d: operators.follow(f, o, d, run.version, span), *operands)
+            return _apply(span, lambda f, o, d: follow(run, f, o, d, span), *operands)
         case ast.PartOf():
             return _apply(span, lambda target: part_of(node.part, target, span), value(node.target))
         case _:

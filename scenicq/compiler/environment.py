@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from difflib import get_close_matches
 from typing import Protocol
 
@@ -220,4 +221,8 @@ class Runner(Protocol):
 
     def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:
         """Require that a choice between `count` options does not come out as one of some: they have no value."""
+        ...
+
+    def assuming(self, index: Node, option: int, count: int) -> AbstractContextManager[None]:
+        """What is excluded meanwhile is so only where a choice comes out as an option of `count`."""
         ...

@@ -150,6 +150,11 @@ def intersection(a: Shape, b: Shape) -> Shape:
         return shapely.intersection(a, b, grid_size=_GRID)
 
 
+def shared_areas(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
+    """What each pair of polygons has in common, in square metres."""
+    return shapely.area(shapely.intersection(a, b))
+
+
 def intersections(geometries: Sequence[Shape], window: Shape) -> list[Shape]:
     """What each geometry shares with another one."""
     return [intersection(each, window) for each in geometries]
