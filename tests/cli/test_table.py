@@ -7,6 +7,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.store.dataset import open_dataset
+from scenicq.store.frame_names import find_label, shortened
 from scenicq_cli.report import moment
 from scenicq_cli.table import Table, Text, fitted
 
@@ -77,16 +78,16 @@ def test_the_command_fits_where_the_terminal_is_said_to_be_narrow(run, crossroad
 
 def test_frames_are_found_by_beginnings_that_no_other_has(crossroads):
     dataset = open_dataset(crossroads)
-    assert dataset.label("03-busy-intersection/09").frame == "03-busy-intersection/09"
-    assert dataset.label("03-b/09").frame == "03-busy-intersection/09"
-    cut = dataset.short_frames()
+    assert find_label(dataset, "03-busy-intersection/09").frame == "03-busy-intersection/09"
+    assert find_label(dataset, "03-b/09").frame == "03-busy-intersection/09"
+    cut = shortened(dataset)
     for label in itertools.islice(dataset.labels(), 0, None, 39):
-        assert dataset.label(cut(label.frame)) == label
+        assert find_label(dataset, cut(label.frame)) == label
     with pytest.raises(DataError, match="several frames begin with `03-b`"):
-        dataset.label("03-b")
+        find_label(dataset, "03-b")
     for absent in ("04-b/.*", "nope", "%"):
         with pytest.raises(DataError, match="has no frame"):
-            dataset.label(absent)
+            find_label(dataset, absent)
 
 
 def test_a_clock_without_a_date_shows_none():
