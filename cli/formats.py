@@ -9,15 +9,14 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any, BinaryIO, Protocol
 
 import pyarrow.parquet as pq
 
 from scenicq.query.execution.result_tables import result_schema, result_table
-from scenicq.store.dataset import Dataset
-from scenicq.store.frame_names import shortened
 
+from .report import CONTROL as _CONTROL
+from .report import plain
 from .table import Table, Text
 
 __all__ = ["FORMATS", "Writer", "make_writer"]
@@ -27,6 +26,8 @@ FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 
 _json = json.JSONEncoder(ensure_ascii=False).encode
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What makes a spreadsheet take a cell for a formula."""
 _COLUMNS: tuple[str, ...] = (
     "frame",
     "recording",
@@ -74,7 +75,20 @@ def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _name(record: Mapping[str, Any]) -> str | None:
-    return record["frame"] if record["verdict"] == "match" else None
+    return plain(record["frame"]).replace("\n", "\\n") if record["verdict"] == "match" else None
+
+
+def _escaped(record: Mapping[str, Any]) -> str:
+    """JSON in which nothing moves a cursor or turns text round; what it says is the same."""
+    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", _json(record))
+
+
+def _cell(value: Any) -> Any:
+    """A text that a terminal shows as it is, and that no spreadsheet takes for a formula."""
+    if not isinstance(value, str):
+        return value
+    shown = plain(value)
+    return f"'{shown}" if shown.startswith(_FORMULA) else shown
 
 
 class _Csv:
@@ -84,7 +98,7 @@ class _Csv:
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.writerow(_flat(record))
+        self._rows.writerow({name: _cell(value) for name, value in _flat(record).items()})
         self._text.flush()
 
     def finish(self) -> None:
@@ -112,7 +126,10 @@ class _Parquet:
 
 
 def make_writer(
-    name: str, sink: BinaryIO, roles: Callable[[], Sequence[str]], dataset: Dataset | None = None
+    name: str,
+    sink: BinaryIO,
+    roles: Callable[[], Sequence[str]],
+    shorten: Callable[[], Callable[[str], str]] | None = None,
 ) -> Writer:
     """The writer of a format.
 
@@ -120,17 +137,17 @@ def make_writer(
         name: One of `FORMATS`.
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
-        dataset: Whose frames are told; a table cuts their names short where it would not fit.
+        shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
     """
     if name == "parquet":
         return _Parquet(sink, roles())
     text = Text(sink)
     match name:
         case "table":
-            return Table(text, None if dataset is None else partial(shortened, dataset))
+            return Table(text, shorten)
         case "csv":
             return _Csv(text)
         case "ids":
             return _Lines(text, _name)
         case _:
-            return _Lines(text, _json)
+            return _Lines(text, _escaped)

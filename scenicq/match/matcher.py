@@ -14,6 +14,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
+from scenicq.budget import TimeIsUp, limited
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Leaf
 from scenicq.forest.scenario import Scenario
@@ -37,6 +38,9 @@ from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 
 __all__ = ["Finding", "Matcher"]
+
+
+_SEARCH = "correspondence search"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +106,15 @@ class Matcher:
             among: What is known of who may play whom.
             places: What is known of places of the map; see `look_up`.
         """
-        if reporter is None and not given:
-            found = self._direct(label, among, places or MapLookups())
-            if found is not None:
-                return found
-        return next(self._findings(label, reporter, given or {}, among, places)).verdict
+        with limited(self.options.timeout_s):
+            if reporter is None and not given:
+                try:
+                    found = self._direct(label, among, places or MapLookups())
+                except TimeIsUp:
+                    found = None
+                if found is not None:
+                    return found
+            return next(self._findings(label, reporter, given or {}, among, places)).verdict
 
     def match_all(self, labels: Sequence[tuple[Label, Candidates | None]], places: MapLookups) -> Iterator[Verdict]:
         """Decide labels, each as `match` does; those that match in the first way that is tried are found together.
@@ -169,7 +177,8 @@ class Matcher:
 
     def examine(self, label: Label) -> Finding:
         """Decide one label and keep what the verdict rests on."""
-        return next(self._findings(label, None, {}))
+        with limited(self.options.timeout_s):
+            return next(self._findings(label, None, {}))
 
     def relaxed(self, options: MatchOptions) -> Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
@@ -224,7 +233,7 @@ class Matcher:
     ) -> Iterator[Match]:
         """Every correspondence by which a label matches; of interchangeable objects, one order only.
 
-        Stops early where the budget of the options is used up.
+        Stops early where the budget of the options is used up, or one takes too long to be found.
 
         Args:
             label: The label.
@@ -232,8 +241,14 @@ class Matcher:
             among: As of `match`.
             places: As of `match`.
         """
-        found = (finding.verdict for finding in self._findings(label, None, given or {}, among, places))
-        return (verdict for verdict in found if isinstance(verdict, Match))
+        found = self._findings(label, None, given or {}, among, places)
+        while True:
+            with limited(self.options.timeout_s):
+                finding = next(found, None)
+            if finding is None:
+                return
+            if isinstance(finding.verdict, Match):
+                yield finding.verdict
 
     def plan(self, signature: Signature) -> MatchPlan:
         """The groups for a signature, analysed once."""
@@ -262,7 +277,7 @@ class Matcher:
                 rest.append((0, Finding(NoMatch(cast_, self._names(label, ego, {})))))
                 continue
             attempt = LabelSearch(self.scenario, self.options, cast_, self.ask, reporter, places or MapLookups())
-            exhausted = False
+            exhausted: Unknown | None = None
             try:
                 for signature, candidates in cast_.signatures(self._relevant):
                     plan = self.plan(signature)
@@ -270,8 +285,10 @@ class Matcher:
                         matched = True
                         yield Finding(self._match(label, ego, solution), attempt, plan, solution.assignment)
             except Exhausted:
-                exhausted = True
-            weight, verdict = self._rest(label, attempt, exhausted=exhausted)
+                exhausted = Unknown("budget", Cause(_SEARCH, f"more than {self.options.budget:,} steps"))
+            except TimeIsUp:
+                exhausted = Unknown("timeout", Cause(_SEARCH, f"more than {self.options.timeout_s:g} s"))
+            weight, verdict = self._rest(label, attempt, exhausted)
             rest.append((weight, Finding(verdict, attempt)))
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest
@@ -282,16 +299,15 @@ class Matcher:
         detail = "the source has no ego" if self.options.ego == "label" else f"no {thing.category}"
         return Cause(f"{thing.name}.class", detail, thing.span, (thing.index,))
 
-    def _rest(self, label: Label, attempt: LabelSearch, *, exhausted: bool) -> tuple[int, Verdict]:
+    def _rest(self, label: Label, attempt: LabelSearch, exhausted: Unknown | None) -> tuple[int, Verdict]:
         """The verdict of an attempt without a match, and its weight."""
         ego, failure = attempt.cast.ego, attempt.failure
         if attempt.undecided is not None:
             found = attempt.undecided
             reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
             return 2_000_000, Unknown(reason, self._cause(found), self._names(label, ego, found.assignment))
-        if exhausted:
-            cause = Cause("correspondence search", f"more than {self.options.budget:,} steps")
-            return 1_000_000, Unknown("budget", cause)
+        if exhausted is not None:
+            return 1_000_000, exhausted
         if failure is None:
             cause = Cause("correspondence", "no distinct label objects for all objects")
             return 0, NoMatch(cause, self._names(label, ego, {}))

@@ -27,7 +27,6 @@ from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import Shot, draw
 from scenicq.report.write import write_report
-from scenicq.store.frame_names import find_label
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -177,7 +176,7 @@ class Matches(Sequence[FrameResult]):
         return self.to_arrow().to_pandas()
 
     def _shot(self, frame: str) -> tuple[Shot, Backdrop]:
-        label = find_label(self.query.dataset, frame)
+        label = self.query.dataset.label(frame)
         world = self.query.world(label.map)
         with LazySolver(self.query.options.solver) as solver:
             matcher = Matcher(world.scenario, self.query.options.match, solver)
@@ -196,7 +195,7 @@ class Matches(Sequence[FrameResult]):
         Raises:
             DataError: option-invalid: there is no such frame.
         """
-        label = find_label(self.query.dataset, frame)
+        label = self.query.dataset.label(frame)
         with LazySolver(self.query.options.solver) as solver:
             matcher = Matcher(self.query.world(label.map).scenario, self.query.options.match, solver)
             return Text(show_explanation(explain(matcher, label)))

@@ -8,7 +8,6 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.store.dataset import open_dataset
-from scenicq.store.frame_names import find_label, shortened
 from scenicq_cli.report import moment
 from scenicq_cli.table import Table, Text, fitted
 
@@ -79,7 +78,7 @@ def test_on_a_terminal_it_fits_and_names_frames_as_other_commands_take_them(cros
     monkeypatch.setenv("COLUMNS", "70")
     dataset = open_dataset(crossroads)
     sink = Terminal()
-    table = Table(Text(sink), lambda: shortened(dataset))
+    table = Table(Text(sink), dataset.short_frames)
     labels = list(itertools.islice(dataset.labels(), 120))
     for label in labels:
         table.write({
@@ -91,21 +90,21 @@ def test_on_a_terminal_it_fits_and_names_frames_as_other_commands_take_them(cros
     assert max(map(len, lines)) <= 70
     names = [line.split()[0] for line in lines if line[:1] not in ("F", " ")]
     assert len(names) == len(labels)
-    assert [find_label(dataset, name).frame for name in names[::40]] == [label.frame for label in labels[::40]]
+    assert [dataset.label(name).frame for name in names[::40]] == [label.frame for label in labels[::40]]
 
 
 def test_frames_are_found_by_beginnings_that_no_other_has(crossroads):
     dataset = open_dataset(crossroads)
-    assert find_label(dataset, "03-busy-intersection/09").frame == "03-busy-intersection/09"
-    assert find_label(dataset, "03-b/09").frame == "03-busy-intersection/09"
-    cut = shortened(dataset)
+    assert dataset.label("03-busy-intersection/09").frame == "03-busy-intersection/09"
+    assert dataset.label("03-b/09").frame == "03-busy-intersection/09"
+    cut = dataset.short_frames()
     for label in itertools.islice(dataset.labels(), 0, None, 39):
-        assert find_label(dataset, cut(label.frame)) == label
+        assert dataset.label(cut(label.frame)) == label
     with pytest.raises(DataError, match="several frames begin with `03-b`"):
-        find_label(dataset, "03-b")
+        dataset.label("03-b")
     for absent in ("04-b/.*", "nope", "%"):
         with pytest.raises(DataError, match="has no frame"):
-            find_label(dataset, absent)
+            dataset.label(absent)
 
 
 def test_a_clock_without_a_date_shows_none():

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import cast
 
+from scenicq.budget import look
 from scenicq.forest import build
 from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.condition import condition
@@ -84,6 +85,7 @@ class _Cascade:
             given: Values chosen so far.
             rows: Facts that came with cells chosen so far.
         """
+        look()
         open_items: list[Item] = []
         for item in items:
             if not isinstance(item[1], Constant):
