@@ -21,17 +21,17 @@ DEFAULTS = MatchOptions()
 _SOLVERS = ("auto", "dreal", "portable")
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "ignore_params",
+    "initial", "ignore_params", "strict",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
 TOPICS = {
-    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget"},
+    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
         "limit", "every", "all_matches", "near", "format_", "output", "report", "sensors", "export", "explain",
     },
     "Long runs": {"shard", "resume"},
-    "Messages and exit code": {"exit_zero", "summary", "quiet", "help"},
+    "Messages and exit code": {"strict", "exit_zero", "summary", "quiet", "help"},
 }  # fmt: skip
 """The options of `match` as its help lists them."""
 ONE_FRAME = {"prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False}
@@ -93,5 +93,5 @@ def query_options(given: dict[str, Any]) -> QueryOptions:
         budget=given["budget"],
         ignore_params=DEFAULTS.ignore_params.union(_names(given["ignore_params"])),
     )
-    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches")
+    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches", "strict")
     return QueryOptions(match=options, version=read_version(given["scenic"]), **{name: given[name] for name in same})

@@ -76,6 +76,7 @@ class Funnel:
         matches, unknowns: Verdicts.
         excluded: How many frames failed first at which feature or requirement.
         reasons: Why frames are unknown.
+        missing: Frames of the dataset in which a property that the program sets is missing, although others have it.
         warnings: What the user should know, such as a map that the program does not fit.
     """
 
@@ -86,6 +87,7 @@ class Funnel:
     unknowns: int = 0
     excluded: Counter[str] = field(default_factory=Counter[str])
     reasons: Counter[str] = field(default_factory=Counter[str])
+    missing: dict[str, int] = field(default_factory=dict[str, int])
     warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
 
     def add(self, other: Funnel) -> None:
@@ -97,6 +99,7 @@ class Funnel:
         self.unknowns += other.unknowns
         self.excluded.update(other.excluded)
         self.reasons.update(other.reasons)
+        self.missing.update(other.missing)
         self.warnings += [warning for warning in other.warnings if warning not in self.warnings]
 
     def exclude(self, what: str, frames: int = 1) -> None:
