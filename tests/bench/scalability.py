@@ -38,6 +38,7 @@ from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
 from scenicq.match.problem.map_lookups import MapLookups  # noqa: E402
+from scenicq.match.tolerance import EXACT  # noqa: E402
 from scenicq.match.verdict import Match  # noqa: E402
 from scenicq.smt.answer import Answer, SolverSession, Unknown  # noqa: E402
 from scenicq.smt.formula import Problem  # noqa: E402
@@ -174,14 +175,14 @@ def ways(scenario: Scenario, solver: Patient) -> list[HeadingAssignment]:
     given = {thing.name: f"object-{thing.index}" for thing in scenario.objects if thing.index != scenario.ego}
 
     def matcher(method: Method) -> Matcher:
-        return Matcher(scenario, MatchOptions(method=method, timeout_s=solver.patience_s), solver)
+        return Matcher(scenario, MatchOptions(tolerance=EXACT, method=method, timeout_s=solver.patience_s), solver)
 
     def ours(method: Method) -> HeadingAssignment:
         made = matcher(method)
         return HeadingAssignment(f"{method}, shuffled", lambda label: isinstance(made.match(label), Match))
 
     def published(variant: Variant) -> HeadingAssignment:
-        options = MatchOptions(timeout_s=solver.patience_s)
+        options = MatchOptions(tolerance=EXACT, timeout_s=solver.patience_s)
 
         def decide(label: Label) -> bool:
             return matches(scenario, label, variant, solver, options, solver.tick)

@@ -37,9 +37,10 @@ from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.decide import cascade, decomposition  # noqa: E402
 from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
-from scenicq.match.options import MatchOptions, Tolerance  # noqa: E402
+from scenicq.match.options import MatchOptions  # noqa: E402
 from scenicq.match.problem.outcome import Undecided  # noqa: E402
 from scenicq.match.search import group_plan, label_search  # noqa: E402
+from scenicq.match.tolerance import Tolerance  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
 
 MAP = ROOT.parent / "shared" / "data" / "boston" / "maps" / "boston-seaport.geojson"

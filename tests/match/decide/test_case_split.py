@@ -11,6 +11,8 @@ from shapely import Point, union_all
 from scenicq.match.decide import decomposition
 from scenicq.match.decide.case_split import picked
 from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.store.labels import Label, LabelObject
 
@@ -53,7 +55,7 @@ def test_a_car_on_the_lane_at_a_place_near_the_ego_is_on_a_lane_that_comes_near_
         f"require (distance from ego to p) < {NEAR}\nrequire lane is not ego._lane\n",
         STREET,
     )
-    matcher, rng, seen = Matcher(scenario), random.Random(1), []
+    matcher, rng, seen = Matcher(scenario, MatchOptions(tolerance=EXACT)), random.Random(1), []
     road, lanes = union_all([lane.polygon for lane in STREET.lanes]), STREET.lanes
     for _ in range(60):
         ego = inside(rng, road)
@@ -76,7 +78,7 @@ def test_a_car_on_the_lane_at_a_place_near_the_ego_is_on_a_lane_that_comes_near_
 @pytest.mark.parametrize("area", ["sidewalk", "shoulder"])
 def test_what_lies_at_a_free_place_where_elements_overlap_is_decided_without_a_solver(area):
     scenario = compiled(f"{HEADER}p = new Point on {area}\nother = new Car on network.elementAt(p), {ANYHOW}", STREET)
-    matcher, rng = Matcher(scenario), random.Random(2)
+    matcher, rng = Matcher(scenario, MatchOptions(tolerance=EXACT)), random.Random(2)
     elements = STREET.sidewalks if area == "sidewalk" else STREET.shoulders
     for element in rng.sample(list(elements), 3):
         assert isinstance(matcher.match(label((0.0, 0.0), inside(rng, element.polygon))), Match)

@@ -18,7 +18,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import candidates_of
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match
 from scenicq.smt.solver import open_solver
 
@@ -47,7 +47,7 @@ CASES = {**PROGRAMS, "rows": ROWS, "any heading": ANY_HEADING, "turned": TURNED,
 SURE = ("ahead", "offset", "left of", "facing field", "normal", "rows", "any heading", "turned")
 """Programs of which every drawn scene is decided together with the others."""
 OPTIONS = (
-    MatchOptions(),
+    MatchOptions(tolerance=EXACT),
     MatchOptions(tolerance=Tolerance(x=0.5, y=0.2, heading=0.1), radius=30.0),
     MatchOptions(tolerance=Tolerance(position=1.0, heading=0.3)),
 )

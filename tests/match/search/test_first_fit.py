@@ -13,6 +13,7 @@ from scenicq.match import matcher as matching
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.search.backtracking import SilentReporter
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match
 from scenicq.smt.solver import open_solver
 
@@ -45,7 +46,7 @@ def solver():
 @pytest.mark.parametrize("radius", [None, 30.0])
 def test_the_same_is_found_without_a_search(name, radius, solver, monkeypatch):
     scenario = compiled(HEADER + CASES[name])
-    matcher = Matcher(scenario, MatchOptions(radius=radius), solver)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT, radius=radius), solver)
     direct = []
     solve = matching.Casting.solve
 
