@@ -121,6 +121,21 @@ def found(dataset: Dataset, text: str, options: MatchOptions, *, prefilter: bool
     }, query
 
 
+@pytest.mark.parametrize("name", ["ahead", "offset", "figure 3", "facing field", "shared heading", "crowd"])
+def test_the_prefilter_keeps_to_scopes(dataset, name):
+    scenario = compile_scenario(Source("test.scenic", HEADER + PROGRAMS[name]), STREET)
+    rng = random.Random(name)
+    scopes = ["Object", "Vehicle", *(each.name for each in scenario.objects), *(o.category for o in scenario.objects)]
+    for _ in range(3):
+        rules = {
+            (rng.choice(scopes), rng.choice(["position", "heading"])): rng.choice([0.001, 0.1, 1.0]) for _ in range(3)
+        }
+        scoped = replace(EXACT, rules=tuple((*key, size) for key, size in sorted(rules.items())))
+        options = MatchOptions(tolerance=scoped)
+        with_it, without = (found(dataset, PROGRAMS[name], options, prefilter=each)[0] for each in (True, False))
+        assert with_it == without, scoped
+
+
 def cases():
     """Every program under every option; those that keep a solver busy only by request."""
     for options in OPTIONS:
