@@ -11,14 +11,17 @@ from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import click
+
 from scenicq.exporters.export import Exporter
+from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target, write_report
 
 from .formats import make_writer
 from .output import ProgressBar, destination, writing
-from .report import show_few
+from .report import count, show_few
 from .sources import sensor_root
 
 __all__ = ["Wanted", "deliver"]
@@ -52,6 +55,7 @@ def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wa
         DataError: target-exists or target-unwritable.
     """
     started = time.perf_counter()
+    unlisted = 0
     file, report = wanted.file, wanted.report
     exporter = None
     if wanted.export is not None:
@@ -62,14 +66,19 @@ def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wa
     close: list[Result] | None = None if report is None else []
     with destination(file, wanted.work) as sink, bar, contextlib.closing(results):
         with writing(file):
-            writer = make_writer(wanted.form, sink)
+            writer = make_writer(wanted.form, sink, query.roles, query.dataset)
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
                 writer.write(record(result))
+            unlisted += wanted.form == "ids" and isinstance(result.verdict, NoMatch)
             if exporter is not None:
                 exporter.add(result)
         with bar.aside(), writing(file):
             writer.finish()
+        if unlisted:
+            told = f"`ids` lists frames that match: {count(unlisted, 'other frame')} left out"
+            with bar.aside():
+                click.echo(told, err=True)
         if exporter is not None:
             with bar.aside():
                 show_few(exporter.finish().left_out)

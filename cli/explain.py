@@ -11,40 +11,29 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
-from scenicq.store.dataset import Dataset, open_dataset
-from scenicq.store.labels import Label
+from scenicq.store.dataset import open_dataset
+from scenicq.store.frame_names import find_label
 
 from .main import NOTHING
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
-from .remarks import show_remarks
+from .programs import SCENARIO, read_scenario
+from .remarks import remarks, show_remarks
 from .report import plain
 
-__all__ = ["explain", "find_label"]
-
-
-def find_label(dataset: Dataset, frame: str) -> Label:
-    """The label of a frame.
-
-    Raises:
-        DataError: option-invalid: there is no such frame.
-    """
-    for label in dataset.labels([frame]):
-        return label
-    hint = "`scenicq match SCENARIO DATASET --all` lists the frames"
-    raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{frame}`", hints=(hint,)))
+__all__ = ["explain"]
 
 
 @click.command(
     cls=Manual,
     arguments={
-        "SCENARIO": "A Scenic program, as a file.",
+        "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has.",
     },
     exits={0: "the frame matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
     topics={"What counts as a match": SHARED},
@@ -66,9 +55,9 @@ def explain(
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
-    query = Query(open_dataset(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
+    query = Query(open_dataset(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
     label = find_label(query.dataset, frame)
-    show_remarks(query, [label.map])
+    show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)

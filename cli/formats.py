@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, BinaryIO, Protocol
 
-import pyarrow as pa
 import pyarrow.parquet as pq
+
+from scenicq.query.execution.result_tables import result_schema, result_table
+from scenicq.store.dataset import Dataset
+from scenicq.store.frame_names import shortened
 
 from .table import Table, Text
 
@@ -88,18 +92,18 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO) -> None:
-        self._schema = pa.schema([(name, pa.int64() if name == "timestamp_us" else pa.string()) for name in _COLUMNS])
+    def __init__(self, sink: BinaryIO, roles: Sequence[str]) -> None:
+        self._schema = result_schema(roles)
         self._file = pq.ParquetWriter(sink, self._schema)
-        self._rows: list[dict[str, Any]] = []
+        self._rows: list[Mapping[str, Any]] = []
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.append(_flat(record))
+        self._rows.append(record)
         if len(self._rows) >= 10_000:
             self._spill()
 
     def _spill(self) -> None:
-        self._file.write_table(pa.Table.from_pylist(self._rows, schema=self._schema))
+        self._file.write_table(result_table(self._rows, self._schema))
         self._rows.clear()
 
     def finish(self) -> None:
@@ -107,19 +111,23 @@ class _Parquet:
         self._file.close()
 
 
-def make_writer(name: str, sink: BinaryIO) -> Writer:
+def make_writer(
+    name: str, sink: BinaryIO, roles: Callable[[], Sequence[str]], dataset: Dataset | None = None
+) -> Writer:
     """The writer of a format.
 
     Args:
         name: One of `FORMATS`.
         sink: Where to; it stays open.
+        roles: Gives the roles that results may name; asked where they are columns.
+        dataset: Whose frames are told; a table cuts their names short where it would not fit.
     """
     if name == "parquet":
-        return _Parquet(sink)
+        return _Parquet(sink, roles())
     text = Text(sink)
     match name:
         case "table":
-            return Table(text)
+            return Table(text, None if dataset is None else partial(shortened, dataset))
         case "csv":
             return _Csv(text)
         case "ids":

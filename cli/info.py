@@ -13,7 +13,7 @@ from scenicq.store.schema import SCHEMAS
 
 from .ingest import defects
 from .manual import Manual
-from .report import columns, count, moment, plain
+from .report import columns, count, is_date, moment, plain
 
 __all__ = ["info"]
 
@@ -53,11 +53,12 @@ def _lines(manifest: Manifest) -> list[str]:
     span = manifest.span_us
     source, made = manifest.provenance.get("source", "unknown"), manifest.provenance.get("time", "unknown")
     versions = ", ".join(f"{name} {number}" for name, number in manifest.provenance.get("versions", {}).items())
+    clock = "UTC" if span is None or is_date(span[0]) else "by the source's own clock, which tells no date"
     without_map = sorted(set(manifest.by_map) - set(manifest.maps))
     return [
         f"{manifest.name}: {count(manifest.total.frames, 'frame')}, {count(manifest.total.objects, 'object')}, "
         f"{count(manifest.tracks, 'track')} in {count(len(manifest.by_recording), 'recording')}",
-        *([f"from {moment(span[0])} to {moment(span[1])} (UTC)"] if span else []),
+        *([f"from {moment(span[0])} to {moment(span[1])} ({clock})"] if span else []),
         f"read as {manifest.importer} from {source} on {made}",
         f"with {versions}",
         "",

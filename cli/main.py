@@ -33,6 +33,7 @@ COMMANDS = {
     "sample": "Draw scenes from a scenario, as labels.",
     "explain": "Say why one frame matches, or what keeps it from it and which tolerance would do.",
     "show": "Draw one frame from above: map, boxes, and what a scenario says of it.",
+    "evaluate": "Say whether a model fails on the frames that match.",
     "report": "Say which matches came, went and stayed between two result files.",
     "info": "Say what a dataset holds and what was left out of it.",
     "index": "Compute anew what a dataset holds beside the labels.",
@@ -135,6 +136,8 @@ def _let_go_of_output() -> None:
 def _interrupted(ctx: click.Context) -> NoReturn:
     INTERRUPTS.done()
     click.echo("interrupted", err=True)
+    if INTERRUPTS.advice:
+        click.echo(INTERRUPTS.advice, err=True)
     ctx.exit(INTERRUPTED)
 
 

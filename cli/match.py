@@ -16,7 +16,7 @@ import click
 
 from scenicq.exporters.export import EXPORTS
 from scenicq.query.execution.results import Result
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.store.dataset import open_dataset
@@ -25,13 +25,14 @@ from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
 from .funnel import show_funnel
-from .main import NOTHING
+from .main import INTERRUPTS, NOTHING
 from .manual import Manual
 from .options import DEFAULTS, TOPICS, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
-from .remarks import show_remarks
+from .programs import SCENARIO, given_program
+from .remarks import remarks, show_remarks
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -47,7 +48,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.command(
     cls=Manual,
     arguments={
-        "SCENARIO": "A Scenic program, as a file.",
+        "SCENARIO": f"{SCENARIO} Not with -e.",
         "DATASET": "A folder that `scenicq ingest` made.",
     },
     exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
@@ -56,10 +57,13 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
     "  scenicq match crossing.scenic dataset --tolerance position=0.5,ego.heading=15deg\n"
     "  scenicq match crossing.scenic dataset --format ids | head\n"
     "  scenicq match crossing.scenic dataset -o matches.parquet --summary\n"
+    "  scenicq match -e 'ego = new Car; new Pedestrian ahead of ego by Range(0, 20)' dataset --tolerance position=2\n"
     "  seq 16 | xargs -P 4 -I{} scenicq match crossing.scenic dataset --shard {}/16 -o pieces --exit-zero"
 )
-@click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path())
+@click.argument("scenario", metavar="SCENARIO", type=click.Path(path_type=Path), required=False)
+@click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
+@click.option("-e", "--program", metavar="TEXT", help="The program itself, in place of SCENARIO; `;` separates "
+              "statements, and the driving world model is there unless it imports another.")
 @click.option("--tolerance", metavar="LIST",
               help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
               "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
@@ -118,10 +122,10 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
-def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | None, output: Path | None,
-          export: tuple[str, Path] | None, near: int | None, report: Path | None, shard: Shard | None, resume: bool,
-          sensors: Path | None, engine: Engine | None, explain: bool, exit_zero: bool, summary: bool, quiet: bool,
-          **given: Any) -> None:
+def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
+          output: Path | None, export: tuple[str, Path] | None, near: int | None, report: Path | None,
+          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool,
+          exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
 
@@ -133,16 +137,23 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     chosen = choose_format(format_, None if shard else file)
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
-    query = Query(open_dataset(dataset), read_program(scenario), query_options(given))
+    source, target, model = given_program(ctx, program, scenario, dataset)
+    query = Query(open_dataset(target), source, query_options({**given, "model": model}))
     if explain:
         show_plan(query)
         return
-    show_remarks(query)
+    with ProgressBar(query.dataset.manifest.total.frames, quiet=quiet) as bar:
+        told = remarks(query)
+        with bar.aside():
+            show_remarks(query, *told)
     if shard is not None:
         _in_shard(ctx, query, shard, file, quiet=quiet)
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
     pieces = None
+    if file is not None:
+        again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
+        INTERRUPTS.advice = f"  = hint: {again}"
     if resume:
         if file is None:
             raise click.UsageError("--resume needs -o FILE, beside which it keeps what is done", ctx)

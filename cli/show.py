@@ -12,7 +12,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.frames import frame_page
@@ -20,14 +20,15 @@ from scenicq.report.picture import Shot, Style, draw
 from scenicq.report.png import can_make_png, png
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.frame_names import find_label
 from scenicq.store.labels import Label
 
-from .explain import find_label
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
-from .remarks import show_remarks
+from .programs import read_scenario
+from .remarks import remarks, show_remarks
 from .sources import SENSORS, sensor_root
 
 __all__ = ["show"]
@@ -50,8 +51,8 @@ def _kind(output: Path | None) -> str:
 def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str, Any]) -> tuple[Shot, Backdrop]:
     if scenario is None:
         return Shot(label), Backdrop(dataset.network(label.map))
-    query = Query(dataset, read_program(scenario), query_options({**given, **ONE_FRAME}))
-    show_remarks(query, [label.map])
+    query = Query(dataset, read_scenario(scenario), query_options({**given, **ONE_FRAME}))
+    show_remarks(query, *remarks(query, [label.map]))
     compiled, network = query.compile(label.map)
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(compiled, query.options.match, solver)
@@ -64,7 +65,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     cls=Manual,
     arguments={
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has.",
     },
     topics={"What counts as a match, with --scenario": SHARED},
     epilog="\b\nExamples:\n"

@@ -52,6 +52,7 @@ def compile_scenario(
     version: int | None = None,
     initial: bool = False,
     loader: Loader | None = None,
+    model: str | None = None,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -61,6 +62,7 @@ def compile_scenario(
         version: 1, 2 or 3; inferred from the spelling if not given.
         initial: Ignore dynamic parts instead of refusing them.
         loader: Reads files that the program imports.
+        model: The world model of a program that imports none, as Scenic's `--model`.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -70,11 +72,14 @@ def compile_scenario(
     world = _World(network, chosen, initial, loader)
     run = world.interpreter
     try:
-        library = _left_out(module, chosen)
+        given = None if model is None or _imports(module) else model
+        library = given or _left_out(module, chosen)
         names = {} if library is None else dict(world.load(library, 0, _start(source)).names)
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
-        return _scenario(run, module, chosen, network, _borrowed(module, scope, names, library))
+        return _scenario(
+            run, module, chosen, network, _borrowed(module, scope, names, library) if given is None else ()
+        )
     except RecursionError:
         raise fail("budget-exceeded", "the program is nested too deeply", _start(source), "",
                    ("make expressions and calls flatter",)) from None  # fmt: skip
@@ -89,12 +94,16 @@ def _start(source: Source) -> Span:
     return Span(source, 0, min(1, len(source.text)))
 
 
+def _imports(module: ast.Module) -> bool:
+    """Whether a program brings in anything itself."""
+    return any(isinstance(node, _IMPORTS) for node in walk(*module.body))
+
+
 def _left_out(module: ast.Module, version: int) -> str | None:
     """The library that an early program needs without importing any; None where it imports one."""
-    nodes = list(walk(*module.body))
-    if version == 3 or any(isinstance(node, _IMPORTS) for node in nodes):
+    if version == 3 or _imports(module):
         return None
-    return default_library(version, frozenset(node.id for node in nodes if isinstance(node, ast.Name)))
+    return default_library(version, frozenset(node.id for node in walk(*module.body) if isinstance(node, ast.Name)))
 
 
 def _borrowed(

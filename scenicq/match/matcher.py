@@ -329,7 +329,7 @@ class Matcher:
         for leaf in variables:
             place = self._places.get(leaf)
             if place is None:
-                place = self._places[leaf] = leaf.span.place if leaf.span else type(leaf).__name__
+                place = self._places[leaf] = leaf.span.mark if leaf.span else type(leaf).__name__
             counts[place] = counts.get(place, 0) + 1
             keys.append(place if counts[place] == 1 else f"{place}#{counts[place]}")
         return keys

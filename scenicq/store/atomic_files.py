@@ -28,6 +28,7 @@ class WholeFile:
         self._path = path
         self._temporary = (folder or path.parent) / f".{path.name}.{os.getpid()}.tmp"
         self._file: BinaryIO | None = None
+        self._begun = False
 
     def open(self) -> BinaryIO:
         """The file, to be written.
@@ -35,6 +36,8 @@ class WholeFile:
         Raises:
             OSError: The folder cannot be written.
         """
+        # an interrupt may come when the file is there and has not been handed on
+        self._begun = True
         self._file = self._temporary.open("wb")
         return self._file
 
@@ -53,10 +56,11 @@ class WholeFile:
 
     def abandon(self) -> None:
         """Remove what is not finished; nothing where all is."""
-        if self._file is None:
+        if not self._begun:
             return
-        with suppress(OSError):  # what is left in the buffer may not fit on the disk
-            self._file.close()
+        if self._file is not None:
+            with suppress(OSError):  # what is left in the buffer may not fit on the disk
+                self._file.close()
         with suppress(OSError):
             self._temporary.unlink()
 

@@ -49,7 +49,7 @@ def _verdict(record: Mapping[str, Any], source: Source) -> Verdict:
 
 def _span(place: str, source: Source) -> Span | None:
     name, *numbers = place.rsplit(":", 2)
-    if name != source.name or len(numbers) != 2:
+    if name != source.file_name or len(numbers) != 2:
         return None
     line, column = map(int, numbers)
     start = source.line_starts[line - 1] + column - 1

@@ -47,6 +47,7 @@ class QueryOptions:
         limit: Matches after which to stop; None for all.
         every: Whether frames that do not match are results too.
         all_matches: Whether every correspondence of a frame is a result of its own.
+        model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
     """
 
@@ -59,6 +60,7 @@ class QueryOptions:
     limit: int | None = None
     every: bool = False
     all_matches: bool = False
+    model: str | None = None
     strict: bool = False
 
 
@@ -110,6 +112,7 @@ class _Known:
     """What a query has found out once, for it and its copies with other recordings."""
 
     worlds: dict[str, CompiledMap] = field(default_factory=dict["str", "CompiledMap"])
+    lacking: dict[str, ScenarioError] = field(default_factory=dict["str", "ScenarioError"])
     extents: dict[str, list[Extent]] | None = None
     coverage: Coverage | None = None
 
@@ -150,6 +153,7 @@ class Query:
                 version=options.version,
                 initial=options.initial,
                 loader=beside(self.file or Path(self.source.name)),
+                model=options.model,
             )
         except ScenarioError as error:
             raise about_dataset(error, self.dataset, map_name) from None
@@ -183,32 +187,38 @@ class Query:
     def _worlds(self) -> dict[str, CompiledMap | Diagnostic]:
         """The scenario over each map, or what the map lacks; an error if it fits none."""
         self._check_ego()
-        found: dict[str, CompiledMap | Diagnostic] = {}
-        errors: list[ScenarioError] = []
+        lacking = self._known.lacking
         for name in self.dataset.maps:
+            if name in lacking:
+                continue
             try:
-                found[name] = self.world(name)
+                self.world(name)
             except ScenarioError as error:
                 if error.diagnostics[0].code != "map-lacks":
                     raise
-                errors.append(error)
-                found[name] = error.diagnostics[0]
+                lacking[name] = error
+        if lacking and len(lacking) == len(self.dataset.maps):
+            raise next(iter(lacking.values()))
+        told = {name: error.diagnostics[0] for name, error in lacking.items()}
+        return {name: told.get(name) or self.world(name) for name in self.dataset.maps}
+
+    def _warn(self, worlds: Mapping[str, CompiledMap | Diagnostic]) -> None:
+        """Note in the funnel what the author should know, and count the frames on maps that cannot match."""
+        for name, told in worlds.items():
+            if isinstance(told, Diagnostic):
                 count = self.dataset.manifest.by_map.get(name, Counts()).frames
-                message = f"{count} frames on map `{name}` cannot match: {error.diagnostics[0].message}"
+                message = f"{count} frames on map `{name}` cannot match: {told.message}"
                 self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
                 if here := self._frames(name):
                     self.funnel.frames += here
                     self.funnel.excluded[f"map {name}"] += here
-        if errors and len(errors) == len(found):
-            raise errors[0]
-        worlds = [world for world in found.values() if isinstance(world, CompiledMap)]
-        if worlds:
+        compiled = [world for world in worlds.values() if isinstance(world, CompiledMap)]
+        if compiled:
             compared = self.coverage()
-            self.funnel.warnings += [*compared.warnings, *_remarks(worlds[0].scenario)]
+            self.funnel.warnings += [*compared.warnings, *_remarks(compiled[0].scenario)]
             self.funnel.missing.update(compared.missing)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
-        return found
 
     def fitting(self, maps: Iterable[str] | None = None) -> Iterator[CompiledMap]:
         """The scenario over each map that it fits.
@@ -254,6 +264,11 @@ class Query:
         """The first and the last recording of a map that are looked at; None for all."""
         return None if self.recordings is None else (self.recordings[map_name].first, self.recordings[map_name].last)
 
+    def roles(self) -> tuple[str, ...]:
+        """Names of the scenario's objects, of all maps that it fits."""
+        worlds = [each.scenario for each in self._worlds().values() if isinstance(each, CompiledMap)]
+        return tuple(dict.fromkeys(thing.name for scenario in worlds for thing in scenario.objects))
+
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
         worlds = self._worlds().items()
@@ -298,6 +313,7 @@ class Query:
             ScenarioError: The program is wrong or not supported.
         """
         worlds = self._worlds()
+        self._warn(worlds)
         left, progress = self.options.limit, progress or _ignore
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())

@@ -41,6 +41,13 @@ def test_the_ranking_is_that_of_looking_at_every_frame(query):
         assert isinstance(Matcher(matcher.scenario, MatchOptions(tolerance=tolerance)).match(label), Match)
 
 
+def test_the_ranking_leaves_out_what_cannot_be_among_the_closest(query):
+    seen = []
+    ranked = nearest_misses(query, 1, progress=seen.append)
+    assert len(ranked) == 1
+    assert len(seen) < query.dataset.manifest.total.frames / 2
+
+
 def test_the_ranking_looks_at_so_many_frames_only(query):
     seen = []
     nearest_misses(query, 2, most_frames=5, progress=seen.append)
