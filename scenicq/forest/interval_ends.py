@@ -237,7 +237,8 @@ class _Arrays:
         return np.logical_not(a)
 
     def where(self, condition: Array, a: Array, b: Array) -> Array:
-        return np.where(condition, a, b)
+        chosen: Array = np.where(condition, a, b)
+        return chosen
 
 
 FLOATS: Ends[float] = _Floats()

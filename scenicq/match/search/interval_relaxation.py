@@ -90,11 +90,11 @@ def _meets(root: Node, target: tuple[Array, Array], radius: float, known: dict[i
         match node:
             case VectorSum():
                 sides = ((node.left, node.right), (node.right, node.left))
-                exact = next(((at, other) for one, other in sides if (at := _point(known[id(one)]))), None)
+                exact = next(((one, other) for one, other in sides if _is_point(known[id(one)])), None)
                 if exact is None:
                     break
-                (a, b), node = exact
-                x, y = x - a, y - b
+                at = cast("IntervalVector[Array]", known[id(exact[0])])
+                x, y, node = x - at.x.low, y - at.y.low, exact[1]
             case Rotate() if isinstance(angle := known[id(node.angle)], Interval) and angle.exact:
                 c, s = np.cos(angle.low), np.sin(angle.low)
                 x, y, node = x * c + y * s, y * c - x * s, node.vector
@@ -107,8 +107,6 @@ def _meets(root: Node, target: tuple[Array, Array], radius: float, known: dict[i
     return across & (box.y.low - radius <= y) & (y <= box.y.high + radius)
 
 
-def _point(value: Bounds[Array]) -> tuple[Array, Array] | None:
-    """A vector that is known for each candidate."""
-    if isinstance(value, IntervalVector) and value.x.exact and value.y.exact:
-        return value.x.low, value.y.low
-    return None
+def _is_point(value: Bounds[Array]) -> bool:
+    """Whether a vector is known for each candidate."""
+    return isinstance(value, IntervalVector) and value.x.exact and value.y.exact
