@@ -40,6 +40,7 @@ test: $(READY) ## All tests but the slow ones
 	$(PYTEST) -n $(WORKERS) -m 'not slow'
 
 test-all: $(READY) ## All tests
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev,notebook]'
 	$(PYTEST) -n $(WORKERS)
 
 golden: $(READY) ## Rewrite the golden files that tests compare with

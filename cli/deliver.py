@@ -66,7 +66,7 @@ def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wa
     close: list[Result] | None = None if report is None else []
     with destination(file, wanted.work) as sink, bar, contextlib.closing(results):
         with writing(file):
-            writer = make_writer(wanted.form, sink, query.roles, query.dataset)
+            writer = make_writer(wanted.form, sink, query.roles, query.dataset.short_frames)
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
                 writer.write(record(result))

@@ -15,7 +15,6 @@ from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.store.dataset import open_dataset
-from scenicq.store.frame_names import find_label
 
 from .main import NOTHING
 from .manual import Manual
@@ -56,7 +55,7 @@ def explain(
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
     query = Query(open_dataset(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
-    label = find_label(query.dataset, frame)
+    label = query.dataset.label(frame)
     show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)

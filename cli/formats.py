@@ -9,14 +9,11 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any, BinaryIO, Protocol
 
 import pyarrow.parquet as pq
 
 from scenicq.query.execution.result_tables import result_schema, result_table
-from scenicq.store.dataset import Dataset
-from scenicq.store.frame_names import shortened
 
 from .table import Table, Text
 
@@ -112,7 +109,10 @@ class _Parquet:
 
 
 def make_writer(
-    name: str, sink: BinaryIO, roles: Callable[[], Sequence[str]], dataset: Dataset | None = None
+    name: str,
+    sink: BinaryIO,
+    roles: Callable[[], Sequence[str]],
+    shorten: Callable[[], Callable[[str], str]] | None = None,
 ) -> Writer:
     """The writer of a format.
 
@@ -120,14 +120,14 @@ def make_writer(
         name: One of `FORMATS`.
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
-        dataset: Whose frames are told; a table cuts their names short where it would not fit.
+        shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
     """
     if name == "parquet":
         return _Parquet(sink, roles())
     text = Text(sink)
     match name:
         case "table":
-            return Table(text, None if dataset is None else partial(shortened, dataset))
+            return Table(text, shorten)
         case "csv":
             return _Csv(text)
         case "ids":

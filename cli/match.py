@@ -21,6 +21,7 @@ from scenicq.query.execution.shards import Engine, in_order, kept, run_here, sha
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.store.dataset import open_dataset
 
+from .advise import advise, is_nearly_empty
 from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
@@ -95,6 +96,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               "interchangeable objects in one order only.")
 @click.option("--near", metavar="K", type=click.IntRange(1), help="Show the K frames, too, that do not match but come "
               "closest, each with the tolerance under which it would.")
+@click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most, and how many frames each "
+              "single change of the program would leave. Without it, this is said where hardly any frame matches.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, parquet or ids.  [default: by the extension of FILE, else table on a terminal "
               "and jsonl in a pipe]")
@@ -124,7 +127,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.pass_context
 def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
           output: Path | None, export: tuple[str, Path] | None, near: int | None, report: Path | None,
-          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool,
+          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool, advised: bool,
           exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
@@ -171,6 +174,8 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         raise
     if pieces is not None:
         shutil.rmtree(pieces, ignore_errors=True)
+    if advised or (not quiet and query.options.limit is None and is_nearly_empty(query)):
+        advise(query, asked=advised)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 

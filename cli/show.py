@@ -20,7 +20,6 @@ from scenicq.report.picture import Shot, Style, draw
 from scenicq.report.png import can_make_png, png
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.store.dataset import Dataset, open_dataset
-from scenicq.store.frame_names import find_label
 from scenicq.store.labels import Label
 
 from .manual import Manual
@@ -106,7 +105,7 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
     file = None if output is None or str(output) == "-" else output
     kind = _kind(file)
     opened = open_dataset(dataset)
-    shot, backdrop = _shot(opened, find_label(opened, frame), scenario, given)
+    shot, backdrop = _shot(opened, opened.label(frame), scenario, given)
     picture = draw(shot, backdrop, half=half, pixels=width, style=_STYLES[kind], captioned=kind != ".html")
     match kind:
         case ".png":

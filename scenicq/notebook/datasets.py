@@ -18,7 +18,6 @@ from scenicq.notebook.matches import Matches
 from scenicq.query.execution.option_texts import OptionTexts, read_options
 from scenicq.query.execution.run import Query, read_program
 from scenicq.store.dataset import Dataset, open_dataset
-from scenicq.store.frame_names import find_label
 
 __all__ = ["OpenedDataset", "open"]
 
@@ -80,7 +79,7 @@ class OpenedDataset:
         Raises:
             DataError: option-invalid: there is no such frame.
         """
-        return Frame(self.dataset, find_label(self.dataset, frame))
+        return Frame(self.dataset, self.dataset.label(frame))
 
     def __contains__(self, frame: object) -> bool:
         """Whether there is a frame of that name."""

@@ -6,8 +6,8 @@ nothing: every connection is an in-memory database with views over the manifest'
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from scenicq.errors import DataError, Diagnostic, ScenicqError
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.store.frame_index import find_rows
+from scenicq.store.frame_names import find_frame, shortened
 from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
@@ -154,6 +155,23 @@ class Dataset:
                 hint = f"`scenicq info {self.name} --verify` reads all of it and names the files that have changed"
                 raise DataError(Diagnostic("store-damaged", message, hints=(hint,))) from error
             raise
+
+    def label(self, frame: str) -> Label:
+        """The label of a frame, which may be named by as much of its name as no other frame has.
+
+        Raises:
+            DataError: option-invalid: there is no such frame, or there are several.
+        """
+        for label in self.labels([frame]):
+            return label
+        with closing(self.connect()) as connection, self.blamed():
+            name = find_frame(connection, frame)
+        return next(self.labels([name]))
+
+    def short_frames(self) -> Callable[[str], str]:
+        """Cuts names of frames short, as far as `label` still finds them."""
+        with closing(self.connect()) as connection, self.blamed():
+            return shortened(connection)
 
     def labels_at(self, part: int, first: int, end: int) -> Iterator[Label]:
         """Labels of one part, in order.

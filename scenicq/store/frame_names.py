@@ -7,38 +7,33 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from contextlib import closing
 
 import duckdb
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.dataset import Dataset
-from scenicq.store.labels import Label
 
-__all__ = ["find_frame", "find_label", "shortened"]
+__all__ = ["find_frame", "shortened"]
 
 _SHORTEST = 6
 _SHOWN = 5
 
 
-def find_frame(dataset: Dataset, text: str) -> str:
+def find_frame(connection: duckdb.DuckDBPyConnection, text: str) -> str:
     """The frame of a name, or of the beginning of one.
 
     Args:
-        dataset: The dataset.
+        connection: To a dataset.
         text: A name, or as much of it, or of each of its parts, as no other frame has.
 
     Raises:
         DataError: option-invalid: there is no such frame, or there are several.
     """
-    parts = [re.escape(part) for part in text.split("/")]
-    pattern = "[^/]*/".join(parts) + ".*"
-    with closing(dataset.connect()) as connection, dataset.blamed():
-        rows = connection.execute(
-            "SELECT frame FROM labels WHERE frame = ? OR regexp_full_match(frame, ?, 's') "
-            "ORDER BY frame <> ?, frame LIMIT ?",
-            [text, pattern, text, _SHOWN + 1],
-        ).fetchall()
+    pattern = "[^/]*/".join(re.escape(part) for part in text.split("/")) + ".*"
+    rows = connection.execute(
+        "SELECT frame FROM labels WHERE frame = ? OR regexp_full_match(frame, ?, 's') "
+        "ORDER BY frame <> ?, frame LIMIT ?",
+        [text, pattern, text, _SHOWN + 1],
+    ).fetchall()
     found = [str(frame) for (frame,) in rows]
     if found and (found[0] == text or len(found) == 1):
         return found[0]
@@ -50,33 +45,20 @@ def find_frame(dataset: Dataset, text: str) -> str:
     raise DataError(Diagnostic("option-invalid", f"several frames begin with `{text}`", hints=(hint,)))
 
 
-def find_label(dataset: Dataset, text: str) -> Label:
-    """The label of a frame.
-
-    Args:
-        dataset: The dataset.
-        text: As of `find_frame`.
-
-    Raises:
-        DataError: option-invalid: there is no such frame, or there are several.
-    """
-    return next(dataset.labels([find_frame(dataset, text)]))
-
-
-def shortened(dataset: Dataset) -> Callable[[str], str]:
+def shortened(connection: duckdb.DuckDBPyConnection) -> Callable[[str], str]:
     """Cuts names of frames short, so that `find_frame` still finds them; all to the same length.
 
     Names that do not all have the same number of parts stay as they are.
+
+    Args:
+        connection: To a dataset.
     """
-    with closing(dataset.connect()) as connection, dataset.blamed():
-        rows = connection.execute("SELECT DISTINCT len(string_split(frame, '/')) FROM labels").fetchall()
-        if len(rows) != 1:
-            return str
-        parts = [f"string_split(frame, '/')[{number}]" for number in range(1, rows[0][0] + 1)]
-        lengths = [_shortest(connection, part) for part in parts]
-    return lambda frame: "/".join(
-        part[:length] for part, length in zip(frame.split("/"), lengths, strict=True)
-    )  # fmt: skip
+    rows = connection.execute("SELECT DISTINCT len(string_split(frame, '/')) FROM labels").fetchall()
+    if len(rows) != 1:
+        return str
+    parts = [f"string_split(frame, '/')[{number}]" for number in range(1, rows[0][0] + 1)]
+    lengths = [_shortest(connection, part) for part in parts]
+    return lambda frame: "/".join(part[:length] for part, length in zip(frame.split("/"), lengths, strict=True))
 
 
 def _shortest(connection: duckdb.DuckDBPyConnection, part: str) -> int:
