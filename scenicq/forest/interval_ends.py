@@ -237,8 +237,7 @@ class _Arrays:
         return np.logical_not(a)
 
     def where(self, condition: Array, a: Array, b: Array) -> Array:
-        chosen: Array = np.where(condition, a, b)
-        return chosen
+        return np.where(np.asarray(condition), a, b)
 
 
 FLOATS: Ends[float] = _Floats()
