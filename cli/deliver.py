@@ -18,6 +18,7 @@ from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target, write_report
+from scenicq.store.atomic_files import sole_writer
 
 from .formats import make_writer
 from .output import ProgressBar, destination, writing
@@ -52,16 +53,25 @@ def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wa
     """Take results, and then those that come close, and hand them on.
 
     Raises:
-        DataError: target-exists or target-unwritable.
+        DataError: target-exists, target-busy or target-unwritable.
     """
+    if wanted.report is None:
+        _deliver(query, results, near, wanted, bar)
+        return
+    check_target(wanted.report)
+    with sole_writer(wanted.report):
+        _deliver(query, results, near, wanted, bar)
+
+
+def _deliver(
+    query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar
+) -> None:
     started = time.perf_counter()
     unlisted = 0
     file, report = wanted.file, wanted.report
     exporter = None
     if wanted.export is not None:
         exporter = Exporter(wanted.export[0], query.dataset, wanted.export[1], Path(query.source.name).stem)
-    if report is not None:
-        check_target(report)
     shown: list[Result] | None = None if report is None else []
     close: list[Result] | None = None if report is None else []
     with destination(file, wanted.work) as sink, bar, contextlib.closing(results):

@@ -14,8 +14,8 @@ from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
-from scenicq.store.dataset import open_dataset
 
+from .datasets import open_checked
 from .main import NOTHING
 from .manual import Manual
 from .match import match
@@ -54,7 +54,7 @@ def explain(
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
-    query = Query(open_dataset(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
+    query = Query(open_checked(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
     label = query.dataset.label(frame)
     show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:

@@ -15,6 +15,8 @@ import pyarrow.parquet as pq
 
 from scenicq.query.execution.result_tables import result_schema, result_table
 
+from .report import CONTROL as _CONTROL
+from .report import plain
 from .table import Table, Text
 
 __all__ = ["FORMATS", "Writer", "make_writer"]
@@ -24,6 +26,8 @@ FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 
 _json = json.JSONEncoder(ensure_ascii=False).encode
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What makes a spreadsheet take a cell for a formula."""
 _COLUMNS: tuple[str, ...] = (
     "frame",
     "recording",
@@ -71,7 +75,20 @@ def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _name(record: Mapping[str, Any]) -> str | None:
-    return record["frame"] if record["verdict"] == "match" else None
+    return plain(record["frame"]).replace("\n", "\\n") if record["verdict"] == "match" else None
+
+
+def _escaped(record: Mapping[str, Any]) -> str:
+    """JSON in which nothing moves a cursor or turns text round; what it says is the same."""
+    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", _json(record))
+
+
+def _cell(value: Any) -> Any:
+    """A text that a terminal shows as it is, and that no spreadsheet takes for a formula."""
+    if not isinstance(value, str):
+        return value
+    shown = plain(value)
+    return f"'{shown}" if shown.startswith(_FORMULA) else shown
 
 
 class _Csv:
@@ -81,7 +98,7 @@ class _Csv:
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.writerow(_flat(record))
+        self._rows.writerow({name: _cell(value) for name, value in _flat(record).items()})
         self._text.flush()
 
     def finish(self) -> None:
@@ -133,4 +150,4 @@ def make_writer(
         case "ids":
             return _Lines(text, _name)
         case _:
-            return _Lines(text, _json)
+            return _Lines(text, _escaped)

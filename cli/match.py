@@ -14,14 +14,16 @@ from typing import Any
 
 import click
 
+from scenicq.errors import Diagnostic
 from scenicq.exporters.export import EXPORTS
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
-from scenicq.store.dataset import open_dataset
+from scenicq.store.atomic_files import sole_writer
 
 from .advise import advise, is_nearly_empty
+from .datasets import open_checked
 from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
@@ -34,6 +36,7 @@ from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
 from .programs import SCENARIO, given_program
 from .remarks import remarks, show_remarks
+from .report import show
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -41,7 +44,7 @@ __all__ = ["match"]
 
 def _near(query: Query, count: int | None) -> Iterator[Result]:
     """The frames that come closest, looked for once the matches are there."""
-    if count is not None:
+    if count is not None and not query.funnel.cut:
         yield from nearest_misses(query, count)
 
 
@@ -87,10 +90,12 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--jobs", metavar="N", type=click.IntRange(1), help="Processes that match.  [default: one a processor, "
               "at most 8, once it is clear that it takes long; with --shard 1]")
 @click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULTS.timeout_s,
-              help="Seconds for one question to the solver; then the frame is unknown.")
+              help="Seconds for one frame, the solver's included; then it is unknown.")
 @click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
               help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
 @click.option("--limit", metavar="N", type=click.IntRange(1), help="Stop after so many matches.")
+@click.option("--deadline", metavar="S", type=click.FloatRange(0, min_open=True), help="Stop after S seconds: what is "
+              "decided by then is written, the rest is counted, and `--resume` goes on.")
 @click.option("--all", "every", is_flag=True, help="Show frames that do not match, too, each with its cause.")
 @click.option("--all-matches", is_flag=True, help="One line for each correspondence by which a frame matches, "
               "interchangeable objects in one order only.")
@@ -126,9 +131,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
 def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
-          output: Path | None, export: tuple[str, Path] | None, near: int | None, report: Path | None,
-          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool, advised: bool,
-          exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
+          output: Path | None, export: tuple[str, Path] | None, near: int | None, deadline: float | None,
+          report: Path | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None,
+          explain: bool, advised: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames of a dataset that match a scenario.
 
@@ -141,7 +146,10 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
     source, target, model = given_program(ctx, program, scenario, dataset)
-    query = Query(open_dataset(target), source, query_options({**given, "model": model}))
+    options = query_options({**given, "model": model})
+    if deadline is not None:
+        options = replace(options, until=time.time() + deadline)
+    query = Query(open_checked(target), source, options)
     if explain:
         show_plan(query)
         return
@@ -165,18 +173,30 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         engine = kept(engine or run_here, pieces)
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
     results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
-    try:
-        deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
-    except BaseException:
-        if pieces is not None:
-            with contextlib.suppress(OSError):
-                pieces.rmdir()  # if nothing is done yet
-        raise
-    if pieces is not None:
-        shutil.rmtree(pieces, ignore_errors=True)
-    if advised or (not quiet and query.options.limit is None and is_nearly_empty(query)):
+    with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
+        try:
+            deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
+        except BaseException:
+            if pieces is not None:
+                with contextlib.suppress(OSError):
+                    pieces.rmdir()  # if nothing is done yet
+            raise
+        if pieces is not None and not query.funnel.cut:
+            shutil.rmtree(pieces, ignore_errors=True)
+    if query.funnel.cut:
+        _tell_cut(query, resume=resume)
+    whole = query.options.limit is None and not query.funnel.cut
+    if advised or (not quiet and whole and is_nearly_empty(query)):
         advise(query, asked=advised)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
+
+
+def _tell_cut(query: Query, *, resume: bool) -> None:
+    """Say that the time was over, also where no summary is printed."""
+    done, total = query.funnel.frames, query.dataset.manifest.total.frames
+    message = f"the deadline passed: {done:,} of {total:,} frames are decided, and the others are not in the results"
+    again = "the same command goes on from here" if resume else "`--resume` with `-o FILE` keeps what is done"
+    show([Diagnostic("deadline-passed", message, hints=(again,), severity="warning")])
 
 
 def _in_shard(ctx: click.Context, query: Query, shard: Shard, folder: Path | None, *, quiet: bool) -> None:

@@ -19,9 +19,10 @@ from scenicq.report.frames import frame_page
 from scenicq.report.picture import Shot, Style, draw
 from scenicq.report.png import can_make_png, png
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
-from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 
+from .datasets import open_checked
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
@@ -104,7 +105,7 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
     """
     file = None if output is None or str(output) == "-" else output
     kind = _kind(file)
-    opened = open_dataset(dataset)
+    opened = open_checked(dataset)
     shot, backdrop = _shot(opened, opened.label(frame), scenario, given)
     picture = draw(shot, backdrop, half=half, pixels=width, style=_STYLES[kind], captioned=kind != ".html")
     match kind:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -237,7 +237,7 @@ class _Arrays:
         return np.logical_not(a)
 
     def where(self, condition: Array, a: Array, b: Array) -> Array:
-        return np.where(np.asarray(condition), a, b)
+        return cast("Array", np.where(condition, a, b))
 
 
 FLOATS: Ends[float] = _Floats()

@@ -21,6 +21,8 @@ Shape: TypeAlias = BaseGeometry
 """Any shapely geometry."""
 XY: TypeAlias = tuple[float, float]
 """A point, in metres."""
+GeometryError = shapely.errors.ShapelyError
+"""Raised where shapes cannot be made or compared, such as those with coordinates that are not finite."""
 Bounds: TypeAlias = tuple[float, float, float, float]
 """A box: xmin, ymin, xmax, ymax."""
 Coordinates: TypeAlias = NDArray[np.float64]
@@ -148,6 +150,11 @@ def intersection(a: Shape, b: Shape) -> Shape:
         return shapely.intersection(a, b, grid_size=_GRID)
 
 
+def shared_areas(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
+    """What each pair of polygons has in common, in square metres."""
+    return shapely.area(shapely.intersection(a, b))
+
+
 def intersections(geometries: Sequence[Shape], window: Shape) -> list[Shape]:
     """What each geometry shares with another one."""
     return [intersection(each, window) for each in geometries]
@@ -199,6 +206,15 @@ def inner_point(shape: Shape) -> XY:
 def disc_polygon(x: float, y: float, radius: float, quarter: int = 16) -> Shape:
     """A polygon inscribed in a circle."""
     return cast(Shape, shapely.buffer(Point(x, y), radius, quad_segs=quarter))
+
+
+QUARTER_SEGMENTS = 16
+"""Sides of the polygon that stands for a quarter of a circle in `grown`."""
+
+
+def grown(shape: Shape, width: float) -> Shape:
+    """What lies within `width` metres of a shape, circles as polygons inside of them."""
+    return cast(Shape, shapely.buffer(shape, width, quad_segs=QUARTER_SEGMENTS))
 
 
 def band(shape: Shape, width: float) -> Shape:

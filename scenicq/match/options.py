@@ -35,7 +35,7 @@ class MatchOptions:
         enforce: Built-in requirements in force.
         exact: Whether the correspondence must cover all label objects.
         method: How groups are decided.
-        timeout_s: Seconds for one call of a solver.
+        timeout_s: Seconds for one label, our own work and the solver's together.
         precision: The solver's precision (δ).
         ignore_params: Global parameters that are not compared.
         budget: Steps of the correspondence search for one label.

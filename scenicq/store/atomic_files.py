@@ -8,7 +8,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["WholeFile", "sync_folder", "whole_file", "write_whole"]
+try:
+    import fcntl
+except ImportError:
+    fcntl = None
+
+from scenicq.errors import DataError, Diagnostic
+
+__all__ = ["WholeFile", "sole_writer", "sync_folder", "whole_file", "write_whole"]
 
 
 class WholeFile:
@@ -88,6 +95,47 @@ def write_whole(path: Path, text: str) -> None:
     """
     with whole_file(path) as file:
         file.write(text.encode())
+
+
+def _locked(handle: int) -> bool:
+    """Lock a folder; also true where its file system has no locks."""
+    try:
+        if fcntl is not None:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        pass
+    return True
+
+
+@contextmanager
+def sole_writer(folder: Path) -> Generator[None]:
+    """Hold a folder for writing, made if need be, so that a second run is told before it works.
+
+    The lock goes with the process, however that ends. A folder that was made and that nothing is in is removed again.
+
+    Raises:
+        DataError: target-busy: another process holds it; target-unwritable.
+    """
+    made = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = None if fcntl is None else os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        message = f"{folder} cannot be written: {error.strerror or error}"
+        raise DataError(Diagnostic("target-unwritable", message)) from None
+    try:
+        if handle is not None and not _locked(handle):
+            hint = "wait until it is done, or choose another target"
+            raise DataError(Diagnostic("target-busy", f"another run writes to {folder}", hints=(hint,)))
+        yield
+    finally:
+        if handle is not None:
+            os.close(handle)
+        if made:
+            with suppress(OSError):
+                folder.rmdir()
 
 
 def sync_folder(folder: Path) -> None:

@@ -24,6 +24,7 @@ from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
+from scenicq.store.soundness import check_dataset
 from scenicq.store.sql import sql_text
 
 __all__ = ["Dataset", "open_dataset"]
@@ -145,7 +146,7 @@ class Dataset:
         """
         try:
             yield
-        except ScenicqError:
+        except (ScenicqError, MemoryError):
             raise
         except Exception as error:
             if self.folder is not None:
@@ -201,14 +202,17 @@ class Dataset:
             raise DataError(problems)
 
 
-def open_dataset(address: str | Path) -> Dataset:
+def open_dataset(address: str | Path, *, check: bool = True) -> Dataset:
     """Open a dataset.
 
     Args:
         address: A folder, or what fsspec understands, such as `s3://bucket/dataset`.
+        check: Whether to read all of it and refuse one that is not sound. Only who knows that it is may do without:
+            what readers do with an unsound one is not defined.
 
     Raises:
         DataError: `store-missing`, `store-version`, or `store-damaged` where a file is missing or has another size;
+            `dataset-invalid` where the tables hold what no dataset may;
             `option-invalid` where a package for the address is not installed.
     """
     place = find_place(address)
@@ -216,7 +220,15 @@ def open_dataset(address: str | Path) -> Dataset:
     problems = place.problems(part for parts in manifest.tables.values() for part in parts)
     if problems:
         raise DataError(problems)
-    return Dataset(place, manifest)
+    dataset = Dataset(place, manifest)
+    if check:
+        try:
+            with dataset.blamed():
+                check_dataset(dataset)
+        except DataError:
+            dataset.verify()  # a file that was damaged since is another matter
+            raise
+    return dataset
 
 
 def _sql_list(texts: Iterable[str]) -> str:

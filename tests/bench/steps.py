@@ -39,7 +39,8 @@ from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
 from scenicq.match.problem.outcome import Undecided  # noqa: E402
-from scenicq.match.search import group_plan, label_search  # noqa: E402
+from scenicq.match.search import group_cache, group_plan, label_search  # noqa: E402
+from scenicq.match.search.first_fit import FirstFit  # noqa: E402
 from scenicq.match.tolerance import Tolerance  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
 
@@ -66,8 +67,10 @@ ON_MAP = {
     "figure 6, curb": PROGRAMS["figure 6"].replace("network.laneRegion", "curb"),
     "lane of a spot": "ego = new Car\nspot = new OrientedPoint in visible network.laneRegion\n"
     "other = new Car on network.laneAt(spot)",
+    "right edge": "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car on lane.centerline\n"
+    "spot = new OrientedPoint on lane.rightEdge\nother = new Car left of spot by 0.5, facing roadDirection",
     "one lane of many": "ego = new Car on Uniform(*network.lanes)\nother = new Car ahead of ego by Range(4, 10)",
-} | {name: CHAINS[name] for name in ("row of 12, one shift", "platoon", "platoon, one shift")} | {
+} | {name: CHAINS[name] for name in ("row of 12, one shift", "platoon")} | {
     name: PROGRAMS[name] for name in ("facing field", "badly parked", "follow", "figure 3")
 }  # fmt: skip
 TOLERANCE = Tolerance(position=0.25, heading=0.0873)
@@ -85,15 +88,16 @@ def _undecided(parts: Sequence[Sequence[Any]], *_: object) -> Undecided:
 
 
 STEPS: dict[str, Off] = {
-    "first fit": _set(Matcher, "_direct_for", lambda *_: None),
-    "closed forms": _set(group_plan, "closed_form_of", lambda group: None),
+    "first fit": _set(FirstFit, "fill", lambda *_: iter(())),
+    "closed forms": _set(group_plan, "closed_form_of", lambda *_: None),
     "arc consistency": _set(label_search, "thinned", lambda plan, candidates, *_: (candidates, None)),
     "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
     "decomposition": _set(label_search, "decide_decomposed", cascade.decide),
-    "case split": _set(decomposition, "picked", lambda *_: None),
+    "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
+    "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
     "heading propagation": _set(decomposition, "decide_directions", _undecided),
-    "one shared number": _set(decomposition, "_shared", lambda *_: None),
+    "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
 }
 
 

@@ -63,7 +63,7 @@ def test_our_own_mistakes_become_one_line_and_a_file(run, crossroads, monkeypatc
     def broken(_):
         raise ZeroDivisionError("a mistake of ours")
 
-    monkeypatch.setattr(scenicq_cli.info, "open_dataset", broken)
+    monkeypatch.setattr(scenicq_cli.info, "open_checked", broken)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     result = run("info", crossroads)
     assert result.exit_code == 2

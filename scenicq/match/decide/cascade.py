@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import cast
 
+from scenicq.budget import look
 from scenicq.forest import build
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.kinds import kind_of
@@ -73,6 +74,7 @@ class _Cascade:
             items: The constraints.
             given: Values chosen so far.
         """
+        look()
         open_items: list[Item] = []
         for item in items:
             if not isinstance(item[1], Constant):

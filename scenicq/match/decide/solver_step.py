@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from scenicq.budget import waiting
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.match.fields.field_solver import repaired
 from scenicq.match.options import MatchOptions
@@ -56,7 +57,8 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
         if attempt == 1:
             # what was left out to keep the question small may be what the witness breaks
             encoding = encoded(items, options)
-        answer = check_by_cases(solver, encoding.problem, precision=precision, timeout_s=options.timeout_s)
+        with waiting(options.timeout_s) as left_s:
+            answer = check_by_cases(solver, encoding.problem, precision=precision, timeout_s=left_s)
         match answer:
             case Unsat():
                 return Refuted(blame)
