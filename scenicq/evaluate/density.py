@@ -61,9 +61,8 @@ class GroupDensity:
     Attributes:
         group: The group, over the scenario as it is written.
         draws: Of hidden variables.
-        tolerances: Within which features must be that hang on finite choices alone, by property.
         fixed: Features without any random variable.
-        reason: Why there is no density, if there is none.
+        reason: What could not be computed last.
     """
 
     group: Group
