@@ -228,7 +228,7 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
 
     real = group_cache.decide_decomposed
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(group_plan, "closed_form_of", lambda _: None)
+        patch.setattr(group_plan, "closed_form_of", lambda *_: None)
         patch.setattr(group_cache, "decide_decomposed", decide)
         assert Matcher(scenario, MatchOptions(), Fixed(NoAnswer("timeout"))).match(label).correspondence["other"] == "b"
         lone = Matcher(scenario, MatchOptions(), Fixed(NoAnswer("timeout"))).match(frame(label.objects[0]))

@@ -15,21 +15,19 @@ from scenicq.forest import build
 from scenicq.forest.nodes import (
     ArithmeticOp,
     Constant,
-    DirectionAt,
     DiscreteRange,
     Index,
     Normal,
     PointIn,
     Select,
 )
-from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.regions import Disc, PointSet, PolygonSet, PolylineSet, Rectangle, intersection, union
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.solver_step import ask
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.smt.solver import open_solver
 
 small = st.floats(-20, 20).map(lambda x: round(x, 2))
@@ -162,7 +160,7 @@ def test_a_point_in_a_region_by_every_step(kind, shared, solver):
                 assert kind == "disc"
             else:
                 assert isinstance(outcome, expected), (x, y, outcome)
-            assert isinstance(ask([items], MatchOptions(), solver), expected), (x, y)
+            assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), expected), (x, y)
 
 
 def test_two_positions_of_one_spot_must_agree():
@@ -225,46 +223,6 @@ def test_very_many_choices_are_left_to_a_solver():
     assert isinstance(decide([compared("width", total, 450.25)], DEFAULT), Undecided)
 
 
-class Split:
-    """A field whose cell says too much: north in the left half, west in the right, in one cell for each."""
-
-    name = "split"
-
-    def values(self, x, y):
-        return (0.0,) if x <= 5 else (math.pi / 2,)
-
-    def cells(self, bounds):
-        square = np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)])
-        return [FieldCell(square, 0.0, exact=False), FieldCell(square, math.pi / 2, exact=False)]
-
-
-def split_items(x, heading):
-    spot = PointIn(c(Rectangle((5.0, 5.0), 0.0, 10.0, 10.0)))
-    return [
-        compared("position", build.vector_sum(spot, build.vector(between(-0.2, 0.2), c(0.0))), (x, 5.0)),
-        compared("heading", DirectionAt(c(Split()), spot), heading),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("x", "heading"), [(2.0, 0.0), (4.9, 0.0), (5.15, 0.0), (8.0, math.pi / 2), (4.85, math.pi / 2)]
-)
-def test_a_cell_that_covers_too_much_is_refined_until_a_witness_holds(x, heading):
-    assert isinstance(check(split_items(x, heading)), Satisfied)
-
-
-@pytest.mark.parametrize(("x", "heading"), [(8.0, 0.0), (5.25, 0.0), (4.7, math.pi / 2)])
-def test_a_cell_that_covers_too_much_proves_nothing(x, heading):
-    assert not isinstance(check(split_items(x, heading)), Satisfied)
-
-
-def test_a_decision_that_takes_too_many_linear_programs_is_left_to_a_solver(monkeypatch):
-    monkeypatch.setattr("scenicq.match.decide.cascade._MOST_PROGRAMS", 2)
-    found = check(split_items(5.15, 0.0))
-    assert isinstance(found, Undecided)
-    assert found.reason == "nonlinear"
-
-
 def test_distance_to_a_region_and_boxes_in_the_solver(solver):
     from scenicq.forest.groups import Condition
     from scenicq.forest.nodes import Compare, CompareOp, Distance, Encloses, Intersects, RectangleAt
@@ -275,7 +233,11 @@ def test_distance_to_a_region_and_boxes_in_the_solver(solver):
 
     def verdict(condition):
         return type(
-            ask([[at, (Condition(Requirement(condition, None), condition), condition, None)]], MatchOptions(), solver)
+            ask(
+                [[at, (Condition(Requirement(condition, None), condition), condition, None)]],
+                MatchOptions(tolerance=EXACT),
+                solver,
+            )
         )
 
     region = c(PolygonSet((Polygon([(4, -5), (9, -5), (9, 5), (4, 5)]),), "wall"))
@@ -296,8 +258,8 @@ def test_a_choice_of_words_in_the_solver(solver):
     weather = Select(Index((1.0, 2.0)), (Constant("sun"), Constant("rain")))
     for observed, expected in (("rain", Satisfied), ("sun", Satisfied), ("snow", Refuted)):
         items = [compared("weather", weather, observed)]
-        assert isinstance(ask([items], MatchOptions(), solver), expected)
-        assert isinstance(decide(items, Tolerance()), expected)
+        assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), expected)
+        assert isinstance(decide(items, EXACT), expected)
     for observed in (True, False):
         items = [compared("lit", Select(Index((1.0, 1.0)), (c(True), c(True))), observed)]
-        assert isinstance(ask([items], MatchOptions(), solver), Satisfied if observed else Refuted)
+        assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), Satisfied if observed else Refuted)
