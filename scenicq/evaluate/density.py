@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from scenicq.evaluate.expression_arrays import Array, ArrayValue, Pair, UncomputedError, evaluate_arrays
 from scenicq.evaluate.variables import Draws, density_of, point_density
-from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
+from scenicq.forest.groups import Comparison, Condition, Group
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
@@ -40,7 +40,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import children, leaves, postorder, rebuild
 
-__all__ = ["GroupDensity", "Observed", "about"]
+__all__ = ["GroupDensity", "Observed"]
 
 Reals = NDArray[np.float64]
 Observed = Mapping[tuple[int, str], Value]
@@ -61,9 +61,8 @@ class GroupDensity:
     Attributes:
         group: The group, over the scenario as it is written.
         draws: Of hidden variables.
-        tolerances: Within which features must be that hang on finite choices alone, by property.
         fixed: Features without any random variable.
-        reason: Why there is no density, if there is none.
+        reason: What could not be computed last.
     """
 
     group: Group
@@ -393,10 +392,3 @@ def _column(values: list[Value]) -> ArrayValue:
     if all(isinstance(value, bool | int | float) for value in values):
         return np.array(values, dtype=np.float64)[:, None]
     return np.array(values, dtype=object)[:, None]
-
-
-def about(compared: Comparison, names: Sequence[str]) -> str:
-    """A feature in the words of the program."""
-    if compared.object == PARAMS:
-        return f"param {compared.property}"
-    return f"{names[compared.object]}.{compared.property}"

@@ -31,6 +31,10 @@ SHOWN = 30
 """Frames of each scenario that are shown as pictures."""
 
 _NEAREST, _FARTHEST = 25.0, 60.0
+_SIGNS = (
+    "Pictures: label objects are green where they were found, red where they were missed, dotted where they do not "
+    "count; those in question have thick lines; predictions are dashed."
+)
 
 
 def write_pages(evaluation: Evaluation, dataset: Dataset, folder: Path, sensors: Path | None = None) -> Path:
@@ -110,6 +114,7 @@ class _Pages:
             )
             for one in worst
         ]
+        parts.append(element("p", escape(_SIGNS), class_="hint"))
         parts.append(table("Worst frames", ("frame", "recording", "missed", "false boxes"), links))
         yield element("section", *parts)
         for one in worst:

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.evaluate.density import GroupDensity, Observed, about
+from scenicq.evaluate.density import GroupDensity, Observed
 from scenicq.evaluate.expression_arrays import UncomputedError
 from scenicq.evaluate.variables import Draws
-from scenicq.forest.groups import PARAMS
+from scenicq.forest.groups import PARAMS, Comparison
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
@@ -84,7 +84,7 @@ def _of_one_signature(
     counted = False
     for group in build_groups(scenario, signature, options):
         each = GroupDensity(group, shared)
-        fixed += [about(compared, names) for compared in each.fixed]
+        fixed += [_about(compared, names) for compared in each.fixed]
         if each.trivial:
             continue
         counted = True
@@ -103,6 +103,13 @@ def _of_one_signature(
         else LogDensity(None, 0, tuple(fixed), outside)
         for log, error in zip(logs, errors, strict=True)
     ]
+
+
+def _about(compared: Comparison, names: Sequence[str]) -> str:
+    """A feature in the words of the program."""
+    if compared.object == PARAMS:
+        return f"param {compared.property}"
+    return f"{names[compared.object]}.{compared.property}"
 
 
 def densities(query: Query, results: Sequence[Result]) -> list[LogDensity | None]:
