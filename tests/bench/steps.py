@@ -97,8 +97,8 @@ STEPS: dict[str, Off] = {
     "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
     "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
-    "case split by regions": _set(decomposition, "picked", lambda *_: None),
-    "case split by fields": _set(decomposition, "field_options", lambda *_: None),
+    "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
+    "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
     "heading propagation": _set(decomposition, "decide_directions", _undecided),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
 }

@@ -1,7 +1,7 @@
 """A group decided part by part: constraints that share no random variable are decided separately.
 
-What one part excludes is excluded; where a point lies in one of many regions, each region that is near is a case of its
-own; fields at hidden points go to heading propagation, where parts that one random number alone joins stay parts.
+What one part excludes is excluded; distances of hidden points become areas; fields at hidden points go to heading
+propagation, where parts that one random number alone joins stay parts.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Range, TruncatedNormal, Value
 from scenicq.forest.walk import leaves, postorder
 from scenicq.match.decide.cascade import decide
-from scenicq.match.decide.case_split import Picked, field_options, picked
+from scenicq.match.decide.hidden_distances import with_areas
 from scenicq.match.fields.field_solver import decide_directions
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.problem.conditioned import Item
@@ -39,11 +39,14 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
     alone = _components(left, used, None)
     if len(alone) > 1:
         return _all(alone, items, tolerance)
-    cases = picked(left, tolerance)
-    if cases is None:
-        cases = field_options(left)
-    if cases is not None:
-        return _any(cases, items, tolerance)
+    outlined = with_areas(left, tolerance)
+    if outlined is not None:
+        found = decide_decomposed(outlined, tolerance)
+        if not isinstance(found, Satisfied) or replay(items, found.values, tolerance, SLACK):
+            return found
+        found = decide_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance)
+        sure = isinstance(found, Satisfied) and replay(items, found.values, tolerance, SLACK)
+        return found if sure else Undecided(items[0][0], "nonlinear")
     if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in left])):
         shared = _shared(left, used)
         parts, number = ([left], None) if shared is None else (shared[2], shared[0].identity)
@@ -66,21 +69,6 @@ def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance) -
     if doubt is not None:
         return doubt
     return Satisfied(values) if replay(items, values, tolerance, SLACK) else Undecided(items[0][0], "nonlinear")
-
-
-def _any(cases: Sequence[Picked], items: list[Item], tolerance: Tolerance) -> Outcome:
-    """Whether a solution is left in one of some cases."""
-    first = items[0][0]
-    blamed: Outcome = Refuted(first)
-    for case in cases:
-        outcome = decide_decomposed(case.items, tolerance)
-        if isinstance(outcome, Satisfied):
-            values = {**case.given, **outcome.values}
-            if replay(items, values, tolerance, SLACK):
-                return Satisfied(values)
-        if not isinstance(outcome, Refuted):
-            blamed = Undecided(first, "nonlinear")
-    return blamed
 
 
 def _components(

@@ -21,6 +21,7 @@ from scenicq.match.problem.conditioned import Item, condition_group
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.problem.radius import within_radius
+from scenicq.match.search.choice_search import decide_with_choices
 from scenicq.match.search.group_plan import GroupPlan
 
 __all__ = ["Asker", "GroupCache", "translated"]
@@ -90,7 +91,11 @@ class GroupCache:
             items = self.items(group, assignment)
             if self.options.method == "smt":
                 return self.ask([items])
-            outcome = decide_decomposed(items, self.options.tolerance)
+            tolerance = self.options.tolerance
+            chosen = decide_with_choices(items, tolerance, lambda left: decide_decomposed(left, tolerance), self.ask)
+            if chosen is not None:
+                return chosen
+            outcome = decide_decomposed(items, tolerance)
             return self.ask([items]) if isinstance(outcome, Undecided) else outcome
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")

@@ -17,6 +17,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.verdict import Verdict
+from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.executor import Block, Candidate, candidates, names, run_prefilter
@@ -78,6 +79,7 @@ class Decider:
         threads: Of the database.
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
+        until: When the time is over; see `check_deadline`.
     """
 
     dataset: Dataset
@@ -87,6 +89,7 @@ class Decider:
     threads: int | None
     all_matches: bool
     every: bool
+    until: float | None = None
     _worlds: dict[str, tuple[CompiledMap, Matcher]] = field(default_factory=dict["str", "tuple[CompiledMap, Matcher]"])
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
@@ -105,7 +108,9 @@ class Decider:
 
         Raises:
             ScenarioError: The program does not fit the map.
+            DeadlineError: The time is over; while results are taken, too.
         """
+        check_deadline(self.until)
         if self._connection is None:
             self._connection = self.dataset.connect(threads=self.threads)
             self._open.callback(self._connection.close)
@@ -133,6 +138,7 @@ class Decider:
             else:
                 verdicts = ([verdict] for verdict in matcher.match_all(labels))
             for (label, _), found in zip(labels, verdicts, strict=True):
+                check_deadline(self.until)
                 yield [Result(label.frame, label.recording, label.timestamp_us, each, label.sensors) for each in found]
             size = _BATCH
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Se
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal, TypeVar, cast
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
 from scenicq.query.execution.compiled_map import about_dataset, map_remark
+from scenicq.query.execution.deadline import DeadlineError
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names
@@ -49,6 +50,7 @@ class QueryOptions:
         all_matches: Whether every correspondence of a frame is a result of its own.
         model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
+        until: When the time is over, in seconds since 1970; None for never. What is decided by then are the results.
     """
 
     match: MatchOptions = MatchOptions()
@@ -62,6 +64,7 @@ class QueryOptions:
     all_matches: bool = False
     model: str | None = None
     strict: bool = False
+    until: float | None = None
 
 
 def read_program(path: str | Path) -> Source:
@@ -301,6 +304,7 @@ class Query:
             threads=threads,
             all_matches=options.all_matches,
             every=options.every,
+            until=options.until,
         )
 
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
@@ -335,6 +339,8 @@ class Query:
                             left -= 1
                             if left <= 0:
                                 return
+                if self.funnel.cut:
+                    return
 
     def _lacking(self, map_name: str, told: Diagnostic, progress: Callable[[int], None]) -> Iterator[Result]:
         """The frames of a map that lacks what the program needs, which are counted already."""
@@ -347,14 +353,19 @@ class Query:
         progress(self._frames(map_name))
 
     def _merge(self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]) -> Generator[Result]:
-        for block in decided:
-            found = iter(block.found)
+        for block in _until_deadline(decided, self.funnel):
+            found = _until_deadline(block.found, self.funnel)
             start = 0
             try:
                 for place in np.flatnonzero(block.missed < 0).tolist():
                     if self.options.every:
                         yield from _excluded(plan, block, start, place)
-                    first, *more = next(found)
+                    verdicts = next(found, None)
+                    if verdicts is None:
+                        # the time was over in another process
+                        self.funnel.cut = True
+                        return
+                    first, *more = verdicts
                     self.funnel.count(first.verdict)
                     progress(place + 1 - start)
                     start = place + 1
@@ -371,6 +382,17 @@ class Query:
                 for step, count in enumerate(np.bincount(past[past >= 0], minlength=len(plan.steps)).tolist()):
                     if count:
                         self.funnel.exclude(plan.steps[step].what, count)
+
+
+_Item = TypeVar("_Item")
+
+
+def _until_deadline(found: Iterable[_Item], funnel: Funnel) -> Iterator[_Item]:
+    """What comes before the time is over."""
+    try:
+        yield from found
+    except DeadlineError:
+        funnel.cut = True
 
 
 def _excluded(plan: Plan, block: Decided, start: int, end: int) -> Iterator[Result]:
@@ -409,6 +431,6 @@ def _start_worker(
 
     def work(block: Block, _tell: Callable[[object], None]) -> Decided:
         decided = decider.decide(block)
-        return replace(decided, found=list(decided.found))
+        return replace(decided, found=list(_until_deadline(decided.found, Funnel())))
 
     return work
