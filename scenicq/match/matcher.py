@@ -31,7 +31,7 @@ from scenicq.match.search.batch_lookups import look_up_positions
 from scenicq.match.search.first_fit import FirstFit, Row, first_fit_of, signature_of
 from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
 from scenicq.match.search.label_search import LabelSearch
-from scenicq.match.search.verdict_builder import VerdictBuilder
+from scenicq.match.search.verdict_builder import Ended, VerdictBuilder
 from scenicq.match.verdict import Cause, Match, Verdict
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -100,10 +100,10 @@ class Matcher:
             label: The label.
             among: As of `match`.
         """
-        findings = self._findings(label, MapLookups(), None, {}, among)
+        found = self._findings(label, MapLookups(), None, {}, among)
         while True:
             with limited(self.options.timeout_s):
-                finding = next(findings, None)
+                finding = next(found, None)
             if finding is None:
                 return
             if isinstance(finding.verdict, Match):
@@ -144,16 +144,16 @@ class Matcher:
     ) -> Iterator[Verdict]:
         """The verdicts of labels: by first fit side by side, else each by a search of its own."""
         found: dict[int, Match] = {}
-        for fit, rows in self._batches(labels, given).items():
-            # labels that are left when the time is up are searched for, each on a clock of its own
-            with suppress(TimeIsUp), limited(self.options.timeout_s * len(rows)):
+        with suppress(TimeIsUp), limited(self.options.timeout_s * len(labels)):
+            for fit, rows in self._batches(labels, given).items():
                 for batch in fit.fill(rows, self.options, lookups):
                     found.update(self._verdicts.matches(fit, batch))
         for place, (label, among) in enumerate(labels):
-            verdict: Verdict | None = found.get(place)
-            if verdict is None:
-                with limited(self.options.timeout_s):
-                    verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
+            if place in found:
+                yield found[place]
+                continue
+            with limited(self.options.timeout_s):
+                verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
             yield verdict
 
     def _batches(
@@ -196,16 +196,18 @@ class Matcher:
                 rest.append((0, Finding(self._verdicts.excluded(label, ego, roles))))
                 continue
             search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups)
-            exhausted: Exhausted | TimeIsUp | None = None
+            ended: Ended | None = None
             try:
                 for signature, candidates in roles.signatures(self._relevant):
                     plan = self.plan(signature)
                     for solution in search.solutions(plan, candidates):
                         matched = True
                         yield Finding(self._verdicts.match(label, solution), search, plan, solution.assignment)
-            except (Exhausted, TimeIsUp) as error:
-                exhausted = error
-            weight, verdict = self._verdicts.without_match(label, search, exhausted)
+            except Exhausted:
+                ended = "budget"
+            except TimeIsUp:
+                ended = "timeout"
+            weight, verdict = self._verdicts.without_match(label, search, ended)
             rest.append((weight, Finding(verdict, search)))
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest

@@ -97,7 +97,7 @@ STEPS: dict[str, Off] = {
     "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
     "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
-    "choice search": _set(group_cache, "decide_with_choices", lambda *_, **__: None),
+    "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
     "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
     "heading propagation": _set(decomposition, "decide_directions", _undecided),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
