@@ -17,6 +17,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.verdict import Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
@@ -27,6 +28,8 @@ from scenicq.store.labels import Label
 
 _FIRST_BATCH, _BATCH = 16, 512
 """Labels whose places are looked up together: few until it is known what matters."""
+_MOTION = frozenset({"speed", "velocity", "angularSpeed", "acceleration"})
+"""Properties that the store computes of tracks."""
 
 __all__ = ["CompiledMap", "Decided", "Decider", "every_label"]
 
@@ -39,17 +42,20 @@ class CompiledMap:
         scenario: The scenario.
         network: The map.
         plan: The prefilter.
+        motion: Whether the scenario reads observed motion.
     """
 
     scenario: Scenario
     network: Network
     plan: Plan
+    motion: bool = True
 
     @classmethod
     def of(cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool) -> CompiledMap:
         """With its prefilter, or one that excludes nothing."""
         plan = make_plan(scenario, network, options) if prefilter else Plan(network.name, (), (), ())
-        return cls(scenario, network, plan)
+        motion = any(_MOTION & names for names in relevant_properties(scenario, options))
+        return cls(scenario, network, plan, motion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,11 +122,11 @@ class Decider:
             self._worlds[block.map] = world, Matcher(world.scenario, self.options, self._solver)
         world, matcher = self._worlds[block.map]
         if not world.plan.stages:
-            labels = [Candidate(label, None) for label in every_label(self.dataset, block)]
+            labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=world.motion)]
             return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
         missed = run_prefilter(self.dataset, self._connection, world.plan, block)
         named = names(self.dataset, self._connection, block) if self.every else []
-        left = candidates(self._connection, world.plan) if (missed < 0).any() else iter(())
+        left = candidates(self._connection, world.plan, motion=world.motion) if (missed < 0).any() else iter(())
         return Decided(missed, self._matched(matcher, left), named)
 
     def _matched(self, matcher: Matcher, left: Iterator[Candidate]) -> Iterator[list[Result]]:
@@ -145,11 +151,11 @@ def _every_match(matcher: Matcher, label: Label, among: Candidates | None, place
     return matches or [matcher.match(label, among=among, places=places)]
 
 
-def every_label(dataset: Dataset, block: Block) -> Iterator[Label]:
+def every_label(dataset: Dataset, block: Block, *, motion: bool = False) -> Iterator[Label]:
     """The labels of a block, read without the database."""
     first, last = block.recordings or ("", None)
     return (
         label
-        for label in dataset.labels_at(block.part, block.first, block.end)
+        for label in dataset.labels_at(block.part, block.first, block.end, motion=motion)
         if label.map == block.map and label.recording >= first and (last is None or label.recording <= last)
     )

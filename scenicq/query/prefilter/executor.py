@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, Plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
-from scenicq.store.reader import EGO_COLUMNS, LABEL_COLUMNS, OBJECT_COLUMNS, assemble
+from scenicq.store.reader import EGO_COLUMNS, LABEL_COLUMNS, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
 from scenicq.store.schema import ArrowTable
 from scenicq.store.sql import sql_text
 
@@ -192,16 +192,18 @@ def names(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block)
     return connection.execute(f"SELECT frame, recording, timestamp_us FROM {LABELS} ORDER BY number").fetchall()
 
 
-def candidates(connection: duckdb.DuckDBPyConnection, plan: Plan) -> Iterator[Candidate]:
+def candidates(connection: duckdb.DuckDBPyConnection, plan: Plan, *, motion: bool = False) -> Iterator[Candidate]:
     """The labels that are left of the block that was sifted last, in order.
 
     Args:
         connection: The one that sifted.
         plan: The plan.
+        motion: Whether what is computed of motion is read, too.
     """
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
-    of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *EGO_COLUMNS))
-    of_objects = ", ".join(f"a.{name}" for name in OBJECT_COLUMNS)
+    more = MOTION_COLUMNS if motion else []
+    of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *EGO_COLUMNS, *(f"ego_{name}" for name in more)))
+    of_objects = ", ".join(f"a.{name}" for name in (*OBJECT_COLUMNS, *more))
     frames = _rows(connection, f"SELECT l.number, {of_frames} FROM {LABELS} l WHERE l.number IN {left} ORDER BY 1")
     mine = f"JOIN {LABELS} l ON s.frame = l.frame WHERE l.number IN {left} ORDER BY s.number"
     sensors = _rows(connection, f"SELECT s.channel, s.path FROM {_SENSORS} s {mine}")
