@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from scenicq.compiler.program import compile_scenario
-from scenicq.query.execution.run import beside, read_program
 from scenicq.exporters.sample import sample_labels, sample_record, write_sample
+from scenicq.query.execution.run import beside, read_program
 
 from .check import networks_of, read_version
 from .manual import Manual

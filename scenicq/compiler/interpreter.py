@@ -26,10 +26,13 @@ from scenicq.compiler.imports import import_into
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import decided
 from scenicq.compiler.logic import condition
+from scenicq.compiler.monitors import MonitorCall, MonitorDefinition
 from scenicq.compiler.placing import Surroundings, bind
 from scenicq.compiler.requirements import Requirement, requirement
 from scenicq.compiler.scoping import own_names
 from scenicq.compiler.specifiers import construct
+from scenicq.compiler.temporal import TimedStatements
+from scenicq.compiler.timed_statements import leave_out, timed_statement
 from scenicq.compiler.values import (
     Choice,
     Delayed,
@@ -80,6 +83,7 @@ class Interpreter:
         initial: Whether dynamic parts are ignored rather than refused.
         load: Resolves an import or model: its dotted name and place to a module.
         network: The road network.
+        timed: Takes what is said about time; None for a program that is matched at one instant.
     """
 
     version: int
@@ -92,6 +96,7 @@ class Interpreter:
     params: dict[str, tuple[ModelValue, Span, bool]] = field(default_factory=dict[str, Any])
     excluded: Exclusions = field(default_factory=Exclusions)
     lookups: Lookups = field(default_factory=Lookups)
+    timed: TimedStatements | None = None
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
     workspace: Node = field(default_factory=lambda: build.constant(Everywhere()))
@@ -145,6 +150,8 @@ class Interpreter:
     ) -> ModelValue:
         """Call a function; see `Runner`."""
         given = bind_arguments(function, args, named, span)
+        if isinstance(function, MonitorDefinition):
+            return MonitorCall(function, given)
         scope = Environment(given, cast(Environment, function.environment), own=self._own_names(function))
         self.budget.enter(span)
         try:
@@ -285,6 +292,8 @@ class Interpreter:
                 self._share(node, scope)
             case ast.Simulator():
                 self.dynamic("simulator", node.span)
+            case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor() if self.timed is not None:
+                timed_statement(self, self.timed, node, scope)
             case ast.DynamicStatement() | ast.DynamicDefinition():
                 self.dynamic(node.kind, node.span)
                 if isinstance(node, ast.DynamicDefinition) and node.name:
@@ -314,6 +323,9 @@ class Interpreter:
         Raises:
             ScenarioError: unsupported-construct, unless dynamic parts are to be ignored.
         """
+        if self.timed is not None:
+            leave_out(self.timed, self.ignored, kind, span)
+            return
         found = Diagnostic(
             "unsupported-construct",
             f"`{kind}` is not supported",

@@ -26,6 +26,7 @@ from scenicq.compiler.models import (
 )
 from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
+from scenicq.compiler.temporal import Behaviors, TimedStatements
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, fail, is_node
 from scenicq.compiler.version_detection import decide_version
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
@@ -51,6 +52,7 @@ def compile_scenario(
     *,
     version: int | None = None,
     initial: bool = False,
+    behaviors: Behaviors | None = None,
     loader: Loader | None = None,
 ) -> Scenario:
     """Compile a program against a map.
@@ -60,6 +62,8 @@ def compile_scenario(
         network: The road network of the map.
         version: 1, 2 or 3; inferred from the spelling if not given.
         initial: Ignore dynamic parts instead of refusing them.
+        behaviors: What becomes of behaviors, where the scenario is to be matched over time; None where it is about one
+            instant, and all dynamic parts are refused or ignored.
         loader: Reads files that the program imports.
 
     Raises:
@@ -69,6 +73,7 @@ def compile_scenario(
     chosen = decide_version(module)
     world = _World(network, chosen, initial, loader)
     run = world.interpreter
+    run.timed = None if initial or behaviors is None else TimedStatements(behaviors)
     try:
         library = _left_out(module, chosen)
         names = {} if library is None else dict(world.load(library, 0, _start(source)).names)
@@ -217,7 +222,8 @@ def _scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
         tuple(Requirement(each.condition(), each.span, probability=each.probability) for each in soft),
-        tuple(run.ignored), warnings,
+        tuple(run.ignored), (*warnings, *(run.timed.remarks() if run.timed is not None else ())),
+        dynamics=run.timed.dynamics() if run.timed is not None else None,
     )  # fmt: skip
 
 
@@ -233,10 +239,15 @@ def _names(objects: list[Instance]) -> list[str]:
     return names
 
 
+_SCALARS = frozenset(
+    ("heading", "width", "length", "height", "speed", "angularSpeed", "acceleration", "visibleDistance", "viewAngle")
+)
+
+
 def _property(name: str, value: ModelValue, span: Span | None) -> Node | None:
     if name in ("position", "velocity"):
         return to_vector(value, span)
-    if name in ("heading", "width", "length", "height", "speed", "visibleDistance", "viewAngle"):
+    if name in _SCALARS:
         return to_scalar(value, span)
     if name == "regionContainedIn" and value is not None:
         return to_region(value, span)

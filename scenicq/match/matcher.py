@@ -170,6 +170,21 @@ class Matcher:
         """Decide one label and keep what the verdict rests on."""
         return next(self._findings(label, None, {}))
 
+    def findings(
+        self, label: Label, *, among: Candidates | None = None, places: MapLookups | None = None
+    ) -> Iterator[Finding]:
+        """Every correspondence by which a label matches; of interchangeable objects, one order only.
+
+        Then, or where there is none, what is not a match: one finding for each choice of the ego that leaves something
+        undecided, and where nothing matches the one finding of `examine`.
+
+        Args:
+            label: The label.
+            among: What is known of who may play whom.
+            places: What is known of places of the map; see `look_up`.
+        """
+        return self._findings(label, None, {}, among, places, rest_too=True)
+
     def relaxed(self, options: MatchOptions) -> Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared."""
         return Matcher(self.scenario, options, self.solver, self._plans, self._kinds)
@@ -243,8 +258,10 @@ class Matcher:
         given: Mapping[str, str],
         among: Candidates | None = None,
         places: MapLookups | None = None,
+        *,
+        rest_too: bool = False,
     ) -> Iterator[Finding]:
-        """Matches, or else the one verdict that there is."""
+        """Matches, or else the one verdict that there is; after matches, what is undecided, if that is wanted, too."""
         matched = False
         rest: list[tuple[int, Finding]] = []
         for ego in egos(self.scenario, label, self.options):
@@ -267,6 +284,8 @@ class Matcher:
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest
             yield max(rest, key=lambda each: each[0], default=(0, Finding(NoMatch(self._without_ego()))))[1]
+        elif rest_too:
+            yield from (finding for _, finding in rest if isinstance(finding.verdict, Unknown))
 
     def _without_ego(self) -> Cause:
         thing = self.scenario.objects[self.scenario.ego]

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -123,6 +123,10 @@ class TrackReader:
         """Close the files."""
         self._labels.close()
         self._objects.close()
+
+    def names(self, rows: Sequence[int]) -> list[str]:
+        """The recordings of some rows of `labels`, in order."""
+        return self._labels.take(np.array(rows, dtype=np.int64))["recording"].to_pylist()
 
     def read(self, first: int, end: int) -> RecordingTracks:
         """The recording whose labels are in some rows, the end left out."""

@@ -20,11 +20,13 @@ from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.verdict import Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.executor import Block, Candidate, candidates, names, run_prefilter
 from scenicq.query.prefilter.plan import Plan, make_plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
+from scenicq.temporal.intervals import IntervalMatcher, IntervalOptions
 
 _FIRST_BATCH, _BATCH = 16, 512
 """Labels whose places are looked up together: few until it is known what matters."""
@@ -66,11 +68,13 @@ class Decided:
         missed: For each frame in order the number of the plan's step that excludes it, -1 for candidates.
         found: For each candidate in order its results, at least one.
         names: Frame, recording and timestamp of every frame, if asked for.
+        recordings: Of a query over time, what became of the recordings; then nothing is found of single candidates.
     """
 
     missed: NDArray[np.int16]
     found: Iterator[list[Result]] | list[list[Result]]
     names: list[tuple[str, str, int]]
+    recordings: DecidedRecordings | None = None
 
 
 @dataclass(slots=True)
@@ -85,6 +89,7 @@ class Decider:
         threads: Of the database.
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
+        time: Options of a query over time.
     """
 
     dataset: Dataset
@@ -94,6 +99,7 @@ class Decider:
     threads: int | None
     all_matches: bool
     every: bool
+    time: IntervalOptions = IntervalOptions()
     _worlds: dict[str, tuple[CompiledMap, Matcher]] = field(default_factory=dict["str", "tuple[CompiledMap, Matcher]"])
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
@@ -121,6 +127,8 @@ class Decider:
             world = self.world(block.map)
             self._worlds[block.map] = world, Matcher(world.scenario, self.options, self._solver)
         world, matcher = self._worlds[block.map]
+        if block.runs:
+            return self._recordings(world, matcher, block)
         if not world.plan.stages:
             labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=world.motion)]
             return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
@@ -128,6 +136,21 @@ class Decider:
         named = names(self.dataset, self._connection, block) if self.every else []
         left = candidates(self._connection, world.plan, motion=world.motion) if (missed < 0).any() else iter(())
         return Decided(missed, self._matched(matcher, left), named)
+
+    def _recordings(self, world: CompiledMap, matcher: Matcher, block: Block) -> Decided:
+        """Decide a block of whole recordings over time."""
+        assert self._connection is not None
+        intervals = IntervalMatcher(world.scenario, self.options, self.time, self._solver)
+        recordings = RecordingMatcher(self.dataset, matcher, intervals)
+        if not world.plan.stages:
+            labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=world.motion)]
+            missed, left = np.full(len(labels), -1, np.int16), iter(labels)
+        else:
+            missed = run_prefilter(self.dataset, self._connection, world.plan, block)
+            left = iter(())
+            if (missed < 0).any():
+                left = candidates(self._connection, world.plan, motion=world.motion)
+        return Decided(missed, [], [], recordings.decide(block, left))
 
     def _matched(self, matcher: Matcher, left: Iterator[Candidate]) -> Iterator[list[Result]]:
         """The results of labels, whose places are looked up so many at a time."""

@@ -10,17 +10,35 @@ from typing import Any
 from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
 
-__all__ = ["Funnel", "Result", "record"]
+__all__ = ["Funnel", "IntervalSpan", "Result", "record"]
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalSpan:
+    """How far an interval goes on from its first frame.
+
+    Attributes:
+        last: Its last frame.
+        end_us: The timestamp of that.
+        count: How many frames it has.
+        open_ended: Whether the program does not say when it ends.
+    """
+
+    last: str
+    end_us: int
+    count: int
+    open_ended: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """The verdict on one frame.
+    """The verdict on one frame, or on an interval of a recording.
 
     Attributes:
-        frame, recording, timestamp_us: Which frame.
-        verdict: The verdict.
+        frame, recording, timestamp_us: Which frame; the first of an interval.
+        verdict: The verdict. That on an interval names tracks.
         sensors: Path of the sensor file of each channel; empty for frames that the prefilter excluded.
+        interval: How far the interval goes on; None for a frame.
     """
 
     frame: str
@@ -28,10 +46,11 @@ class Result:
     timestamp_us: int
     verdict: Verdict
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
+    interval: IntervalSpan | None = None
 
-    def __reduce__(self) -> tuple[type[Result], tuple[str, str, int, Verdict, Mapping[str, str]]]:
+    def __reduce__(self) -> tuple[type[Result], tuple[Any, ...]]:
         """Pickled as a call, which takes half the time."""
-        return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors)
+        return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
 
 
 def _cause(cause: Cause) -> dict[str, Any]:
@@ -43,14 +62,7 @@ def record(result: Result) -> dict[str, Any]:
     """A result as plain values with stable keys in a stable order, ready for JSON."""
     verdict = result.verdict
     name = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}[type(verdict)]
-    found: dict[str, Any] = {
-        "frame": result.frame,
-        "recording": result.recording,
-        "timestamp_us": result.timestamp_us,
-        "verdict": name,
-        "correspondence": {},
-        "witness": {},
-    }
+    found = {**_which(result), "verdict": name, "correspondence": {}, "witness": {}}
     match verdict:
         case Match():
             found["correspondence"] = dict(verdict.correspondence)
@@ -61,8 +73,23 @@ def record(result: Result) -> dict[str, Any]:
         case NoMatch():
             found["correspondence"] = dict(verdict.partial)
             found["cause"] = _cause(verdict.cause)
-    found["sensors"] = dict(result.sensors)
+    if result.interval is None:
+        found["sensors"] = dict(result.sensors)
+    else:
+        found["open_ended"] = result.interval.open_ended
     return found
+
+
+def _which(result: Result) -> dict[str, Any]:
+    span = result.interval
+    if span is None:
+        return {"frame": result.frame, "recording": result.recording, "timestamp_us": result.timestamp_us}
+    return {
+        "recording": result.recording,
+        "start_us": result.timestamp_us,
+        "end_us": span.end_us,
+        "frames": {"first": result.frame, "last": span.last, "count": span.count},
+    }
 
 
 @dataclass(slots=True)
@@ -76,6 +103,10 @@ class Funnel:
         matches, unknowns: Verdicts.
         excluded: How many frames failed first at which feature or requirement.
         reasons: Why frames are unknown.
+        over_time: Of a query over time: "recordings" looked at, "starts" (frames that match the initial scene), "bindings"
+            that these make, and bindings "cut off" because the recording or a track ends before the program does.
+            Matches, unknowns and reasons are then those of intervals.
+        broken: Of a query over time: how many bindings without a match broke which requirement.
         warnings: What the user should know, such as a map that the program does not fit.
     """
 
@@ -86,6 +117,8 @@ class Funnel:
     unknowns: int = 0
     excluded: Counter[str] = field(default_factory=Counter[str])
     reasons: Counter[str] = field(default_factory=Counter[str])
+    over_time: Counter[str] = field(default_factory=Counter[str])
+    broken: Counter[str] = field(default_factory=Counter[str])
     warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
 
     def add(self, other: Funnel) -> None:
@@ -97,12 +130,25 @@ class Funnel:
         self.unknowns += other.unknowns
         self.excluded.update(other.excluded)
         self.reasons.update(other.reasons)
+        self.over_time.update(other.over_time)
+        self.broken.update(other.broken)
         self.warnings += [warning for warning in other.warnings if warning not in self.warnings]
 
     def exclude(self, what: str, frames: int = 1) -> None:
         """Count frames that the prefilter excludes."""
         self.frames += frames
         self.excluded[what] += frames
+
+    def count_interval(self, verdict: Verdict) -> None:
+        """Count a verdict on an interval."""
+        match verdict:
+            case Match():
+                self.matches += 1
+            case Unknown():
+                self.unknowns += 1
+                self.reasons[verdict.reason] += 1
+            case NoMatch():
+                self.broken[verdict.cause.what] += 1
 
     def count(self, verdict: Verdict) -> None:
         """Count a verdict of the matcher."""
