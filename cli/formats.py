@@ -35,6 +35,26 @@ _COLUMNS: tuple[str, ...] = (
 )
 
 
+_INTERVAL_COLUMNS: tuple[str, ...] = (
+    "recording",
+    "start_us",
+    "end_us",
+    "first_frame",
+    "last_frame",
+    "frame_count",
+    "verdict",
+    "correspondence",
+    "witness",
+    "cause",
+    "open_ended",
+)
+_TYPES = {
+    "timestamp_us": pa.int64(), "start_us": pa.int64(), "end_us": pa.int64(), "frame_count": pa.int64(),
+    "open_ended": pa.bool_(),
+}  # fmt: skip
+"""Types of the columns that are no texts."""
+
+
 class Writer(Protocol):
     """Writes results one by one."""
 
@@ -48,7 +68,7 @@ class Writer(Protocol):
 
 
 class _Lines:
-    """One line a result: JSON, or the name of a frame that matches."""
+    """One line a result: JSON, or the name of a frame, or the recording and start of an interval, that matches."""
 
     def __init__(self, text: Text, line: Callable[[Mapping[str, Any]], str | None]) -> None:
         self._text, self._line = text, line
@@ -63,24 +83,29 @@ class _Lines:
         self._text.flush()
 
 
-def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(record: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     """A row of plain cells; nested values become JSON text."""
-    cells = {name: record.get(name, {}) for name in _COLUMNS}
+    if "frames" in record:
+        record = {**record, **{f"{key}_frame": record["frames"][key] for key in ("first", "last")}}
+        record["frame_count"] = record["frames"]["count"]
+    cells = {name: record.get(name, {}) for name in names}
     return {name: _json(cell) if isinstance(cell, Mapping) else cell for name, cell in cells.items()}
 
 
 def _name(record: Mapping[str, Any]) -> str | None:
-    return record["frame"] if record["verdict"] == "match" else None
+    if record["verdict"] != "match":
+        return None
+    return record["frame"] if "frame" in record else f"{record['recording']}@{record['start_us']}"
 
 
 class _Csv:
-    def __init__(self, text: Text) -> None:
-        self._text = text
-        self._rows = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
+    def __init__(self, text: Text, names: tuple[str, ...]) -> None:
+        self._text, self._names = text, names
+        self._rows = csv.DictWriter(text, names, lineterminator="\n")
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.writerow(_flat(record))
+        self._rows.writerow(_flat(record, self._names))
         self._text.flush()
 
     def finish(self) -> None:
@@ -88,13 +113,14 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO) -> None:
-        self._schema = pa.schema([(name, pa.int64() if name == "timestamp_us" else pa.string()) for name in _COLUMNS])
+    def __init__(self, sink: BinaryIO, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._schema = pa.schema([(name, _TYPES.get(name, pa.string())) for name in names])
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[dict[str, Any]] = []
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.append(_flat(record))
+        self._rows.append(_flat(record, self._names))
         if len(self._rows) >= 10_000:
             self._spill()
 
@@ -107,21 +133,23 @@ class _Parquet:
         self._file.close()
 
 
-def make_writer(name: str, sink: BinaryIO) -> Writer:
+def make_writer(name: str, sink: BinaryIO, *, over_time: bool = False) -> Writer:
     """The writer of a format.
 
     Args:
         name: One of `FORMATS`.
         sink: Where to; it stays open.
+        over_time: Whether the results are intervals.
     """
+    names = _INTERVAL_COLUMNS if over_time else _COLUMNS
     if name == "parquet":
-        return _Parquet(sink)
+        return _Parquet(sink, names)
     text = Text(sink)
     match name:
         case "table":
-            return Table(text)
+            return Table(text, over_time=over_time)
         case "csv":
-            return _Csv(text)
+            return _Csv(text, names)
         case "ids":
             return _Lines(text, _name)
         case _:

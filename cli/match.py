@@ -20,6 +20,7 @@ from scenicq.query.execution.run import Query, read_program
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.store.dataset import open_dataset
+from scenicq.temporal.intervals import DEFAULT_GAP_S
 
 from .deliver import Wanted, deliver
 from .engine import parse_engine
@@ -109,6 +110,14 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @SENSORS
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
+@click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of a "
+              "dynamic program over time.")
+@click.option("--min-duration", metavar="S", type=click.FloatRange(0), help="Find intervals of at least S seconds: of a "
+              "program about one instant, those in which every frame matches with the same objects.")
+@click.option("--intervals", type=click.Choice(["longest", "all"]), default="longest",
+              help="Of intervals that overlap the longest, or one for each frame that one can start at.")
+@click.option("--gap", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULT_GAP_S,
+              help="An object that has no label for longer than this is another one afterwards.")
 @click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches.")
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
@@ -119,7 +128,7 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
           sensors: Path | None, engine: Engine | None, explain: bool, exit_zero: bool, summary: bool, quiet: bool,
           **given: Any) -> None:
     # fmt: on
-    """Find the frames of a dataset that match a scenario.
+    """Find the frames of a dataset that match a scenario, or the intervals that match a dynamic one.
 
     Results go to standard output, one a line; progress and summary to standard error. Each match comes with the label
     object of every role and with values of the random variables that prove it.
@@ -130,6 +139,8 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
     query = Query(open_dataset(dataset), read_program(scenario), query_options(given))
+    if near is not None and query.is_over_time():
+        raise click.UsageError("--near looks for frames: it cannot be had with intervals", ctx)
     if explain:
         show_plan(query)
         return

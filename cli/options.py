@@ -6,10 +6,12 @@ import shlex
 import shutil
 from typing import Any
 
+from scenicq.compiler.temporal import Behaviors
 from scenicq.errors import DataError, Diagnostic, SolverError
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.options import MatchOptions, parse_tolerance
 from scenicq.query.execution.run import QueryOptions
+from scenicq.temporal.intervals import DEFAULT_GAP_S, IntervalOptions
 
 from .check import read_version
 
@@ -20,11 +22,12 @@ DEFAULTS = MatchOptions()
 _SOLVERS = ("auto", "dreal", "portable")
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "ignore_params",
+    "initial", "behaviors", "ignore_params",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
 TOPICS = {
-    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget"},
+    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "behaviors"},
+    "Over time": {"behaviors", "min_duration", "intervals", "gap"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
         "limit", "every", "all_matches", "near", "format_", "output", "report", "sensors", "export", "explain",
@@ -33,7 +36,10 @@ TOPICS = {
     "Messages and exit code": {"exit_zero", "summary", "quiet", "help"},
 }  # fmt: skip
 """The options of `match` as its help lists them."""
-ONE_FRAME = {"prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False}
+ONE_FRAME = {
+    "prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False,
+    "min_duration": None, "intervals": "longest", "gap": DEFAULT_GAP_S,
+}  # fmt: skip
 """The rest of the options of a query about one frame."""
 
 
@@ -93,4 +99,7 @@ def query_options(given: dict[str, Any]) -> QueryOptions:
         ignore_params=DEFAULTS.ignore_params.union(_names(given["ignore_params"])),
     )
     same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches")
-    return QueryOptions(match=options, version=read_version(given["scenic"]), **{name: given[name] for name in same})
+    time = IntervalOptions(given["intervals"], given["min_duration"], given["gap"])
+    named = {name: given[name] for name in same}
+    behaviors: Behaviors = given["behaviors"] or "refuse"
+    return QueryOptions(match=options, version=read_version(given["scenic"]), behaviors=behaviors, time=time, **named)

@@ -260,6 +260,20 @@ class Query:
         """Whether intervals are looked for, and not frames."""
         return world.scenario.dynamics is not None or self.options.time.min_duration_s is not None
 
+    def is_over_time(self) -> bool:
+        """Whether the results are intervals, and not frames; the program is compiled for the first map that it fits.
+
+        Raises:
+            ScenarioError: The program is wrong.
+        """
+        for name in self.dataset.maps:
+            try:
+                return self.over_time(self.world(name))
+            except ScenarioError as error:
+                if error.diagnostics[0].code != "map-lacks":
+                    raise
+        return False
+
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.
 
