@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -16,16 +16,19 @@ from scenicq.errors import DataError, Diagnostic, ScenarioError, ScenicqError, S
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.show import show_forest
 from scenicq.geometry.network import Network
+from scenicq.lint.program import lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import ready
 from scenicq.query.execution.compiled_map import program_network, read_network
+from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.run import beside, read_program
-from scenicq.store.dataset import open_dataset
+from scenicq.store.dataset import Dataset, open_dataset
 
 from .cache import user_cache
 from .main import ERROR
 from .manual import Manual
+from .remarks import LINTED_MAPS
 from .report import as_json, count, show
 
 __all__ = ["check", "networks_of", "read_version"]
@@ -95,8 +98,25 @@ def _groups(scenario: Scenario) -> list[str]:
     ]
 
 
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What a check looks at beside the program.
+
+    Attributes:
+        options: Classes and ego.
+        dataset: Whose labels tell what is compared, if any.
+        real: Whether the maps are real ones, rather than a street that stands in.
+        strict: Whether warnings of what cannot be meant are errors.
+    """
+
+    options: MatchOptions
+    dataset: Dataset | None
+    real: bool
+    strict: bool
+
+
 def _found(
-    source: Source, networks: Iterator[Network], version: int | None, initial: bool, details: Details
+    source: Source, networks: Iterator[Network], version: int | None, initial: bool, details: Details, asked: _Asked
 ) -> tuple[list[str], list[Diagnostic]]:
     """A line for each map that the scenario fits, and every diagnostic once.
 
@@ -106,6 +126,7 @@ def _found(
     errors: list[Diagnostic] = []
     lacking: list[Diagnostic] = []
     rest: list[Diagnostic] = []
+    compiled: list[tuple[Scenario, Network | None]] = []
     for network in networks:
         try:
             loader = beside(Path(source.name))
@@ -114,13 +135,16 @@ def _found(
             codes = {diagnostic.code for diagnostic in error.diagnostics}
             (lacking if codes == {"map-lacks"} else errors).extend(error.diagnostics)
             continue
+        compiled.append((scenario, network if asked.real else None))
         lines += [_told(scenario), *(f"  {line}" for part in details for line in part(scenario))]
         rest += [*scenario.warnings, *scenario.ignored]
-    if lines:
-        rest += [
-            Diagnostic(each.code, each.message, each.span, each.label, each.notes, each.hints, "warning")
-            for each in lacking
-        ]
+    if compiled:
+        rest += [replace(each, severity="warning") for each in lacking]
+        remarks = lint(source, compiled[:LINTED_MAPS], asked.options, properties=asked.dataset is None)
+        if asked.dataset is not None:
+            scenarios = [ready(scenario) for scenario, _ in compiled]
+            remarks = [*coverage(asked.dataset, scenarios, asked.options).warnings, *remarks]
+        rest += [replace(each, severity="error") for each in remarks] if asked.strict else remarks
     else:
         errors += lacking
     return lines, list(dict.fromkeys([*errors, *rest]))
@@ -145,6 +169,9 @@ def _found(
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("--forest", is_flag=True, help="Print the expression forest.")
 @click.option("--groups", is_flag=True, help="Print the groups of jointly dependent constraints, in order.")
+@click.option("--classes", type=click.Choice(["fine", "coarse"]), default="fine",
+              help="Look at the program as `match` does with these classes.")  # fmt: skip
+@click.option("--strict", is_flag=True, help="What compiles but cannot be meant, or is never compared, is an error.")
 @click.option(
     "--format",
     "format_",
@@ -154,10 +181,14 @@ def _found(
 )
 @click.pass_context
 def check(ctx: click.Context, scenario: Path, dataset: str | None, *, map_file: Path | None,
-          scenic: str | None, initial: bool, forest: bool, groups: bool, format_: str) -> None:  # fmt: skip
+          scenic: str | None, initial: bool, forest: bool, groups: bool, classes: Literal["fine", "coarse"],
+          strict: bool, format_: str) -> None:  # fmt: skip
     """Say whether a scenario is sound, and how it is read.
 
-    It is compiled against each map of the dataset, the map that is given, the one that the program names with `param
+    It warns of what compiles but cannot be meant, such as an angle of 90 without `deg`, and with a dataset also of what
+    its labels never have. A comment `# scenicq: ignore[CODE]` on the line silences a warning.
+
+    The program is compiled against each map of the dataset, the map that is given, the one that it names with `param
     map = localPath('FILE')`, or else a small built-in street.
     """
     lines: list[str] = []
@@ -165,7 +196,9 @@ def check(ctx: click.Context, scenario: Path, dataset: str | None, *, map_file: 
     try:
         version, warnings = read_version(scenic), list[Diagnostic]()
         networks = networks_of(dataset, map_file, scenario, version, warnings)
-        lines, diagnostics = _found(read_program(scenario), networks, version, initial, details)
+        opened = None if dataset is None else open_dataset(dataset)
+        asked = _Asked(MatchOptions(classes=classes), opened, opened is not None or map_file is not None, strict)
+        lines, diagnostics = _found(read_program(scenario), networks, version, initial, details, asked)
         diagnostics += warnings
     except ScenicqError as error:
         if format_ == "text":

@@ -21,6 +21,7 @@ from .main import NOTHING
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
+from .remarks import show_remarks
 from .report import plain
 
 __all__ = ["explain", "find_label"]
@@ -67,6 +68,7 @@ def explain(
     """
     query = Query(open_dataset(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
     label = find_label(query.dataset, frame)
+    show_remarks(query, [label.map])
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)

@@ -58,9 +58,12 @@ def show_funnel(query: Query, elapsed_s: float) -> None:
         query: After its results were taken.
         elapsed_s: Seconds that it took.
     """
-    show(query.funnel.warnings)
+    # what is never compared was said before the results
+    show(each for each in query.funnel.warnings if each.code != "never-compared")
     lines = columns(_steps(query), right=frozenset({0}))
     lines += [*_failures(query.funnel), *_broken(query.funnel)]
+    for what, frames in sorted(query.funnel.missing.items()):
+        lines.append(f"  `{what}` is missing in {count(frames, 'frame')} of the dataset, and not compared there")
     waived = [requirement.value for requirement in BuiltIn if requirement not in query.options.match.enforce]
     if waived:
         lines.append(f"  waived: {', '.join(waived)} (see --enforce)")

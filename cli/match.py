@@ -32,6 +32,7 @@ from .options import DEFAULTS, TOPICS, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
+from .remarks import show_remarks
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -119,6 +120,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--gap", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULT_GAP_S,
               help="An object that has no label for longer than this is another one afterwards.")
 @click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")
+@click.option("--strict", is_flag=True, help="What the program sets and no label has is an error, not a warning; so is "
+              "all that `scenicq check` warns of.")
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches.")
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
@@ -144,6 +147,7 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     if explain:
         show_plan(query)
         return
+    show_remarks(query)
     if shard is not None:
         _in_shard(ctx, query, shard, file, quiet=quiet)
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)

@@ -22,18 +22,18 @@ DEFAULTS = MatchOptions()
 _SOLVERS = ("auto", "dreal", "portable")
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "behaviors", "ignore_params",
+    "initial", "behaviors", "ignore_params", "strict",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
 TOPICS = {
-    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "behaviors"},
+    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict", "behaviors"},
     "Over time": {"behaviors", "min_duration", "intervals", "gap"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
         "limit", "every", "all_matches", "near", "format_", "output", "report", "sensors", "export", "explain",
     },
     "Long runs": {"shard", "resume"},
-    "Messages and exit code": {"exit_zero", "summary", "quiet", "help"},
+    "Messages and exit code": {"strict", "exit_zero", "summary", "quiet", "help"},
 }  # fmt: skip
 """The options of `match` as its help lists them."""
 ONE_FRAME = {
@@ -98,7 +98,7 @@ def query_options(given: dict[str, Any]) -> QueryOptions:
         budget=given["budget"],
         ignore_params=DEFAULTS.ignore_params.union(_names(given["ignore_params"])),
     )
-    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches")
+    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches", "strict")
     time = IntervalOptions(given["intervals"], given["min_duration"], given["gap"])
     named = {name: given[name] for name in same}
     behaviors: Behaviors = given["behaviors"] or "refuse"

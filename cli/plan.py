@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from scenicq.query.execution.run import Query
-from scenicq.query.prefilter.prefilter_counts import prefilter_counts
+from scenicq.query.explain.prefilter_counts import prefilter_counts
 
 from .report import columns
 

@@ -27,6 +27,7 @@ from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
+from .remarks import show_remarks
 from .sources import SENSORS, sensor_root
 
 __all__ = ["show"]
@@ -50,6 +51,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     if scenario is None:
         return Shot(label), Backdrop(dataset.network(label.map))
     query = Query(dataset, read_program(scenario), query_options({**given, **ONE_FRAME}))
+    show_remarks(query, [label.map])
     compiled, network = query.compile(label.map)
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(compiled, query.options.match, solver)

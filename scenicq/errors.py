@@ -70,6 +70,16 @@ CODES: dict[str, str] = {
     "solver-failed": "the solver cannot be started",
     # the answers
     "frame-excluded": "what a frame shows is not what the program allows",
+    "never-compared": "the program sets what no label of the dataset has",
+    # what compiles but cannot be meant
+    "angle-without-deg": "an angle of more than a full turn, which may be meant in degrees",
+    "range-reversed": "a range whose first end is above its second",
+    "requirement-always": "a requirement that holds in every scene",
+    "requirement-never": "a requirement that holds in no scene",
+    "box-cannot-fit": "a region that is too small for the object that must lie in it",
+    "class-folded": "a class that coarse classes do not tell from others",
+    "unknown-property": "a property that no class has and nothing reads",
+    "unused-variable": "a variable that nothing reads",
 }
 """Every diagnostic code with its meaning."""
 

@@ -1,8 +1,9 @@
 """The pages of `tests/language`: every `scenic` block compiles, or fails with exactly the errors that it marks.
 
-In a block `# error: [code]` marks the line that is wrong, and `# value: name.property == value` states a property of
-an object of which nothing is random. The fence may go on with `scenic=2` (read as that version) and `initial`
-(dynamic parts are left out).
+In a block `# warning: [code]` marks a line of which `scenicq check` warns, exactly these on the page of warnings, and
+`# error: [code]` marks the line that is wrong, and `# value: name.property == value` states a property of
+an object of which nothing is random. The fence may go on with `scenic=2` (read as that version), `initial` (dynamic
+parts are left out) and `coarse` (classes are folded).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import random
 import re
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import takewhile
+from itertools import dropwhile, takewhile
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,8 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.errors import CODES, ScenarioError, Source
 from scenicq.forest.improvise import draw_scene
 from scenicq.forest.scenario import Scenario
+from scenicq.lint.program import lint
+from scenicq.match.options import MatchOptions
 from scenicq.syntax import ast as scenic
 from scenicq.syntax.parser import parse
 from scenicq.syntax.walk import walk
@@ -33,6 +36,7 @@ NOT_ERRORS_OF_PROGRAMS = {"option-invalid", "soft-requirement"}
 
 _BLOCK = re.compile(r"^```scenic(?P<options>[^\n]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _ERROR = re.compile(r"#\s*error:\s*\[([a-z-]+)\]")
+_WARNING = re.compile(r"#\s*warning:\s*\[([a-z-]+)\]")
 _VALUE = re.compile(r"^#\s*value:\s*([\w#]+)\.(\w+)\s*==\s*(.+)$", re.MULTILINE)
 _LINK = re.compile(r"\]\(([\w-]+\.md)\)")
 
@@ -54,8 +58,12 @@ class Block:
     @property
     def marks(self) -> set[tuple[int, str]]:
         """Lines of the block with the codes of their errors."""
+        return self.marked(_ERROR)
+
+    def marked(self, mark: re.Pattern[str]) -> set[tuple[int, str]]:
+        """Lines of the block with the codes that a mark gives them."""
         lines = self.text.splitlines()
-        return {(number, code) for number, line in enumerate(lines, 1) for code in _ERROR.findall(line)}
+        return {(number, code) for number, line in enumerate(lines, 1) for code in mark.findall(line)}
 
     def compiled(self) -> Scenario:
         """The scenario over the made-up street."""
@@ -111,6 +119,24 @@ def test_block(block: Block) -> None:
             assert math.remainder(value - wanted, math.tau) == pytest.approx(0, abs=1e-6), (name, value)
         else:
             assert value == pytest.approx(wanted, abs=1e-6), (name, key)
+
+
+WARNED = [block for block in BLOCKS if block.page == "warnings.md" and not block.marks]
+
+
+@pytest.mark.parametrize("block", WARNED, ids=lambda block: f"{block.page}:{block.line}")
+def test_warnings(block: Block) -> None:
+    """What the page of warnings marks is warned of, and nothing else."""
+    scenario = block.compiled()
+    options = MatchOptions(classes="coarse" if "coarse" in block.options else "fine")
+    found = lint(scenario.source, [(scenario, street())], options)
+    assert {(d.span.source.position(d.span.start)[0], d.code) for d in found if d.span} == block.marked(_WARNING)
+
+
+def test_every_warning_is_shown() -> None:
+    """The codes of the last part of the table."""
+    expected = set(dropwhile(lambda code: code != "angle-without-deg", CODES))
+    assert expected == {code for block in WARNED for _, code in block.marked(_WARNING)}
 
 
 def test_every_code_that_a_program_can_cause_is_shown() -> None:

@@ -33,7 +33,15 @@ from scenicq.geometry.regions import union
 from scenicq.syntax import ast
 from scenicq.syntax.parser import parse
 
-__all__ = ["default_library", "is_dynamic", "libraries_of", "library_text", "network_names", "plain_module"]
+__all__ = [
+    "default_library",
+    "is_dynamic",
+    "libraries_of",
+    "library_text",
+    "library_texts",
+    "network_names",
+    "plain_module",
+]
 
 _LIBRARIES: dict[str, tuple[str, ...]] = {
     "scenic.domains.driving.model": ("colors", "driving", "traffic"),
@@ -147,3 +155,8 @@ def plain_module(name: str, span: Span) -> Module:
                        ("known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "
                         "and `math`",
                         "a scenario never imports Python code: write what it needs in Scenic"))  # fmt: skip
+
+
+def library_texts() -> tuple[ast.Module, ...]:
+    """The syntax of all of the library's files."""
+    return tuple(library_text(name) for name in dict.fromkeys(file for files in _LIBRARIES.values() for file in files))

@@ -263,6 +263,7 @@ def _is_feature(value: ModelValue) -> bool:
 
 def _object(instance: Instance, name: str) -> ScenarioObject:
     properties: dict[str, Property] = {}
+    uncomparable: dict[str, Span | None] = {}
     for key, value in instance.properties.items():
         if key in PARTIAL:
             continue
@@ -272,10 +273,13 @@ def _object(instance: Instance, name: str) -> ScenarioObject:
             raise fail("wrong-value", f"the {key} of an object must be positive", span, "not positive")
         if node is not None:
             properties[key] = Property(node, key in instance.explicit, span)
+        elif key in instance.explicit and value is not None:
+            uncomparable[key] = span
     if instance.mutation is not None:
         properties["mutationScale"] = Property(to_scalar(instance.mutation, instance.span), False, instance.span)
     assert instance.index is not None
-    return ScenarioObject(instance.index, name, instance.cls.category, properties, _mutated(instance), instance.span)
+    mutated = _mutated(instance)
+    return ScenarioObject(instance.index, name, instance.cls.category, properties, mutated, instance.span, uncomparable)
 
 
 def _mutated(instance: Instance) -> frozenset[str]:

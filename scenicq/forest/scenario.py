@@ -47,6 +47,7 @@ class ScenarioObject:
         properties: Its properties by name.
         mutated: The properties (position, heading) to which noise of unbounded support is added at the end.
         span: The expression that creates it.
+        uncomparable: Properties that the program itself sets to what no label can have, such as a list, with the place.
     """
 
     index: int
@@ -55,6 +56,7 @@ class ScenarioObject:
     properties: Mapping[str, Property]
     mutated: frozenset[str]
     span: Span | None
+    uncomparable: Mapping[str, Span | None] = field(default_factory=dict[str, "Span | None"])
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,16 +18,16 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Leaf
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.match.decide.cascade import Outcome, Refuted
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.solver_step import ask
-from scenicq.match.options import MatchOptions
+from scenicq.match.options import Exhausted, MatchOptions
 from scenicq.match.problem.candidates import Candidates, candidates_of, egos, find_candidates
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.constraints import Signature, describe_constraint
 from scenicq.match.problem.map_lookups import Disc, MapLookups
+from scenicq.match.problem.outcome import Outcome, Refuted
 from scenicq.match.problem.preprocess import ready
-from scenicq.match.search.backtracking import Exhausted, Reporter
+from scenicq.match.search.backtracking import Reporter
 from scenicq.match.search.columnar_first_fit import Assignment, firsts, together
 from scenicq.match.search.first_fit import Casting, FirstFit, first_fit_of, signature_of
 from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties

@@ -10,7 +10,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.forest.scenario import BuiltIn
 from scenicq.store.classes import Granularity
 
-__all__ = ["MatchOptions", "Method", "Tolerance", "parse_angle", "parse_tolerance"]
+__all__ = ["Exhausted", "MatchOptions", "Method", "Tolerance", "parse_angle", "parse_tolerance"]
 
 Method = Literal["auto", "smt", "monolithic"]
 
@@ -20,6 +20,10 @@ EXEMPT_PARAMS = frozenset(
     {"map", "carla_map", "lgsvl_map", "render", "use2DMap", "time_step", "timestep", "weather_file"}
 )
 """Parameters that say how to simulate, not what the scene is."""
+
+
+class Exhausted(Exception):
+    """The search took more steps than `MatchOptions.budget` allows."""
 
 
 @dataclass(frozen=True, slots=True)

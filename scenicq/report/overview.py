@@ -97,7 +97,12 @@ def funnel_section(funnel: Funnel, total: int) -> str:
         for name, count in steps
     ]
     stopped = f"Stopped after {funnel.frames:,} of {total:,} frames (--limit)." if funnel.frames < total else ""
-    warnings = [element("li", escape(each.message)) for each in funnel.warnings]
+    told = [f"{each.message}{f' ({each.span.place})' if each.span is not None else ''}" for each in funnel.warnings]
+    told += [
+        f"`{what}` is missing in {count:,} frames of the dataset, and not compared there"
+        for what, count in sorted(funnel.missing.items())
+    ]
+    warnings = [element("li", escape(each)) for each in told]
     failed = [
         (escape(what), f"{count:,}", f"{count / funnel.frames:.1%}")
         for what, count in sorted(funnel.excluded.items(), key=lambda item: (-item[1], item[0]))

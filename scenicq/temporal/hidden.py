@@ -1,8 +1,8 @@
-"""Random variables of the scene that conditions over time hang on: cells of values between which no condition changes.
+"""Random variables of the scene that conditions over time hang on: cells of values within which no condition changes.
 
-A variable is drawn once, so all samples see one value of it. A comparison that is affine in it changes its outcome at one
-value for each sample; between two neighbours of all these values every condition is constant. So a value of each cell
-(and each boundary) stands for all of it, and a run is decided for each by plain evaluation.
+A variable is drawn once, so all samples see one value of it. A comparison that is affine in it changes its outcome at
+one value for each sample; between two neighbours of all these values every condition is constant. So a value of each
+cell (and each boundary) stands for all of it, and a run is decided for each by plain evaluation.
 """
 
 from __future__ import annotations

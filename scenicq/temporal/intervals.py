@@ -1,8 +1,8 @@
 """The intervals of one recording that match: bindings and start samples in, intervals out (see `IntervalMatcher`).
 
-A binding gives each object of the scenario a track, for the whole interval. A start is a sample whose label matches the
-initial scene under a binding. From the starts of one binding all runs are followed together, on columns over the samples
-in which all tracks live; where conditions hang on random variables of the scene, once for each cell of their values.
+A binding gives each object of the scenario a track, for the whole interval. A start is a sample whose label matches
+the initial scene under a binding. From the starts of one binding all runs are followed together, on columns over the
+samples in which all tracks live; where conditions hang on random variables of the scene, once for each cell of their values.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ DEFAULT_GAP_S = 1.5
 """Seconds without a label after which a track's life ends."""
 
 _MOST_JOINT = 32
-"""Start samples of one binding that are matched again with values of a random variable that the initial scene has too."""
+"""Starts of one binding that are matched again with values of random variables that the initial scene has, too."""
 
 
 @dataclass(frozen=True, slots=True)

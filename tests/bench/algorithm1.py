@@ -24,12 +24,12 @@ from scenicq.forest.groups import Group
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.cells import triangles
 from scenicq.geometry.regions import Region
-from scenicq.match.decide.cascade import Satisfied
 from scenicq.match.decide.solver_step import ask
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import condition_group
 from scenicq.match.problem.constraints import build_groups
 from scenicq.match.problem.observation import observe
+from scenicq.match.problem.outcome import Satisfied
 from scenicq.smt import region_membership
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label

@@ -42,7 +42,7 @@ from scenicq.forest.show import show
 from scenicq.forest.simplify import simplify
 from scenicq.forest.walk import features, leaves, postorder, transform
 from scenicq.geometry.regions import PolygonSet
-from scenicq.match.decide.affine_forms import affine_vector
+from scenicq.match.linear.affine_forms import affine_vector
 
 STREET = street()
 

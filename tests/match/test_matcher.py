@@ -14,10 +14,10 @@ from scenes import compiled, drawn, label_of
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.decide import linear_program
-from scenicq.match.decide.cascade import Undecided
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions, Tolerance
 from scenicq.match.problem.candidates import find_candidates
+from scenicq.match.problem.outcome import Undecided
 from scenicq.match.search import group_cache, group_plan
 from scenicq.match.search.arc_consistency import thinned
 from scenicq.match.search.group_plan import relevant_properties

@@ -208,7 +208,9 @@ class Program:
         lines += [f"{role} = new Object at (Range(-999, 999), Range(-999, 999)), facing 0" for role in self.roles]
         lines += ["D = Range(-3, 3)"] if self.hidden else []
         lines += [f"require {self.start.text}"] if self.start else []
-        lines += [f"require always ({text_of(f)})" if f[0] == "atom" else f"require {text_of(f)}" for f in self.requirements]
+        lines += [
+            f"require always ({text_of(f)})" if f[0] == "atom" else f"require {text_of(f)}" for f in self.requirements
+        ]
         lines += [f"terminate when {each.text}" for each in self.ends]
         lines += [f"terminate after {self.after_s} seconds"] if self.after_s is not None else []
         for number, (kind, atoms) in enumerate(self.monitors):
@@ -237,8 +239,10 @@ def random_program(draw: random.Random) -> Program:
     monitors = [(kind, [atom() for _ in range(MONITORS[kind][1])]) for kind in kinds]
     # a formula that is one atom alone is written with `always`
     formulas = [("always", f) if f[0] == "atom" else f for f in formulas]
-    formulas = [f if any(word in text_of(f) for word in ("always", "eventually", "next", "until")) else ("always", f)
-                for f in formulas]
+    formulas = [
+        f if any(word in text_of(f) for word in ("always", "eventually", "next", "until")) else ("always", f)
+        for f in formulas
+    ]
     if not formulas and not ends and after_s is None and not monitors:
         after_s = 1.0
     return Program(roles, start, formulas, ends, after_s, monitors, hidden, made)
@@ -263,8 +267,7 @@ def bindings(program: Program, trace: Trace) -> list[dict[str, str]]:
     told_apart = program.atoms or program.start is not None
     ways = itertools.permutations if told_apart else itertools.combinations
     return [
-        {"ego": "ego", **dict(zip(program.roles, chosen, strict=True))}
-        for chosen in ways(tracks, len(program.roles))
+        {"ego": "ego", **dict(zip(program.roles, chosen, strict=True))} for chosen in ways(tracks, len(program.roles))
     ]
 
 
@@ -294,8 +297,11 @@ def matches(program: Program, trace: Trace, binding: dict[str, str], truth: Trut
         for j in range(i, last + 1):
             done = [monitored(kind, atoms, truth, i, j) for kind, atoms in program.monitors]
             ended = any(truth(each, j) for each in program.ends) or "end" in done
-            late = [k for k in range(i, j + 1) if program.after_s is not None
-                    and trace[k].time - trace[i].time >= program.after_s - 1e-6]
+            late = [
+                k
+                for k in range(i, j + 1)
+                if program.after_s is not None and trace[k].time - trace[i].time >= program.after_s - 1e-6
+            ]
             before = any(truth(each, k) for each in program.ends for k in range(i, j)) or "ended" in done
             before = before or bool(late and late[0] < j)
             over = ended or bool(late and late[0] == j)

@@ -5,13 +5,13 @@ import random
 from pathlib import Path
 
 import pytest
+from interval_definition import Program, Trace, bindings, matches, random_program, random_trace, recording_of
 
 from scenicq.errors import Source
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset
 from scenicq.temporal.intervals import IntervalOptions
-from interval_definition import Program, Trace, bindings, matches, random_program, random_trace, recording_of
 
 D_VALUES = [-3 + number / 4 for number in range(25)]
 """Every value of D that makes a difference: positions are whole numbers."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import cast
 
 from scenicq.forest import build
@@ -34,41 +33,17 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import deciding_first, leaves, postorder
 from scenicq.geometry.fields import FieldCell, VectorField
-from scenicq.match.decide.affine_forms import AffineVector, affine_scalar, affine_vector
-from scenicq.match.decide.affine_reach import Reach, reach_heading, reach_number, reach_position
-from scenicq.match.decide.evaluation import ground_cause, holds, replay
-from scenicq.match.decide.linear_program import Row
-from scenicq.match.decide.linear_relaxation import NotLinear, inside, position_boxes, solve_affine
+from scenicq.match.linear.affine_forms import AffineVector, affine_scalar, affine_vector
+from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
+from scenicq.match.linear.linear_program import LINEAR_SLACK, Row
+from scenicq.match.linear.linear_relaxation import NotLinear, inside, position_boxes, solve_affine
 from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned, fact
+from scenicq.match.problem.evaluation import ground_cause, holds, replay
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 
-__all__ = ["LINEAR_SLACK", "Outcome", "Refuted", "Satisfied", "Undecided", "decide"]
+__all__ = ["decide"]
 
-
-@dataclass(frozen=True, slots=True)
-class Satisfied:
-    """The group can be satisfied, by these values of its random variables."""
-
-    values: Mapping[Identity, Value]
-
-
-@dataclass(frozen=True, slots=True)
-class Refuted:
-    """The group cannot be satisfied; `constraint` is the one to blame, or the first of several."""
-
-    constraint: Constraint
-    detail: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Undecided:
-    """Not decided, and why."""
-
-    constraint: Constraint
-    reason: str
-
-
-Outcome = Satisfied | Refuted | Undecided
 
 _MOST_BRANCHES = 4096
 _MOST_CHOSEN = 100
@@ -77,8 +52,6 @@ _MOST_PARTS = 200
 """Parts of one cell that are looked at."""
 _MOST_PROGRAMS = 20_000
 """Linear programs for one decision: some seconds, after which a solver does no worse."""
-LINEAR_SLACK = 1e-6
-"""Metres or radians that the witness of a linear program may be off."""
 
 
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:

@@ -24,7 +24,7 @@ from scenicq.geometry import shapes
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.proximity import meets
 from scenicq.geometry.regions import Region
-from scenicq.match.decide.linear_relaxation import position_boxes
+from scenicq.match.linear.linear_relaxation import position_boxes
 from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned, fact
 

@@ -33,7 +33,6 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import postorder
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied
 from scenicq.match.decide.compiled_expressions import (
     Column,
     Columns,
@@ -47,9 +46,10 @@ from scenicq.match.decide.compiled_expressions import (
     truth,
     turned,
 )
-from scenicq.match.decide.evaluation import unlike
 from scenicq.match.options import Tolerance
+from scenicq.match.problem.evaluation import unlike
 from scenicq.match.problem.map_lookups import XY, Disc, MapLookups
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied
 
 __all__ = ["Certified", "ClosedForm", "closed_form_of"]
 

@@ -38,7 +38,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children, is_leaf, postorder
-from scenicq.match.decide.affine_reach import ends
+from scenicq.match.linear.affine_reach import ends
 
 __all__ = [
     "Column",

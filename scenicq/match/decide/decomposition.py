@@ -13,13 +13,15 @@ from dataclasses import replace
 from scenicq.forest.bounds import Interval
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Node, Range, TruncatedNormal, Value
 from scenicq.forest.walk import leaves, postorder, transform
-from scenicq.match.decide.affine_reach import ends
-from scenicq.match.decide.cascade import LINEAR_SLACK, Outcome, Refuted, Satisfied, Undecided, decide
+from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.case_split import Picked, picked
-from scenicq.match.decide.evaluation import ground_cause, holds, replay
 from scenicq.match.fields.field_solver import decide_directions
+from scenicq.match.linear.affine_reach import ends
+from scenicq.match.linear.linear_program import LINEAR_SLACK
 from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.problem.evaluation import ground_cause, holds, replay
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 
 __all__ = ["decide_decomposed"]
 

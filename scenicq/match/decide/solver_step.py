@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scenicq.forest.groups import Comparison, Constraint
-from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
-from scenicq.match.decide.evaluation import replay
 from scenicq.match.fields.field_solver import repaired
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.smt.answer import Sat, Solver, Unknown, Unsat
 from scenicq.smt.case_split import check_by_cases
 from scenicq.smt.encode import Encoding, Target, UnsupportedError, encode

@@ -20,14 +20,14 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn, Value
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.geometry.shapes import Bounds
-from scenicq.match.decide.affine_forms import Affine, AffineVector, affine_scalar, affine_vector
-from scenicq.match.decide.cascade import LINEAR_SLACK, Outcome, Refuted, Satisfied, Undecided
-from scenicq.match.decide.evaluation import holds, replay
-from scenicq.match.decide.linear_program import Row
-from scenicq.match.decide.linear_relaxation import Alternative, NotLinear, extent_affine, inside, solve_affine
 from scenicq.match.fields.contractor import BoxSet
+from scenicq.match.linear.affine_forms import Affine, AffineVector, affine_scalar, affine_vector
+from scenicq.match.linear.linear_program import LINEAR_SLACK, Row
+from scenicq.match.linear.linear_relaxation import Alternative, NotLinear, extent_affine, inside, solve_affine
 from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.problem.evaluation import holds, replay
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 
 __all__ = ["MARGIN", "SAME", "HeadingAssignment", "extent", "solved", "way_of"]
 

@@ -19,15 +19,15 @@ from scenicq.forest.bounds import Interval
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import leaves, postorder
-from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
-from scenicq.match.decide.evaluation import holds
-from scenicq.match.decide.shared_variable import find_shared_value, joined
 from scenicq.match.fields.cell_assignment import HeadingAssignment, solved, way_of
 from scenicq.match.fields.constraint_network import Tape
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.heading_propagation import LimitError, directed, halved, settled
+from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.problem.evaluation import holds
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 
 __all__ = ["decide_directions", "repaired"]
 

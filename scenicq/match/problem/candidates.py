@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
-from scenicq.match.options import MatchOptions
+from scenicq.match.options import Exhausted, MatchOptions
+from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.observation import observe, observe_params
-from scenicq.match.search.backtracking import Exhausted, Slot, matchable
 from scenicq.match.verdict import Cause
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label

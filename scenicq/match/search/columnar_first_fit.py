@@ -17,13 +17,13 @@ import numpy as np
 
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.nodes import Identity, Leaf, Value
-from scenicq.match.decide.cascade import Satisfied
 from scenicq.match.decide.closed_form import Certified
 from scenicq.match.decide.compiled_expressions import Column, Columns, Get, UnclearError
 from scenicq.match.options import Tolerance
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.map_lookups import Disc, MapLookups
 from scenicq.match.problem.observation import observe
+from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.search.first_fit import FirstFit
 from scenicq.match.search.group_plan import GroupPlan
 from scenicq.store.labels import Label, LabelObject

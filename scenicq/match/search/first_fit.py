@@ -12,13 +12,13 @@ from functools import lru_cache
 
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
-from scenicq.match.decide.cascade import Refuted, Satisfied
 from scenicq.match.decide.compiled_expressions import UnclearError
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import Disc, MapLookups
 from scenicq.match.problem.observation import observe, observe_params, observed_names
+from scenicq.match.problem.outcome import Refuted, Satisfied
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.match.search.label_search import Failure, Solution
 from scenicq.store.labels import Label

@@ -13,12 +13,12 @@ from typing import Protocol
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Value
-from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Cast
 from scenicq.match.problem.conditioned import Item, condition_group
 from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.problem.radius import within_radius
 from scenicq.match.search.group_plan import GroupPlan
 

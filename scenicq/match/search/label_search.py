@@ -15,14 +15,15 @@ from typing import cast
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.scenario import Scenario
-from scenicq.match.decide.cascade import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.options import MatchOptions
+from scenicq.match.options import Exhausted, MatchOptions
+from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.candidates import Cast
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.arc_consistency import thinned
-from scenicq.match.search.backtracking import Answer, Exhausted, Reporter, Slot, find_assignments
+from scenicq.match.search.backtracking import Answer, Reporter, find_assignments
 from scenicq.match.search.group_cache import Asker, GroupCache, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 

@@ -99,7 +99,7 @@ class Decider:
     threads: int | None
     all_matches: bool
     every: bool
-    time: IntervalOptions = IntervalOptions()
+    time: IntervalOptions = field(default_factory=IntervalOptions)
     _worlds: dict[str, tuple[CompiledMap, Matcher]] = field(default_factory=dict["str", "tuple[CompiledMap, Matcher]"])
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None

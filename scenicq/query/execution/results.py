@@ -103,10 +103,11 @@ class Funnel:
         matches, unknowns: Verdicts.
         excluded: How many frames failed first at which feature or requirement.
         reasons: Why frames are unknown.
-        over_time: Of a query over time: "recordings" looked at, "starts" (frames that match the initial scene), "bindings"
-            that these make, and bindings "cut off" because the recording or a track ends before the program does.
-            Matches, unknowns and reasons are then those of intervals.
+        over_time: Of a query over time: "recordings" looked at, "starts" (frames that match the initial scene),
+            "bindings" that these make, and bindings "cut off" because the recording or a track ends before the program
+            does. Matches, unknowns and reasons are then those of intervals.
         broken: Of a query over time: how many bindings without a match broke which requirement.
+        missing: Frames of the dataset in which a property that the program sets is missing, although others have it.
         warnings: What the user should know, such as a map that the program does not fit.
     """
 
@@ -119,6 +120,7 @@ class Funnel:
     reasons: Counter[str] = field(default_factory=Counter[str])
     over_time: Counter[str] = field(default_factory=Counter[str])
     broken: Counter[str] = field(default_factory=Counter[str])
+    missing: dict[str, int] = field(default_factory=dict[str, int])
     warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
 
     def add(self, other: Funnel) -> None:
@@ -132,6 +134,7 @@ class Funnel:
         self.reasons.update(other.reasons)
         self.over_time.update(other.over_time)
         self.broken.update(other.broken)
+        self.missing.update(other.missing)
         self.warnings += [warning for warning in other.warnings if warning not in self.warnings]
 
     def exclude(self, what: str, frames: int = 1) -> None:

@@ -5,7 +5,7 @@ The dataset is worked through block by block, in this process or in workers; res
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +24,7 @@ from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
 from scenicq.query.execution.compiled_map import about_dataset, map_remark
+from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
@@ -50,6 +51,7 @@ class QueryOptions:
         all_matches: Whether every correspondence of a frame is a result of its own.
         behaviors: Whether a program with behaviors is refused, or matched over time without them.
         time: Options of intervals.
+        strict: Whether what the program sets and no label has is an error.
     """
 
     match: MatchOptions = MatchOptions()
@@ -62,7 +64,8 @@ class QueryOptions:
     every: bool = False
     all_matches: bool = False
     behaviors: Behaviors = "refuse"
-    time: IntervalOptions = IntervalOptions()
+    time: IntervalOptions = field(default_factory=IntervalOptions)
+    strict: bool = False
 
 
 def read_program(path: str | Path) -> Source:
@@ -114,6 +117,7 @@ class _Known:
 
     worlds: dict[str, CompiledMap] = field(default_factory=dict["str", "CompiledMap"])
     extents: dict[str, list[Extent]] | None = None
+    coverage: Coverage | None = None
 
 
 @dataclass(eq=False)
@@ -206,9 +210,45 @@ class Query:
             raise errors[0]
         worlds = [world for world in found.values() if isinstance(world, CompiledMap)]
         if worlds:
-            self.funnel.warnings += _remarks(worlds[0].scenario)
+            compared = self.coverage()
+            self.funnel.warnings += [*compared.warnings, *_remarks(worlds[0].scenario)]
+            self.funnel.missing.update(compared.missing)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
+        return found
+
+    def fitting(self, maps: Iterable[str] | None = None) -> Iterator[CompiledMap]:
+        """The scenario over each map that it fits.
+
+        Args:
+            maps: Only these; all by default.
+
+        Raises:
+            ScenarioError: The program is wrong.
+        """
+        for name in self.dataset.maps if maps is None else maps:
+            try:
+                yield self.world(name)
+            except ScenarioError as error:
+                if error.diagnostics[0].code != "map-lacks":
+                    raise
+
+    def coverage(self, maps: Sequence[str] | None = None) -> Coverage:
+        """How much of what the program sets is compared with the labels; found out once.
+
+        Args:
+            maps: The program is compiled over these; over all by default.
+
+        Raises:
+            ScenarioError: The program is wrong; never-compared, where the options are strict.
+        """
+        self._check_ego()
+        if self._known.coverage is None:
+            scenarios = [each.scenario for each in self.fitting(maps)]
+            self._known.coverage = coverage(self.dataset, scenarios, self.options.match)
+        found = self._known.coverage
+        if self.options.strict and found.warnings:
+            raise ScenarioError([replace(each, severity="error") for each in found.warnings])
         return found
 
     def _frames(self, map_name: str) -> int:

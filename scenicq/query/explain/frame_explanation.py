@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from scenicq.errors import Diagnostic, Span, render
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Group
-from scenicq.match.decide.cascade import Refuted, Satisfied, Undecided
 from scenicq.match.decide.solver_step import encoded
 from scenicq.match.matcher import Finding, Matcher
 from scenicq.match.problem.constraints import describe_constraint
+from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
 from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue

@@ -15,12 +15,13 @@ from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
 from scenicq.forest.nodes import Compare, Constant, Index, Node, PointIn, Undefined, Value
 from scenicq.forest.walk import features, leaves
 from scenicq.geometry.angles import normalize
-from scenicq.match.decide.cascade import Refuted, Satisfied, decide
-from scenicq.match.decide.evaluation import show_value
+from scenicq.match.decide.cascade import decide
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.constraints import describe_constraint
+from scenicq.match.problem.evaluation import show_value
+from scenicq.match.problem.outcome import Refuted, Satisfied
 from scenicq.match.search.label_search import LabelSearch
 
 __all__ = ["Violation", "choices", "violations"]

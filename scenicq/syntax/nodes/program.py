@@ -103,7 +103,7 @@ class DynamicStatement(Node):
 
 @dataclass(frozen=True, slots=True)
 class DynamicDefinition(Node):
-    """A definition of what happens over time, skipped with its body but for monitors; unnamed blocks have an empty name.
+    """A definition of what happens over time, skipped with its body but for monitors; unnamed blocks have no name.
 
     Kinds: `behavior`, `monitor`, `scenario`, `setup`, `compose`, `precondition`, `invariant`. The span ends with the
     header's colon.

@@ -6,12 +6,13 @@ import pytest
 from conditioned_groups import groups
 from programs import PROGRAMS
 
-from scenicq.match.decide.cascade import Refuted, Satisfied, Undecided, decide
+from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.decide.evaluation import replay
 from scenicq.match.fields.constraint_network import Tape
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
 
 ROW = """
 shift = Range(-0.5, 0.5)

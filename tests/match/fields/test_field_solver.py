@@ -13,13 +13,13 @@ from scenes import STREET, compiled, drawn, label_of
 
 from scenicq.forest.nodes import PointIn
 from scenicq.forest.walk import leaves
-from scenicq.match.decide.cascade import Satisfied
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.decide.evaluation import replay
 from scenicq.match.fields import interval_domain
 from scenicq.match.fields.field_solver import repaired
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.verdict import Match, NoMatch
 
 CHAIN = """

@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenicq.match.search.backtracking import Answer, Exhausted, Slot, find_assignments, matchable
+from scenicq.match.options import Exhausted
+from scenicq.match.problem.bipartite_matching import Slot, matchable
+from scenicq.match.search.backtracking import Answer, find_assignments
 
 
 class Recorder:

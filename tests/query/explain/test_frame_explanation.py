@@ -9,9 +9,9 @@ import pytest
 from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
-from scenicq.match.decide.evaluation import show_value
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.problem.evaluation import show_value
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.nearest_miss import closest, show_tolerance, widened

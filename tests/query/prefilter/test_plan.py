@@ -23,9 +23,9 @@ from scenicq.match.options import MatchOptions, Tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.query.explain.prefilter_counts import prefilter_counts
 from scenicq.query.prefilter.executor import Extent, blocks, extents, run_prefilter
 from scenicq.query.prefilter.plan import Plan, make_plan
-from scenicq.query.prefilter.prefilter_counts import prefilter_counts
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset

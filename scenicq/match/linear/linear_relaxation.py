@@ -37,9 +37,9 @@ from scenicq.forest.walk import leaves
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
-from scenicq.match.decide.affine_forms import Affine, AffineVector, Variable, affine_scalar, affine_vector
-from scenicq.match.decide.affine_reach import ends
-from scenicq.match.decide.linear_program import LinearSystem, NotSolved, Row
+from scenicq.match.linear.affine_forms import Affine, AffineVector, Variable, affine_scalar, affine_vector
+from scenicq.match.linear.affine_reach import ends
+from scenicq.match.linear.linear_program import LinearSystem, NotSolved, Row
 from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
 

@@ -21,9 +21,9 @@ import shapely
 from scenicq.forest.nodes import Constant, Identity, Leaf, Normal, PointIn, Range, TruncatedNormal, Value
 from scenicq.geometry.proximity import meets, witness_point
 from scenicq.geometry.regions import Region
-from scenicq.match.decide.affine_forms import Affine, AffineVector, Variable
-from scenicq.match.decide.evaluation import ROUNDING
+from scenicq.match.linear.affine_forms import Affine, AffineVector, Variable
 from scenicq.match.options import Tolerance
+from scenicq.match.problem.evaluation import ROUNDING
 
 __all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position", "tolerance_shape"]
 

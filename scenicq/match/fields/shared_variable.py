@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 
 from scenicq.forest.bounds import Interval
 from scenicq.forest.nodes import Identity, Value
-from scenicq.match.decide.cascade import LINEAR_SLACK, Outcome, Refuted, Satisfied, Undecided
-from scenicq.match.decide.evaluation import replay
 from scenicq.match.fields.cell_assignment import HeadingAssignment, extent, solved
+from scenicq.match.linear.linear_program import LINEAR_SLACK
 from scenicq.match.options import Tolerance
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 
 __all__ = ["find_shared_value", "joined"]
 

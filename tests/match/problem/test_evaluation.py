@@ -10,7 +10,7 @@ import pytest
 from comparisons import DEFAULT, c, compared
 
 from scenicq.forest.nodes import Constant, DirectionAt, Rotate, VectorSum
-from scenicq.match.decide.evaluation import MOST_CHOICES, replay
+from scenicq.match.problem.evaluation import MOST_CHOICES, replay
 
 
 class Fan:

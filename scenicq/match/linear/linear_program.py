@@ -8,9 +8,12 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any
 
-from scenicq.match.decide.affine_forms import Affine, Variable
+from scenicq.match.linear.affine_forms import Affine, Variable
 
-__all__ = ["LinearSystem", "NotSolved", "Row"]
+__all__ = ["LINEAR_SLACK", "LinearSystem", "NotSolved", "Row"]
+
+LINEAR_SLACK = 1e-6
+"""Metres or radians that the witness of a linear program may be off."""
 
 
 class NotSolved(Exception):

@@ -15,13 +15,13 @@ from scenicq.forest.condition import condition
 from scenicq.forest.nodes import ArithmeticOp
 from scenicq.forest.walk import leaves
 from scenicq.match.decide import decomposition
-from scenicq.match.decide.cascade import Refuted, Satisfied
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.decide.evaluation import replay
-from scenicq.match.decide.linear_relaxation import extent_affine
-from scenicq.match.decide.shared_variable import find_shared_value, joined
 from scenicq.match.fields import field_solver
+from scenicq.match.fields.shared_variable import find_shared_value, joined
+from scenicq.match.linear.linear_relaxation import extent_affine
 from scenicq.match.options import Tolerance
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Refuted, Satisfied
 
 CROSSING = """
 ego = new Car on intersection

@@ -1,0 +1,60 @@
+"""What a user should know of a program before its results: what is never compared, and what cannot be meant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import islice
+
+import click
+
+from scenicq.errors import Diagnostic, ScenarioError
+from scenicq.lint.program import lint
+from scenicq.query.execution.run import Query
+
+from .report import count, plain, show
+
+__all__ = ["LINTED_MAPS", "remarks", "show_remarks"]
+
+LINTED_MAPS = 8
+"""Maps on which requirements are looked at."""
+_LINES = 5
+
+
+def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagnostic], list[Diagnostic]]:
+    """What is never compared, and what compiles but cannot be meant.
+
+    Args:
+        query: The query.
+        maps: The program is compiled over these; over all by default.
+
+    Raises:
+        ScenarioError: The program is wrong, or the options are strict and there is anything to be said.
+    """
+    unseen = list(query.coverage(maps).warnings)
+    compiled = ((each.scenario, each.network) for each in islice(query.fitting(maps), LINTED_MAPS))
+    found = lint(query.source, compiled, query.options.match, properties=False)
+    if query.options.strict and found:
+        raise ScenarioError([replace(each, severity="error") for each in found])
+    return unseen, found
+
+
+def show_remarks(query: Query, maps: Sequence[str] | None = None) -> None:
+    """Print on standard error what is never compared, and a line for each thing that cannot be meant.
+
+    Args:
+        query: The query.
+        maps: As of `remarks`.
+
+    Raises:
+        ScenarioError: As of `remarks`.
+    """
+    unseen, found = remarks(query, maps)
+    show(unseen)
+    for each in found[:_LINES]:
+        place = f"{each.span.place}: " if each.span is not None else ""
+        kind = click.style(f"{each.severity}[{each.code}]", fg="yellow", bold=True)
+        click.echo(f"{kind}: {place}{plain(each.message)}", err=True)
+    if found:
+        more = f"{count(len(found) - _LINES, 'more warning')}: " if len(found) > _LINES else ""
+        click.echo(f"  = hint: {more}`scenicq check {plain(query.source.name)}` says what to write", err=True)

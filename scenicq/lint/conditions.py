@@ -1,0 +1,240 @@
+"""What a compiled program gives away on a map: requirements that always or never hold, boxes that fit nowhere.
+
+Intervals tell whether a requirement can fail or hold: headings lie within half a turn, speeds and sizes are not
+negative, positions lie near the map. What intervals leave open is not spoken of.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import cast
+
+from shapely import minimum_rotated_rectangle, unary_union
+from shapely.geometry import MultiPolygon, Polygon
+
+from scenicq.errors import Diagnostic, Span
+from scenicq.forest.bounds import Box, scalar_bounds
+from scenicq.forest.condition import expand
+from scenicq.forest.nodes import (
+    Compare,
+    CompareOp,
+    Constant,
+    Encloses,
+    Feature,
+    Logic,
+    LogicOp,
+    Node,
+    Range,
+    RectangleAt,
+    Select,
+    VectorOf,
+)
+from scenicq.forest.scenario import Requirement, Scenario
+from scenicq.forest.walk import postorder, transform
+from scenicq.geometry.membership import bounds as region_bounds
+from scenicq.geometry.network import Network
+from scenicq.geometry.regions import Nowhere, PolygonSet
+from scenicq.match.options import MatchOptions
+from scenicq.store.classes import fold, is_class
+from scenicq.syntax import ast
+
+__all__ = ["lint_scenario"]
+
+_BEYOND_MAP_M = 200.0
+"""How far beyond the edges of the map labels may lie."""
+_MOST_POLYGONS = 2000
+_ROUNDING_M = 0.01
+
+
+def _warning(code: str, message: str, span: Span | None, label: str, *hints: str) -> Diagnostic:
+    return Diagnostic(code, message, span, label, hints=hints, severity="warning")
+
+
+def lint_scenario(
+    scenario: Scenario, body: tuple[ast.Statement, ...], network: Network | None, options: MatchOptions
+) -> Iterator[Diagnostic]:
+    """What a program gives away once it is compiled over a map.
+
+    Args:
+        scenario: As compiled, not made ready.
+        body: Its text.
+        network: The map; None where a made-up street stands in for one.
+        options: Classes.
+    """
+    yield from _dropped(scenario, body)
+    box = None if network is None else _map_box(network)
+    for requirement in scenario.requirements:
+        if requirement.built_in is None:
+            yield from _constant(requirement, box)
+            if network is not None:
+                yield from _too_large(scenario, requirement)
+    yield from _folded(scenario, options)
+
+
+def _dropped(scenario: Scenario, body: tuple[ast.Statement, ...]) -> Iterator[Diagnostic]:
+    """Requirements that are known to hold without a scene: the compiler has left them out."""
+    kept = {each.span for each in (*scenario.requirements, *scenario.soft)}
+    for statement in body:
+        timed = isinstance(statement, ast.Require) and isinstance(statement.condition, ast.Temporal | ast.Until)
+        if isinstance(statement, ast.Require) and not timed and statement.span not in kept:
+            yield _always(statement.span)
+
+
+def _always(span: Span | None) -> Diagnostic:
+    return _warning("requirement-always", "this requirement holds in every scene", span, "excludes nothing")
+
+
+def _map_box(network: Network) -> Box | None:
+    region = network.drivableRegion
+    if isinstance(region, Nowhere):
+        return None
+    west, south, east, north = region_bounds(region)
+    far = _BEYOND_MAP_M
+    return (west - far, east + far), (south - far, north + far)
+
+
+def _between(low: float, high: float) -> Node:
+    return Range(Constant(low), Constant(high))
+
+
+def _of_label(feature: Feature, box: Box | None) -> Node:
+    """A number that can have any value that a label may have for a feature."""
+    if feature.property == "position" and box is not None:
+        return VectorOf(_between(*box[0]), _between(*box[1]))
+    match feature.property:
+        case "heading":
+            return _between(-math.pi, math.pi)
+        case "speed" | "width" | "length" | "height":
+            return _between(0.0, math.inf)
+        case _:
+            return feature
+
+
+def _constant(requirement: Requirement, box: Box | None) -> Iterator[Diagnostic]:
+    """A requirement that intervals decide."""
+    memo: dict[int, Node] = {}
+    bounded = transform(
+        requirement.condition, lambda node: _of_label(node, box) if isinstance(node, Feature) else node, memo
+    )
+    truth = _truth(bounded)
+    if truth is True:
+        yield _always(requirement.span)
+    elif truth is False:
+        where = "" if box is None else " on this map"
+        yield _warning(
+            "requirement-never", f"no scene{where} satisfies this requirement", requirement.span,
+            "excludes everything",
+        )  # fmt: skip
+
+
+def _truth(root: Node) -> bool | None:
+    """Whether a condition is known to hold or to fail; None where intervals do not tell."""
+    found: dict[int, bool | None] = {}
+    for node in postorder((root,)):
+        match node:
+            case Constant(value=bool() as value):
+                found[id(node)] = value
+            case Compare():
+                found[id(node)] = _order(node)
+            case Logic():
+                args = [found.get(id(arg)) for arg in node.args]
+                found[id(node)] = _logic(node.op, args)
+            case _:
+                found[id(node)] = None
+    return found[id(root)]
+
+
+def _logic(op: LogicOp, args: list[bool | None]) -> bool | None:
+    match op:
+        case LogicOp.NOT:
+            return None if args[0] is None else not args[0]
+        case LogicOp.AND:
+            return False if False in args else None if None in args else True
+        case LogicOp.OR:
+            return True if True in args else None if None in args else False
+
+
+def _order(node: Compare) -> bool | None:
+    if node.op in (CompareOp.EQ, CompareOp.NE):
+        return None
+    left, right = scalar_bounds(node.left), scalar_bounds(node.right)
+    if node.op in (CompareOp.GT, CompareOp.GE):
+        left, right = right, left
+    strict = node.op in (CompareOp.LT, CompareOp.GT)
+    if left[1] < right[0] or (not strict and left[1] == right[0]):
+        return True
+    if left[0] > right[1] or (strict and left[0] == right[1]):
+        return False
+    return None
+
+
+# --- boxes
+
+
+def _too_large(scenario: Scenario, requirement: Requirement) -> Iterator[Diagnostic]:
+    """`in` of an object whose box fits into no part of the region."""
+
+    def sized(feature: Feature) -> Node | None:
+        if feature.property in ("width", "length"):
+            return scenario.objects[feature.object].properties[feature.property].value
+        return None
+
+    for node in postorder((requirement.condition,)):
+        if not (isinstance(node, Encloses) and isinstance(node.inner, RectangleAt)):
+            continue
+        outers = node.outer.options if isinstance(node.outer, Select) else (node.outer,)
+        regions = [outer.value for outer in outers if isinstance(outer, Constant)]
+        if len(regions) < len(outers) or not all(isinstance(region, PolygonSet) for region in regions):
+            continue
+        width, length = (scalar_bounds(expand(side, sized))[0] for side in (node.inner.width, node.inner.length))
+        if not (math.isfinite(width) and math.isfinite(length)):
+            continue
+        short, long = sorted((width, length))
+        if not any(_fits(cast(PolygonSet, region), short, long) for region in regions):
+            name = cast(PolygonSet, regions[0]).name if len(regions) == 1 else "any of these"
+            yield _warning(
+                "box-cannot-fit", f"a box of {width:.3g} m by {length:.3g} m fits nowhere into `{name}`",
+                requirement.span, "the whole box must lie inside",
+                "`X.position in R` asks of the centre of `X` alone",
+            )  # fmt: skip
+
+
+def _fits(region: PolygonSet, short: float, long: float) -> bool:
+    """Whether a box may fit into a part of a region, by the parts' smallest rectangles."""
+    if any(_may_hold(shape, short, long) for shape in region.polygons):
+        return True
+    if len(region.polygons) > _MOST_POLYGONS:
+        return True
+    joined = unary_union(region.polygons)
+    parts = joined.geoms if isinstance(joined, MultiPolygon) else (joined,)
+    return any(_may_hold(part, short, long) for part in parts if isinstance(part, Polygon))
+
+
+def _may_hold(shape: Polygon | MultiPolygon, short: float, long: float) -> bool:
+    if shape.is_empty or shape.area < short * long:
+        return False
+    frame = minimum_rotated_rectangle(shape)
+    if not isinstance(frame, Polygon):
+        return False
+    corners = list(frame.exterior.coords)
+    sides = sorted(math.dist(corners[place], corners[place + 1]) for place in (0, 1))
+    return sides[0] >= short - _ROUNDING_M and sides[1] >= long - _ROUNDING_M
+
+
+# --- classes
+
+
+def _folded(scenario: Scenario, options: MatchOptions) -> Iterator[Diagnostic]:
+    """Classes that the program names and `--classes coarse` does not tell from others."""
+    told: dict[str, None] = {}
+    for thing in scenario.objects:
+        if options.classes == "fine" or thing.category in told or not is_class(thing.category):
+            continue
+        folded = fold(thing.category, options.classes)
+        if folded != thing.category:
+            told[thing.category] = None
+            yield _warning(
+                "class-folded", f"with coarse classes `{thing.category}` matches every `{folded}`", thing.span,
+                "this class is folded", "`--classes fine` tells them apart",
+            )  # fmt: skip

@@ -1,0 +1,196 @@
+"""What the text of a program alone gives away: angles without `deg`, reversed ranges, names that nothing uses."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Iterator
+from functools import cache
+
+from scenicq.compiler.models import library_texts
+from scenicq.compiler.roots import root_classes
+from scenicq.errors import Diagnostic, Span
+from scenicq.syntax import ast
+from scenicq.syntax.walk import children, walk
+
+__all__ = ["lint_text"]
+
+_FULL_TURN = math.tau * (1 + 1e-9)
+_ANGLE_PROPERTIES = frozenset({"heading", "yaw", "roadDeviation", "viewAngle", "parentOrientation"})
+_ANGLES = (ast.RelativeHeading, ast.ApparentHeading, ast.Angle)
+_ORDERS = frozenset({"<", "<=", ">", ">=", "==", "!="})
+_RANGES = frozenset({"Range", "DiscreteRange", "TruncatedNormal"})
+_READ_BY_MODELS = frozenset({"ego", "workspace", "simulation", "simulator", "_"})
+_OF_SCENIC = frozenset({
+    "viewAngles", "orientationStdDev", "angularVelocity", "baseOffset", "onDirection", "visionSensorOffset",
+    "sideComponentThresholds", "lastActions", "pitch", "roll", "orientation", "shape", "contactTolerance", "occluding",
+    "viewRayDensity", "viewRayCount", "viewRayDistanceScaling", "showVisibleRegion", "sensors", "render",
+})  # fmt: skip
+"""Properties that Scenic's own classes have, and that say nothing of a box in the plane."""
+
+
+def _warning(code: str, message: str, span: Span, label: str, *hints: str) -> Diagnostic:
+    return Diagnostic(code, message, span, label, hints=hints, severity="warning")
+
+
+def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[Diagnostic]:
+    """What the text of a program gives away.
+
+    Args:
+        body: The program.
+        properties: Whether properties that no class has are named, too; with a dataset its labels say more.
+    """
+    nodes = list(walk(*body))
+    for node in nodes:
+        yield from _angles(node)
+        yield from _range(node)
+    yield from _unused(nodes)
+    if properties:
+        yield from _unknown_properties(nodes)
+
+
+# --- angles
+
+
+def _number(node: ast.Node) -> float | None:
+    """The value of a number that the text says outright."""
+    match node:
+        case ast.Constant(value=bool()):
+            return None
+        case ast.Constant(value=int() | float() as value):
+            return float(value)
+        case ast.UnaryOp(operator="-" | "+" as sign):
+            inner = _number(node.operand)
+            return None if inner is None else -inner if sign == "-" else inner
+        case ast.Deg():
+            inner = _number(node.value)
+            return None if inner is None else math.radians(inner)
+        case _:
+            return None
+
+
+def _terms(node: ast.Node) -> Iterator[ast.Node]:
+    """The numbers that an expression of an angle is made of, down to those with `deg`."""
+    stack = [node]
+    while stack:
+        each = stack.pop()
+        if _number(each) is not None:
+            yield each
+            continue
+        match each:
+            case ast.UnaryOp() | ast.RelativeTo() | ast.IfElse() | ast.Tuple():
+                stack.extend(reversed(tuple(children(each))))
+            case ast.BinaryOp(operator="+" | "-"):
+                stack += [each.right, each.left]
+            case ast.Call(function=ast.Name(id="Range" | "Uniform" | "DiscreteRange" | "Normal" | "abs")):
+                stack += [argument.value for argument in reversed(each.arguments)]
+            case _:
+                pass
+
+
+def _is_angle(node: ast.Node) -> bool:
+    match node:
+        case ast.Attribute(name=name):
+            return name in _ANGLE_PROPERTIES
+        case ast.UnaryOp(operator="-" | "+"):
+            return _is_angle(node.operand)
+        case ast.BinaryOp(operator="+" | "-"):
+            return _is_angle(node.left) or _is_angle(node.right)
+        case ast.Call(function=ast.Name(id="abs" | "min" | "max")):
+            return any(_is_angle(argument.value) for argument in node.arguments)
+        case _:
+            return isinstance(node, _ANGLES)
+
+
+def _angles(node: ast.Node) -> Iterator[Diagnostic]:
+    """Numbers of more than a full turn where an angle stands."""
+    places: list[ast.Node] = []
+    match node:
+        case ast.FacingSpecifier() | ast.ApparentlyFacingSpecifier():
+            places = [node.heading]
+        case ast.WithSpecifier(property=name) if name in _ANGLE_PROPERTIES:
+            places = [node.value]
+        case ast.PropertyDefault(name=name) if name in _ANGLE_PROPERTIES:
+            places = [node.value]
+        case ast.Compare():
+            sides = [node.left, *(each.right for each in node.comparisons if each.operator in _ORDERS)]
+            if any(map(_is_angle, sides)):
+                places = [side for side in sides if not _is_angle(side)]
+        case _:
+            pass
+    for place in places:
+        for term in _terms(place):
+            value = _number(term)
+            if value is not None and abs(value) > _FULL_TURN and not isinstance(term, ast.Deg):
+                text = term.span.text
+                yield _warning(
+                    "angle-without-deg", f"`{text}` is an angle of {abs(value) / math.tau:.1f} full turns", term.span,
+                    "angles are in radians", f"write `{text} deg` for degrees",
+                )  # fmt: skip
+
+
+# --- ranges
+
+
+def _range(node: ast.Node) -> Iterator[Diagnostic]:
+    match node:
+        case ast.Call(function=ast.Name(id=name)) if name in _RANGES and len(node.arguments) >= 2:
+            low, high = (_number(argument.value) for argument in node.arguments[-2:])
+            if low is not None and high is not None and low > high:
+                first, second = (argument.value.span.text for argument in node.arguments[-2:])
+                yield _warning(
+                    "range-reversed", f"this `{name}` ends before it starts", node.span,
+                    "the lower end comes first", f"write `{second}, {first}`",
+                )  # fmt: skip
+        case _:
+            pass
+
+
+# --- names
+
+
+def _unused(nodes: list[ast.Node]) -> Iterator[Diagnostic]:
+    """Variables that are set and never read; an object is there whether it is named again or not."""
+    assigned = [(target, node) for node in nodes if isinstance(node, ast.Assign) for target in node.targets]
+    written = {id(target) for target, _ in assigned}
+    read = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in written}
+    read |= {item.id for node in nodes if isinstance(node, ast.Global | ast.Nonlocal) for item in node.names}
+    # what is skipped because it happens over time may read anything
+    if any(isinstance(node, ast.DynamicDefinition | ast.DynamicStatement) for node in nodes):
+        return
+    held = {id(line) for node in nodes if isinstance(node, ast.ClassDef) for line in node.body}
+    told: set[str] = set()
+    for target, node in assigned:
+        if id(node) in held or any(isinstance(part, ast.New | ast.Call) for part in walk(node.value)):
+            continue
+        # up to Scenic 2 the bare name of a class is an object
+        if isinstance(node.value, ast.Name) and node.value.id[:1].isupper():
+            continue
+        if isinstance(target, ast.Name) and target.id not in read | told | _READ_BY_MODELS and target.id[0] != "_":
+            told.add(target.id)
+            near = difflib.get_close_matches(target.id, sorted(read), n=1)
+            hints = (f"`{near[0]}` is read, and spelled nearly like it",) if near else ()
+            yield _warning("unused-variable", f"nothing uses `{target.id}`", target.span, "set here", *hints)
+
+
+@cache
+def _library_properties() -> frozenset[str]:
+    lines = (node for module in library_texts() for node in walk(*module.body))
+    names = {line.name for line in lines if isinstance(line, ast.PropertyDefault)}
+    roots = {name for cls in root_classes(3).values() for name in cls.definitions}
+    return frozenset(names | roots) | _OF_SCENIC
+
+
+def _unknown_properties(nodes: Iterable[ast.Node]) -> Iterator[Diagnostic]:
+    """Properties that no class has and that the program does not read itself."""
+    nodes = list(nodes)
+    known = set(_library_properties())
+    known |= {node.name for node in nodes if isinstance(node, ast.PropertyDefault)}
+    known |= {node.name for node in nodes if isinstance(node, ast.Attribute)}
+    for node in nodes:
+        if isinstance(node, ast.WithSpecifier) and node.property not in known:
+            near = difflib.get_close_matches(node.property, sorted(known), n=1)
+            hints = [f"`{near[0]}` is spelled nearly like it"] if near else []
+            hints.append("where it is an attribute of labels, `scenicq check SCENARIO DATASET` says so")
+            message = f"no class has a property `{node.property}`, and nothing reads it"
+            yield _warning("unknown-property", message, node.property_span, "set here", *hints)

@@ -1,0 +1,1 @@
+"""Affine expressions and what linear programs say of them."""

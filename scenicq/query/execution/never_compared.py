@@ -1,0 +1,211 @@
+"""What a program sets and the labels of a dataset do not observe: it is not compared, and its author must know.
+
+One pass over the columns in question says for each property that the program sets in how many frames it is missing;
+what no label has is named with its line, what labels have instead, and a name spelled nearly like it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import Any
+
+import duckdb
+
+from scenicq.errors import Diagnostic, Span
+from scenicq.forest.groups import PARAMS
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.walk import features
+from scenicq.match.options import MatchOptions
+from scenicq.store.classes import ROOT, class_matches, subclasses
+from scenicq.store.dataset import Dataset
+from scenicq.store.sql import sql_text
+
+__all__ = ["Coverage", "coverage"]
+
+_COLUMNS = {
+    "heading": "heading", "width": "width", "length": "length", "height": "height", "velocity": "motion_vx",
+    "speed": "motion_vx", "angularSpeed": "yaw_rate", "acceleration": "acceleration",
+}  # fmt: skip
+"""Properties that have columns of their own; all others are attributes."""
+_READ = frozenset({"velocity", "speed", "angularSpeed", "acceleration"})
+"""Properties for which a library's default stands in where a requirement reads them, although it means nothing."""
+_NOT_SEEN = frozenset({
+    "position", "behavior", "requireVisible", "allowCollisions", "regionContainedIn", "visibleDistance", "viewAngle",
+    "cameraOffset", "mutationScale", "positionStdDev", "headingStdDev", "parentOrientation", "yaw", "baseOffset",
+})  # fmt: skip
+"""Properties that every label has, and those by which a program says what is seen, required or simulated."""
+_SAMPLED = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """How much of what a program sets is compared with a dataset.
+
+    Attributes:
+        warnings: One for each property that no label has (never-compared).
+        missing: Frames in which a property is missing that others have, by its name in the program.
+    """
+
+    warnings: tuple[Diagnostic, ...] = ()
+    missing: dict[str, int] = field(default_factory=dict[str, int])
+
+
+@dataclass(frozen=True, slots=True)
+class _Setting:
+    """A property that the program sets, or that a requirement of it reads.
+
+    Attributes:
+        what: In the words of the program, such as `car.speed`.
+        name: The property; of a parameter its name.
+        category: The class of the object; "" for a parameter.
+        ego: Whether the label's ego is meant, rather than the label objects.
+        span: Where it is set or read.
+        told: What is shown beside that place.
+        comparable: Whether its value is one that a label could have.
+    """
+
+    what: str
+    name: str
+    category: str
+    ego: bool
+    span: Span | None
+    told: str = "set here"
+    comparable: bool = True
+
+
+def _settings(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
+    """What a scenario sets or reads, each place once."""
+    for name, given in scenario.params.items():
+        if given.explicit and name not in options.ignore_params:
+            yield _Setting(f"param {name}", name, "", ego=True, span=given.span)
+    roots = [given.value for thing in scenario.objects for given in thing.properties.values()]
+    roots += [requirement.condition for requirement in scenario.requirements]
+    used = set(features(*roots))
+    for thing in scenario.objects:
+        ego = thing.index == scenario.ego and options.ego == "label"
+        for name, given in thing.properties.items():
+            own = given.explicit and name not in _NOT_SEEN and name not in thing.mutated
+            # a property that the program has for its own use is no claim about labels
+            if own and (name in _COLUMNS or (thing.index, name) not in used):
+                yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, given.span)
+        for name, span in thing.uncomparable.items():
+            if name not in _NOT_SEEN:
+                yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, span, comparable=False)
+    for requirement in scenario.requirements:
+        for index, name in features(requirement.condition):
+            if index == PARAMS or name not in _READ:
+                continue
+            thing = scenario.objects[index]
+            if not thing.properties[name].explicit:
+                ego = index == scenario.ego and options.ego == "label"
+                told = f"read here: the library's default for `{name}` stands in"
+                yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, requirement.span, told)
+
+
+def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOptions) -> Coverage:
+    """How much of what a program sets is compared with a dataset.
+
+    Args:
+        dataset: The dataset.
+        scenarios: The program, compiled over maps of the dataset.
+        options: Classes, ego and ignored parameters.
+    """
+    places: dict[tuple[Span | None, str, str], _Setting] = {}
+    for scenario in scenarios:
+        for each in _settings(scenario, options):
+            places.setdefault((each.span, each.name, each.category), each)
+    found = sorted(places.values(), key=lambda each: each.span.start if each.span is not None else 0)
+    if not found or not dataset.manifest.total.frames:
+        return Coverage()
+    with closing(dataset.connect()) as connection, dataset.blamed():
+        counts = _counts(connection, [each for each in found if each.comparable], options)
+        warnings: list[Diagnostic] = []
+        missing: dict[str, int] = {}
+        for each in found:
+            rows, present, lacking = counts.get(each, (1, 0, 0))
+            if not present and rows:
+                warnings.append(_warning(connection, each, options))
+            elif present and lacking:
+                missing[each.what] = max(lacking, missing.get(each.what, 0))
+    return Coverage(tuple(warnings), missing)
+
+
+def _classes(category: str, options: MatchOptions) -> str:
+    names = [name for name in subclasses(ROOT) if class_matches(category, name, options.classes)]
+    return f"({', '.join(map(sql_text, sorted(names)))})"
+
+
+def _present(each: _Setting) -> str:
+    """SQL that is true of a row that has the property."""
+    prefix = "ego_" if each.ego else ""
+    if each.category and each.name in _COLUMNS:
+        return f"{prefix}{_COLUMNS[each.name]} IS NOT NULL"
+    column = f"{prefix}attributes" if each.category else "params"
+    key = json.dumps(each.name, ensure_ascii=False) + ":"
+    return f"coalesce(contains({column}, {sql_text(key)}), false)"
+
+
+def _counts(
+    connection: duckdb.DuckDBPyConnection, asked: list[_Setting], options: MatchOptions
+) -> dict[_Setting, tuple[int, int, int]]:
+    """For each property the rows that could have it, those that do, and the frames in which one does not."""
+    found: dict[_Setting, tuple[int, int, int]] = {}
+    for table in ("labels", "objects"):
+        mine = [each for each in asked if each.ego == (table == "labels")]
+        if not mine:
+            continue
+        columns: list[str] = []
+        for each in mine:
+            column = "ego_class" if each.ego else "class"
+            own = f"{column} IN {_classes(each.category, options)}" if each.category else "true"
+            has = _present(each)
+            columns += [
+                f"count(*) FILTER ({own})",
+                f"count(*) FILTER ({own} AND {has})",
+                f"count(DISTINCT frame) FILTER ({own} AND NOT ({has}))",
+            ]
+        row = connection.execute(f"SELECT {', '.join(columns)} FROM {table}").fetchone()
+        assert row is not None
+        for place, each in enumerate(mine):
+            found[each] = (row[3 * place], row[3 * place + 1], row[3 * place + 2])
+    return found
+
+
+def _known(connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> list[str]:
+    """The properties that labels have of such an object beside class and position, or the parameters that they have."""
+    table, prefix = ("labels", "ego_") if each.ego else ("objects", "")
+    own = f"{prefix}class IN {_classes(each.category, options)}" if each.category else "true"
+    names: list[str] = []
+    if each.category:
+        flags = ", ".join(f"bool_or({prefix}{column} IS NOT NULL)" for column in _COLUMNS.values())
+        row = connection.execute(f"SELECT {flags} FROM {table} WHERE {own}").fetchone() or ()
+        names = [name for name, there in zip(_COLUMNS, row, strict=True) if there]
+    column = f"{prefix}attributes" if each.category else "params"
+    query = f"SELECT DISTINCT {column} FROM {table} WHERE {own} AND {column} IS NOT NULL ORDER BY ALL LIMIT {_SAMPLED}"
+    further: set[str] = set()
+    for (text,) in connection.execute(query).fetchall():
+        values: dict[str, Any] = json.loads(text)
+        further.update(values)
+    return names + sorted(further - set(names))
+
+
+def _warning(connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> Diagnostic:
+    known = _known(connection, each, options)
+    kind = "the ego" if each.ego else f"`{each.category}`"
+    if not each.category:
+        message = f"`{each.what}` is never compared: no label of the dataset has such a parameter"
+        have = f"parameters of the labels: {', '.join(known) or 'none'}"
+    elif not each.comparable:
+        message = f"`{each.what}` is never compared: no property of a label is a list, a tuple or the like"
+        have = f"the labels have of {kind}: {', '.join(known) or 'class and position alone'}"
+    else:
+        message = f"`{each.what}` is never compared: no label of {kind} in the dataset has it"
+        have = f"the labels have of {kind}: {', '.join(known) or 'class and position alone'}"
+    near = [name for name in difflib.get_close_matches(each.name, [*known, *_COLUMNS], n=1) if name != each.name]
+    absent = "" if not near or near[0] in known else ", which the labels do not have either"
+    hints = (have, *(f"`{name}` is spelled nearly like it{absent}" for name in near))
+    return Diagnostic("never-compared", message, each.span, each.told, hints=hints, severity="warning")
