@@ -111,10 +111,10 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @SENSORS
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
-@click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of a "
-              "dynamic program over time.")
-@click.option("--min-duration", metavar="S", type=click.FloatRange(0), help="Find intervals of at least S seconds: of a "
-              "program about one instant, those in which every frame matches with the same objects.")
+@click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of "
+              "a dynamic program over time.")
+@click.option("--min-duration", metavar="S", type=click.FloatRange(0), help="Find intervals of at least S seconds: of "
+              "a program about one instant, those in which every frame matches with the same objects.")
 @click.option("--intervals", type=click.Choice(["longest", "all"]), default="longest",
               help="Of intervals that overlap the longest, or one for each frame that one can start at.")
 @click.option("--gap", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULT_GAP_S,

@@ -198,7 +198,8 @@ class AtomColumns:
             return _Column(np.full(n, value), status)
         if isinstance(value, tuple):
             return _Column((np.full(n, value[0]), np.full(n, value[1])), status)
-        return _Column([value] * n, status)
+        values: list[Value] = [value] * n
+        return _Column(values, status)
 
     def _feature(self, node: Feature) -> _Column | None:
         """What is observed of a feature; None if no sample has it."""

@@ -2,7 +2,7 @@
 
 A binding gives each object of the scenario a track, for the whole interval. A start is a sample whose label matches
 the initial scene under a binding. From the starts of one binding all runs are followed together, on columns over the
-samples in which all tracks live; where conditions hang on random variables of the scene, once for each cell of their values.
+samples in which all tracks live; where conditions hang on random variables of the scene, once for each cell of values.
 """
 
 from __future__ import annotations
@@ -261,7 +261,9 @@ def _follow(
 
 def _interval(run: Run, start: Start, samples: Samples, binding: tuple[tuple[int, TrackKey], ...]) -> Interval:
     truth = min(run.truth, int(TRUE if isinstance(start.verdict, Match) else UNKNOWN))
-    witness = start.verdict.witness if isinstance(start.verdict, Match) else {}
+    witness: Mapping[str, WitnessValue] = (
+        start.verdict.witness if isinstance(start.verdict, Match) else dict[str, WitnessValue]()
+    )
     reason = "" if truth != UNKNOWN else "unobserved" if isinstance(start.verdict, Match) else start.verdict.reason
     first = samples.first
     return Interval(first + run.start, first + run.end, truth, binding, witness, reason, run.broken, run.cut_off)

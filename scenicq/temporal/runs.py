@@ -6,6 +6,7 @@ each i; any other may end anywhere, and then j is the last sample up to which ev
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -60,7 +61,7 @@ def runs_from(
     watched = [run_monitor(monitor, atom, n) for monitor in dynamics.monitors]
     if dynamics.terminates:
         return _terminating(dynamics, atom, seconds, starts, watched)
-    found = {start: Run(start, start, FALSE) for start in starts}
+    found = {start: Run(start, start, int(FALSE)) for start in starts}
     broken: dict[int, Span | None] = {}
     size = max(1, _MOST_CELLS // max(n, 1))
     for first in range(0, n, size):
@@ -112,12 +113,12 @@ def _terminating(
     for termination in dynamics.terminations:
         if termination.condition is not None:
             ended = np.maximum(ended, atom(termination.condition))
-    after_s = min((each.after_s for each in dynamics.terminations if each.after_s is not None), default=np.inf)
+    after_s = min((each.after_s for each in dynamics.terminations if each.after_s is not None), default=math.inf)
     sure, possible = _first_from(ended == TRUE), _first_from(ended >= UNKNOWN)
     spans: list[tuple[int, int, bool]] = []
     for start in starts:
         outcomes = [outcomes[start] for outcomes in watched]
-        late = int(np.searchsorted(seconds, seconds[start] + after_s - _SLACK_S)) if np.isfinite(after_s) else n
+        late = int(np.searchsorted(seconds, seconds[start] + after_s - _SLACK_S)) if math.isfinite(after_s) else n
         last = min([int(sure[start]), max(late, start), *(outcome.ends for outcome in outcomes)])
         unclear = min([int(possible[start]), *(outcome.unclear for outcome in outcomes)])
         spans.append((min(unclear, last), last, unclear < last))
@@ -140,7 +141,7 @@ def _terminating(
             # its samples are over, unless a monitor has rejected it before
             rejected = min((outcome.rejects for outcome in outcomes), default=NEVER)
             broken = None if rejected == NEVER else _broken(dynamics, np.empty(0, np.int8), outcomes)
-            found.append(Run(start, n - 1, FALSE, broken, cut_off=rejected == NEVER))
+            found.append(Run(start, n - 1, int(FALSE), broken, cut_off=rejected == NEVER))
         elif not unclear:
             truth = truths[last]
             broken = _broken(dynamics, holds[last][:, place], outcomes) if truth == FALSE else None
@@ -149,7 +150,7 @@ def _terminating(
             open_ends = [end for end, truth in truths.items() if truth > FALSE]
             end = last if last < n else open_ends[0] if open_ends else first
             # where the end itself is not seen, it may still come
-            found.append(Run(start, end, UNKNOWN if open_ends or last >= n else FALSE))
+            found.append(Run(start, end, int(UNKNOWN if open_ends or last >= n else FALSE)))
     return found
 
 

@@ -87,7 +87,7 @@ class BlockExecutor:
                 yield from self._elsewhere([half], tries=1 if half.divisible else _TRIES)
             return
         if block.runs:
-            yield lost_recording(self._dataset, block)
+            yield Decided(np.full(block.end - block.first, -1, np.int16), [], [], lost_recording(self._dataset, block))
             return
         for label in every_label(self._dataset, block):
             lost = Unknown("crash", Cause("process", "every process that matched this frame died"))

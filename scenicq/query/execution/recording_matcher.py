@@ -149,7 +149,7 @@ def starts_of(scenario: Scenario, label: Label, sample: int, findings: Iterable[
         else:
             by_id = {thing.id: thing for thing in label.objects} | {"ego": label.ego}
             names = {thing.name: thing.index for thing in scenario.objects}
-            whole = verdict.correspondence if isinstance(verdict, Unknown) else {}
+            whole = verdict.correspondence
             if len(whole) < len(scenario.objects):
                 if isinstance(verdict, Unknown):
                     yield verdict
@@ -193,10 +193,11 @@ def _undecided(tracks: RecordingTracks, sample: int, verdict: Unknown) -> Result
     return Result(frame, tracks.name, time_us, verdict, interval=IntervalSpan(frame, time_us, 1, open_ended=True))
 
 
-def lost_recording(dataset: Dataset, block: Block) -> Result:
-    """The result of a recording that kills every process that takes it."""
+def lost_recording(dataset: Dataset, block: Block) -> DecidedRecordings:
+    """The one result of a recording that kills every process that takes it."""
     with TrackReader(dataset, block.part) as reader:
         tracks = reader.read(block.first, block.end)
     lost = Unknown("crash", Cause("process", "every process that matched this recording died"))
     span = IntervalSpan(tracks.frames[-1], int(tracks.times_us[-1]), len(tracks), open_ended=True)
-    return Result(tracks.frames[0], tracks.name, int(tracks.times_us[0]), lost, interval=span)
+    result = Result(tracks.frames[0], tracks.name, int(tracks.times_us[0]), lost, interval=span)
+    return DecidedRecordings([result], Counter(recordings=1))

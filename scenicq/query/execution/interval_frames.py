@@ -1,0 +1,35 @@
+"""The frames of an interval, with the label objects that play the roles in each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+
+from scenicq.match.verdict import NoMatch
+from scenicq.query.execution.results import Result
+from scenicq.store.dataset import Dataset
+from scenicq.store.labels import Label
+from scenicq.store.sql import sql_text
+
+__all__ = ["frames_of"]
+
+
+def frames_of(dataset: Dataset, result: Result) -> Iterator[tuple[Label, dict[str, str]]]:
+    """The labels of an interval in order of time, each with the label object of each role that is observed there.
+
+    Args:
+        dataset: The dataset.
+        result: Of an interval.
+    """
+    span = result.interval
+    if span is None:
+        raise ValueError("the result is of a frame")
+    where = f"recording = {sql_text(result.recording)} AND timestamp_us BETWEEN {result.timestamp_us} AND {span.end_us}"
+    with closing(dataset.connect()) as connection:
+        names = [name for (name,) in connection.execute(f"SELECT frame FROM labels WHERE {where}").fetchall()]
+    verdict = result.verdict
+    correspondence = verdict.partial if isinstance(verdict, NoMatch) else verdict.correspondence
+    for label in dataset.labels(names):
+        objects = {each.track if each.track is not None else each.id: each.id for each in label.objects}
+        objects["ego"] = "ego"
+        yield label, {role: objects[track] for role, track in correspondence.items() if track in objects}
