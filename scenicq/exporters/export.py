@@ -94,9 +94,7 @@ class Exporter:
         if isinstance(result.verdict, Match) and result.interval is not None:
             for label, roles in frames_of(self.dataset, result):
                 self._further += label.frame in self._matched
-                self._matched.setdefault(
-                    label.frame, Matched(label.frame, label.recording, roles, dict(label.sensors))
-                )
+                self._matched.setdefault(label.frame, Matched(label.frame, label.recording, roles, dict(label.sensors)))
         elif isinstance(result.verdict, Match):
             roles = dict(result.verdict.correspondence)
             self._further += result.frame in self._matched
