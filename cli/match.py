@@ -131,7 +131,7 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
           sensors: Path | None, engine: Engine | None, explain: bool, exit_zero: bool, summary: bool, quiet: bool,
           **given: Any) -> None:
     # fmt: on
-    """Find the frames of a dataset that match a scenario, or the intervals that match a dynamic one.
+    """Find the frames or intervals of a dataset that match a scenario.
 
     Results go to standard output, one a line; progress and summary to standard error. Each match comes with the label
     object of every role and with values of the random variables that prove it.

@@ -70,6 +70,13 @@ class RecordingTracks:
         """The number of samples."""
         return len(self.frames)
 
+    def key(self, name: str) -> TrackKey:
+        """The track of a name, or the label object of it that has no track."""
+        found = ("track", name)
+        if found in self._rows:
+            return found
+        return next((key for key in self._rows if key[0] == "object" and key[1].endswith(f"\n{name}")), found)
+
     def column(self, track: TrackKey, name: str) -> Numbers:
         """The values of a column of `objects` over all samples, shape (n,); nan where there is none."""
         key = track, name

@@ -118,7 +118,9 @@ def _terminating(
     spans: list[tuple[int, int, bool]] = []
     for start in starts:
         outcomes = [outcomes[start] for outcomes in watched]
-        late = int(np.searchsorted(seconds, seconds[start] + after_s - _SLACK_S)) if math.isfinite(after_s) else n
+        late = n
+        if math.isfinite(after_s):
+            late = int(np.searchsorted(seconds, float(seconds[start]) + after_s - _SLACK_S))
         last = min([int(sure[start]), max(late, start), *(outcome.ends for outcome in outcomes)])
         unclear = min([int(possible[start]), *(outcome.unclear for outcome in outcomes)])
         spans.append((min(unclear, last), last, unclear < last))

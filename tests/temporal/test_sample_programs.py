@@ -121,3 +121,39 @@ def test_near_misses_are_of_frames_alone(town):
     done = CliRunner().invoke(cli, words)
     assert done.exit_code == 2
     assert "--near" in done.stderr
+
+
+def explained(town, program, what):
+    words = ["explain", str(program), str(town), what, "--tolerance", "position=0.25,heading=5deg"]
+    return CliRunner().invoke(cli, words)
+
+
+def test_a_match_is_explained_by_what_holds_when(town):
+    done = explained(town, PROGRAMS / "02_cut_in.scenic", "06-cut-in")
+    assert done.exit_code == 0
+    assert "recording 06-cut-in matches from 3.0 s to 7.0 s (9 frames from 06-cut-in/06)" in done.output
+    assert "correspondence: ego = ego, other = car-cutting" in done.output
+    assert "abs(to_the_left(other)) < 0.5                     ........#" in done.output
+
+
+def test_what_is_broken_is_said_with_its_place_time_and_margin(town, tmp_path):
+    text = (PROGRAMS / "02_cut_in.scenic").read_text().replace("always ahead(other) > 0", "always ahead(other) > 3")
+    program = tmp_path / "cut_in.scenic"
+    program.write_text(text)
+    done = explained(town, program, "06-cut-in")
+    assert done.exit_code == 1
+    assert "does not match" in done.output
+    assert "require always ahead(other) > 3" in done.output
+    assert "off by 0.8" in done.output
+
+
+def test_a_recording_without_a_start_says_what_its_frames_fail_at(town):
+    done = explained(town, PROGRAMS / "02_cut_in.scenic", "05-two-lane-traffic")
+    assert done.exit_code == 1
+    assert "no frame of 05-two-lane-traffic matches the initial scene" in done.output
+
+
+def test_a_time_that_a_recording_does_not_have_is_refused(town):
+    done = explained(town, PROGRAMS / "02_cut_in.scenic", "06-cut-in@5")
+    assert done.exit_code == 2
+    assert "has no frame at 5" in done.stderr

@@ -5,13 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import closing
 
+from scenicq.errors import DataError, Diagnostic
 from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.results import Result
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.store.sql import sql_text
 
-__all__ = ["frames_of"]
+__all__ = ["frames_of", "locate"]
+
+
+def locate(dataset: Dataset, recording: str) -> tuple[int, int, int]:
+    """Where a recording is: the number of its part, its first row of `labels`, and the row behind its last.
+
+    Raises:
+        DataError: option-invalid: there is no such recording.
+    """
+    with closing(dataset.connect()) as connection:
+        for part, path in enumerate(dataset.files("labels")):
+            found = connection.execute(
+                "SELECT min(file_row_number), max(file_row_number) + 1 "
+                f"FROM read_parquet({sql_text(str(path))}, file_row_number = true) WHERE recording = ?",
+                [recording],
+            ).fetchone()
+            if found is not None and found[0] is not None:
+                return part, found[0], found[1]
+    raise DataError(Diagnostic("option-invalid", f"the dataset has no recording `{recording}`"))
 
 
 def frames_of(dataset: Dataset, result: Result) -> Iterator[tuple[Label, dict[str, str]]]:

@@ -62,7 +62,8 @@ def record(result: Result) -> dict[str, Any]:
     """A result as plain values with stable keys in a stable order, ready for JSON."""
     verdict = result.verdict
     name = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}[type(verdict)]
-    found = _which(result) | {"verdict": name, "correspondence": {}, "witness": {}}
+    found = _which(result)
+    found["verdict"], found["correspondence"], found["witness"] = name, {}, {}
     match verdict:
         case Match():
             found["correspondence"] = dict(verdict.correspondence)
