@@ -22,29 +22,29 @@ from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import ready
 from scenicq.query.execution.compiled_map import program_network, read_network
 from scenicq.query.execution.never_compared import coverage
-from scenicq.query.execution.run import beside, read_program
+from scenicq.query.execution.option_texts import VERSIONS
+from scenicq.query.execution.run import beside
 from scenicq.store.dataset import Dataset, open_dataset
 
 from .cache import user_cache
 from .main import ERROR
 from .manual import Manual
+from .programs import SCENARIO, read_scenario
 from .remarks import LINTED_MAPS
 from .report import as_json, count, show
 
 __all__ = ["check", "networks_of", "read_version"]
 
-_VERSIONS: dict[str, Literal[1, 2, 3]] = {"1": 1, "2": 2, "3": 3}
-
 
 def read_version(text: str | None) -> Literal[1, 2, 3] | None:
     """The version of Scenic that `--scenic` names; None where it is to be inferred."""
-    return None if text is None else _VERSIONS[text]
+    return None if text is None else VERSIONS[text]
 
 
 def networks_of(
     dataset: str | None,
     map_file: Path | None,
-    program: Path,
+    source: Source,
     version: Literal[1, 2, 3] | None,
     warnings: list[Diagnostic] | None = None,
 ) -> Iterator[Network]:
@@ -64,7 +64,7 @@ def networks_of(
         yield read_network(map_file, user_cache() / "maps")
     else:
         try:
-            named = program_network(read_program(program), program.parent, version, user_cache() / "maps")
+            named = program_network(source, Path(source.name).parent, version, user_cache() / "maps")
         except DataError as error:
             if warnings is None:
                 raise
@@ -155,7 +155,7 @@ def _found(
 @click.command(
     cls=Manual,
     arguments={
-        "SCENARIO": "A Scenic program, as a file.",
+        "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made: the program is read on each of its maps.",
     },
     exits={0: "the program is sound"},
@@ -197,10 +197,11 @@ def check(ctx: click.Context, scenario: Path, dataset: str | None, *, map_file: 
     details: Details = [show_forest] * forest + [_groups] * groups
     try:
         version, warnings = read_version(scenic), list[Diagnostic]()
-        networks = networks_of(dataset, map_file, scenario, version, warnings)
+        source = read_scenario(scenario)
+        networks = networks_of(dataset, map_file, source, version, warnings)
         opened = None if dataset is None else open_dataset(dataset)
         asked = _Asked(MatchOptions(classes=classes), opened, opened is not None or map_file is not None, strict)
-        lines, diagnostics = _found(read_program(scenario), networks, version, initial, details, asked)
+        lines, diagnostics = _found(source, networks, version, initial, details, asked)
         diagnostics += warnings
     except ScenicqError as error:
         if format_ == "text":

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
+from scenicq.query.execution.result_files import read_results
 from scenicq.report.changes import changes, changes_page, changes_text
-from scenicq.report.result_files import read_results
 
 from .manual import Manual
 from .output import destination, writing

@@ -62,7 +62,7 @@ def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wa
     close: list[Result] | None = None if report is None else []
     with destination(file, wanted.work) as sink, bar, contextlib.closing(results):
         with writing(file):
-            writer = make_writer(wanted.form, sink, over_time=query.is_over_time())
+            writer = make_writer(wanted.form, sink, query.roles, over_time=query.is_over_time())
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
                 writer.write(record(result))

@@ -11,33 +11,21 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.query.explain.interval_explanation import explain_recording
-from scenicq.store.dataset import Dataset, open_dataset
-from scenicq.store.labels import Label
+from scenicq.store.dataset import open_dataset
 
 from .main import NOTHING
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
+from .programs import SCENARIO, read_scenario
 from .remarks import show_remarks
 from .report import plain
 
-__all__ = ["explain", "find_label"]
-
-
-def find_label(dataset: Dataset, frame: str) -> Label:
-    """The label of a frame.
-
-    Raises:
-        DataError: option-invalid: there is no such frame.
-    """
-    for label in dataset.labels([frame]):
-        return label
-    hint = "`scenicq match SCENARIO DATASET --all` lists the frames"
-    raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{frame}`", hints=(hint,)))
+__all__ = ["explain"]
 
 
 def _recording(query: Query, named: str) -> tuple[str, int | None] | None:
@@ -52,7 +40,7 @@ def _recording(query: Query, named: str) -> tuple[str, int | None] | None:
 @click.command(
     cls=Manual,
     arguments={
-        "SCENARIO": "A Scenic program, as a file.",
+        "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
         "FRAME": "The name of a frame, as `scenicq match` prints it; of a program about "
         "what happens over time the name of a recording, and after `@` the timestamp at which the interval begins.",
@@ -78,7 +66,7 @@ def explain(
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
-    query = Query(open_dataset(dataset), read_program(scenario), query_options({**given, **ONE_FRAME}))
+    query = Query(open_dataset(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
     if query.is_over_time() and (named := _recording(query, frame)) is not None:
         with LazySolver(query.options.solver) as solver:
             told = explain_recording(query, solver, *named)
@@ -86,7 +74,7 @@ def explain(
         if not told.matches and not exit_zero:
             ctx.exit(NOTHING)
         return
-    label = find_label(query.dataset, frame)
+    label = query.dataset.label(frame)
     show_remarks(query, [label.map])
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, BinaryIO, Protocol
 
-import pyarrow as pa
 import pyarrow.parquet as pq
+
+from scenicq.query.execution.result_tables import result_schema, result_table
 
 from .table import Table, Text
 
@@ -39,20 +40,13 @@ _INTERVAL_COLUMNS: tuple[str, ...] = (
     "recording",
     "start_us",
     "end_us",
-    "first_frame",
-    "last_frame",
-    "frame_count",
+    "frames",
     "verdict",
     "correspondence",
     "witness",
     "cause",
     "open_ended",
 )
-_TYPES = {
-    "timestamp_us": pa.int64(), "start_us": pa.int64(), "end_us": pa.int64(), "frame_count": pa.int64(),
-    "open_ended": pa.bool_(),
-}  # fmt: skip
-"""Types of the columns that are no texts."""
 
 
 class Writer(Protocol):
@@ -84,12 +78,9 @@ class _Lines:
 
 
 def _flat(record: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    """A row of plain cells; nested values become JSON text."""
-    if "frames" in record:
-        record = {**record, **{f"{key}_frame": record["frames"][key] for key in ("first", "last")}}
-        record["frame_count"] = record["frames"]["count"]
+    """A row of plain cells; nested values and truth values become JSON text."""
     cells = {name: record.get(name, {}) for name in names}
-    return {name: _json(cell) if isinstance(cell, Mapping) else cell for name, cell in cells.items()}
+    return {name: _json(cell) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()}
 
 
 def _name(record: Mapping[str, Any]) -> str | None:
@@ -113,19 +104,18 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, names: tuple[str, ...]) -> None:
-        self._names = names
-        self._schema = pa.schema([(name, _TYPES.get(name, pa.string())) for name in names])
+    def __init__(self, sink: BinaryIO, roles: Sequence[str], *, over_time: bool) -> None:
+        self._schema = result_schema(roles, over_time=over_time)
         self._file = pq.ParquetWriter(sink, self._schema)
-        self._rows: list[dict[str, Any]] = []
+        self._rows: list[Mapping[str, Any]] = []
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.append(_flat(record, self._names))
+        self._rows.append(record)
         if len(self._rows) >= 10_000:
             self._spill()
 
     def _spill(self) -> None:
-        self._file.write_table(pa.Table.from_pylist(self._rows, schema=self._schema))
+        self._file.write_table(result_table(self._rows, self._schema))
         self._rows.clear()
 
     def finish(self) -> None:
@@ -133,17 +123,18 @@ class _Parquet:
         self._file.close()
 
 
-def make_writer(name: str, sink: BinaryIO, *, over_time: bool = False) -> Writer:
+def make_writer(name: str, sink: BinaryIO, roles: Callable[[], Sequence[str]], *, over_time: bool = False) -> Writer:
     """The writer of a format.
 
     Args:
         name: One of `FORMATS`.
         sink: Where to; it stays open.
+        roles: Gives the roles that results may name; asked where they are columns.
         over_time: Whether the results are intervals.
     """
     names = _INTERVAL_COLUMNS if over_time else _COLUMNS
     if name == "parquet":
-        return _Parquet(sink, names)
+        return _Parquet(sink, roles(), over_time=over_time)
     text = Text(sink)
     match name:
         case "table":

@@ -10,6 +10,7 @@ from scenicq.exporters.export import EXPORTS
 from scenicq.query.execution.partitions import Gathered
 from scenicq.query.execution.partitions import gather as find_pieces
 from scenicq.query.execution.record_reader import noted_question, read_record
+from scenicq.query.execution.result_tables import roles_of
 
 from .deliver import Wanted, deliver
 from .formats import FORMATS, make_writer
@@ -62,7 +63,8 @@ def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Pat
 
 def _write(gathered: Gathered, file: Path | None, form: str) -> None:
     with destination(file) as sink, writing(file):
-        writer = make_writer(form, sink)
+        over_time = "frames" in next(gathered.records(), {})
+        writer = make_writer(form, sink, lambda: roles_of(gathered.records()), over_time=over_time)
         for each in gathered.records():
             writer.write(each)
         writer.finish()

@@ -33,6 +33,7 @@ COMMANDS = {
     "sample": "Draw scenes from a scenario, as labels.",
     "explain": "Say why a frame or recording matches, or what keeps it from it and what would do.",
     "show": "Draw one frame from above: map, boxes, and what a scenario says of it.",
+    "evaluate": "Say whether a model fails on the frames that match.",
     "report": "Say which matches came, went and stayed between two result files.",
     "info": "Say what a dataset holds and what was left out of it.",
     "index": "Compute anew what a dataset holds beside the labels.",

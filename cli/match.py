@@ -16,7 +16,7 @@ import click
 
 from scenicq.exporters.export import EXPORTS
 from scenicq.query.execution.results import Result
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.store.dataset import open_dataset
@@ -32,6 +32,7 @@ from .options import DEFAULTS, TOPICS, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
+from .programs import SCENARIO, given_program
 from .remarks import show_remarks
 from .sources import SENSORS
 
@@ -48,7 +49,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.command(
     cls=Manual,
     arguments={
-        "SCENARIO": "A Scenic program, as a file.",
+        "SCENARIO": f"{SCENARIO} Not with -e.",
         "DATASET": "A folder that `scenicq ingest` made.",
     },
     exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
@@ -57,10 +58,13 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
     "  scenicq match crossing.scenic dataset --tolerance position=0.25,heading=5deg\n"
     "  scenicq match crossing.scenic dataset --format ids | head\n"
     "  scenicq match crossing.scenic dataset -o matches.parquet --summary\n"
+    "  scenicq match -e 'ego = new Car; new Pedestrian ahead of ego by Range(0, 20)' dataset --tolerance position=2\n"
     "  seq 16 | xargs -P 4 -I{} scenicq match crossing.scenic dataset --shard {}/16 -o pieces --exit-zero"
 )
-@click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path())
+@click.argument("scenario", metavar="SCENARIO", type=click.Path(path_type=Path), required=False)
+@click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
+@click.option("-e", "--program", metavar="TEXT", help="The program itself, in place of SCENARIO; `;` separates "
+              "statements, and the driving world model is there unless it imports another.")
 @click.option("--tolerance", metavar="LIST",
               help="How far labels may be off: position=0.25,heading=5deg, or x=, y=, heading=. Lengths in metres, "
               "angles in deg or rad.  [default: 1e-3 m, 1e-3 rad]")
@@ -126,10 +130,10 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
-def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | None, output: Path | None,
-          export: tuple[str, Path] | None, near: int | None, report: Path | None, shard: Shard | None, resume: bool,
-          sensors: Path | None, engine: Engine | None, explain: bool, exit_zero: bool, summary: bool, quiet: bool,
-          **given: Any) -> None:
+def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
+          output: Path | None, export: tuple[str, Path] | None, near: int | None, report: Path | None,
+          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool,
+          exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames or intervals of a dataset that match a scenario.
 
@@ -141,7 +145,8 @@ def match(ctx: click.Context, scenario: Path, dataset: str, *, format_: str | No
     chosen = choose_format(format_, None if shard else file)
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
-    query = Query(open_dataset(dataset), read_program(scenario), query_options(given))
+    source, target, model = given_program(ctx, program, scenario, dataset)
+    query = Query(open_dataset(target), source, query_options({**given, "model": model}))
     if near is not None and query.is_over_time():
         raise click.UsageError("--near looks for frames: it cannot be had with intervals", ctx)
     if explain:

@@ -6,16 +6,13 @@ import shlex
 import shutil
 from typing import Any
 
-from scenicq.compiler.temporal import Behaviors
-from scenicq.errors import DataError, Diagnostic, SolverError
-from scenicq.forest.scenario import BuiltIn
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.errors import Diagnostic, SolverError
+from scenicq.match.options import MatchOptions
+from scenicq.query.execution.option_texts import OptionTexts, read_options
 from scenicq.query.execution.run import QueryOptions
-from scenicq.temporal.intervals import DEFAULT_GAP_S, IntervalOptions
+from scenicq.temporal.intervals import DEFAULT_GAP_S
 
-from .check import read_version
-
-__all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "built_ins", "query_options"]
+__all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "query_options"]
 
 DEFAULTS = MatchOptions()
 """What counts as a match unless options say otherwise."""
@@ -43,34 +40,6 @@ ONE_FRAME = {
 """The rest of the options of a query about one frame."""
 
 
-def _names(text: str | None) -> list[str]:
-    return [name.strip() for name in (text or "").split(",") if name.strip()]
-
-
-def built_ins(text: str | None, *others: str) -> frozenset[BuiltIn]:
-    """The built-in requirements of a list.
-
-    Args:
-        text: Names, separated by commas.
-        others: Names that may stand among them.
-
-    Raises:
-        DataError: option-invalid.
-    """
-    known = [*BuiltIn, *others]
-    for name in _names(text):
-        if name not in known:
-            hint = f"known are {', '.join(known)}, separated by commas"
-            raise DataError(Diagnostic("option-invalid", f"`{name}` is no built-in requirement", hints=(hint,)))
-    return frozenset(BuiltIn(name) for name in _names(text) if name not in others)
-
-
-def _enforced(text: str | None) -> frozenset[BuiltIn]:
-    """The built-in requirements in force: visibility always, unless the list has `none`."""
-    asked = built_ins(text, "none")
-    return asked if "none" in _names(text) else asked | DEFAULTS.enforce
-
-
 def _check_solver(name: str) -> None:
     """Refuse a name that nothing answers to at once, rather than at the first frame that needs the solver."""
     try:
@@ -84,22 +53,5 @@ def _check_solver(name: str) -> None:
 
 def query_options(given: dict[str, Any]) -> QueryOptions:
     """The options of a query from those of the command line."""
-    tolerance = given["tolerance"]
     _check_solver(given["solver"])
-    options = MatchOptions(
-        tolerance=DEFAULTS.tolerance if tolerance is None else parse_tolerance(tolerance),
-        classes=given["classes"],
-        ego=given["ego"],
-        radius=given["radius"],
-        enforce=_enforced(given["enforce"]),
-        exact=given["exact"],
-        method=given["method"],
-        timeout_s=given["timeout"],
-        budget=given["budget"],
-        ignore_params=DEFAULTS.ignore_params.union(_names(given["ignore_params"])),
-    )
-    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches", "strict")
-    time = IntervalOptions(given["intervals"], given["min_duration"], given["gap"])
-    named = {name: given[name] for name in same}
-    behaviors: Behaviors = given["behaviors"] or "refuse"
-    return QueryOptions(match=options, version=read_version(given["scenic"]), behaviors=behaviors, time=time, **named)
+    return read_options(**{name: given[name] for name in OptionTexts.__annotations__ if name in given})

@@ -8,11 +8,12 @@ import click
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.exporters.sample import sample_labels, sample_record, write_sample
-from scenicq.query.execution.run import beside, read_program
+from scenicq.query.execution.option_texts import read_built_ins
+from scenicq.query.execution.run import beside
 
 from .check import networks_of, read_version
 from .manual import Manual
-from .options import built_ins
+from .programs import SCENARIO, read_scenario
 
 __all__ = ["sample"]
 
@@ -20,7 +21,7 @@ __all__ = ["sample"]
 @click.command(
     cls=Manual,
     arguments={
-        "SCENARIO": "A Scenic program, as a file.",
+        "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made, for its map.",
     },
     epilog="\b\nExamples:\n"
@@ -50,11 +51,11 @@ def sample(scenario: Path, dataset: str | None, *, map_file: Path | None, number
     the first map of the dataset, the map that is given, the one that the program names with `param map =
     localPath('FILE')`, or else a small built-in street. One line of JSON a scene.
     """
-    source = read_program(scenario)
+    source = read_scenario(scenario)
     version = read_version(scenic)
-    network = next(networks_of(dataset, map_file, scenario, version))
+    network = next(networks_of(dataset, map_file, source, version))
     compiled = compile_scenario(source, network, version=version, initial=initial, loader=beside(scenario))
-    labels = sample_labels(compiled, number, seed, built_ins(waive))
+    labels = sample_labels(compiled, number, seed, read_built_ins(waive))
     if output is not None:
         write_sample(labels, network, scenario.stem, output)
         return

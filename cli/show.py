@@ -12,7 +12,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.frames import frame_page
@@ -22,11 +22,11 @@ from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label
 
-from .explain import find_label
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
+from .programs import read_scenario
 from .remarks import show_remarks
 from .sources import SENSORS, sensor_root
 
@@ -50,7 +50,7 @@ def _kind(output: Path | None) -> str:
 def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str, Any]) -> tuple[Shot, Backdrop]:
     if scenario is None:
         return Shot(label), Backdrop(dataset.network(label.map))
-    query = Query(dataset, read_program(scenario), query_options({**given, **ONE_FRAME}))
+    query = Query(dataset, read_scenario(scenario), query_options({**given, **ONE_FRAME}))
     show_remarks(query, [label.map])
     compiled, network = query.compile(label.map)
     with LazySolver(query.options.solver) as solver:
@@ -105,7 +105,7 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
     file = None if output is None or str(output) == "-" else output
     kind = _kind(file)
     opened = open_dataset(dataset)
-    shot, backdrop = _shot(opened, find_label(opened, frame), scenario, given)
+    shot, backdrop = _shot(opened, opened.label(frame), scenario, given)
     picture = draw(shot, backdrop, half=half, pixels=width, style=_STYLES[kind], captioned=kind != ".html")
     match kind:
         case ".png":

@@ -2,10 +2,9 @@
 
 >>> import scenicq
 >>> summary = scenicq.ingest("sample_data/crossroads", "dataset")        # doctest: +SKIP
->>> dataset = scenicq.open_dataset("dataset")                            # doctest: +SKIP
->>> program = scenicq.read_program("sample_data/scenarios/02_crossing_cars.scenic")  # doctest: +SKIP
->>> for result in scenicq.Query(dataset, program).results():             # doctest: +SKIP
-...     print(result.frame, result.verdict)
+>>> dataset = scenicq.open("dataset")                                    # doctest: +SKIP
+>>> for found in dataset.match("sample_data/scenarios/02_crossing_cars.scenic"):  # doctest: +SKIP
+...     print(found.frame, found.roles)
 
 Names are loaded when first used, so that importing the package costs nothing.
 """
@@ -15,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scenicq.compiler.program import compile_scenario
-    from scenicq.errors import ScenicqError, Source, render
+    from scenicq.errors import ScenicqError, Source
     from scenicq.importers.ingest import ingest
     from scenicq.match.matcher import Matcher
     from scenicq.match.options import MatchOptions
+    from scenicq.notebook.datasets import open
     from scenicq.query.execution.run import Query, QueryOptions, read_program
     from scenicq.store.dataset import open_dataset
 
@@ -34,9 +34,9 @@ __all__ = [
     "__version__",
     "compile_scenario",
     "ingest",
+    "open",
     "open_dataset",
     "read_program",
-    "render",
 ]
 
 _HOMES = {
@@ -48,9 +48,9 @@ _HOMES = {
     "Source": "scenicq.errors",
     "compile_scenario": "scenicq.compiler.program",
     "ingest": "scenicq.importers.ingest",
+    "open": "scenicq.notebook.datasets",
     "open_dataset": "scenicq.store.dataset",
     "read_program": "scenicq.query.execution.run",
-    "render": "scenicq.errors",
 }
 
 
@@ -58,3 +58,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """The public names, whether they are loaded or not."""
+    return sorted(__all__)

@@ -49,6 +49,7 @@ CODES: dict[str, str] = {
     "runtime-error": "evaluating the program failed",
     "map-lacks": "the map of the dataset has no element of the needed kind",
     "option-invalid": "an option has a value that cannot be used",
+    "sql-invalid": "a question in SQL that the database refuses",
     # the data
     "unknown-class": "an object class that no taxonomy lists",
     "dataset-unrecognised": "no importer recognises the source",
@@ -64,6 +65,13 @@ CODES: dict[str, str] = {
     "store-damaged": "a file of the dataset is missing or changed",
     "target-exists": "the target is there already",
     "target-unwritable": "the target cannot be written",
+    "predictions-invalid": "a predicted box has a value that makes no sense",
+    "predictions-duplicate": "a predicted box or frame is there more than once",
+    "predictions-missing": "a frame of the dataset has no predictions",
+    "predictions-unmatched": "predictions are of a frame that the dataset does not have",
+    "predictions-frame": "predicted boxes do not lie in the frame of reference that their format has",
+    "few-recordings": "too few recordings for a verdict",
+    "no-density": "a probability density does not exist, or could not be computed",
     "engine-failed": "what runs a query on other processes or machines is not there, or stopped",
     # the solvers
     "solver-missing": "the solver cannot be loaded",

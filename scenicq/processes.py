@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
@@ -19,7 +20,7 @@ from itertools import islice
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from types import TracebackType
+from types import ModuleType, TracebackType
 from typing import Any, Generic, Self, TypeVar
 
 from scenicq.errors import DataError, Diagnostic
@@ -180,7 +181,7 @@ class Workers(Generic[Task, Answer]):
         context = multiprocessing.get_context("spawn")
         mine, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs, *self._call), daemon=False)
-        with _uninterrupted():
+        with _uninterrupted(), _main_hidden():
             process.start()
             theirs.close()  # so that the end of the process is the end of the pipe
             self._workers.append(_Worker(process, mine))
@@ -255,6 +256,17 @@ def _end(worker: _Worker) -> int | None:
     worker.process.close()
     worker.connection.close()
     return code
+
+
+@contextlib.contextmanager
+def _main_hidden() -> Generator[None]:
+    """Keeps workers from running the caller's script once more, as `multiprocessing` does with what is `__main__`."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]], setup: tuple[Any, ...]) -> None:

@@ -64,7 +64,7 @@ def test_the_python_example_runs(folder, command):
     subprocess.run([command, "ingest", "sample_data/crossroads", "town", "-q", "--force"], cwd=folder, check=True)
     (program,) = _blocks("python")
     done = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=True)
-    assert len(re.findall(r"^03-busy-intersection/\d\d Match", done.stdout, re.MULTILINE)) == 5
+    assert len(re.findall(r"^03-busy-intersection/\d\d {'ego': 'ego'", done.stdout, re.MULTILINE)) == 5
 
 
 def test_the_scenario_shown_is_the_one_that_is_run():

@@ -54,6 +54,7 @@ def compile_scenario(
     initial: bool = False,
     behaviors: Behaviors | None = None,
     loader: Loader | None = None,
+    model: str | None = None,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -65,6 +66,7 @@ def compile_scenario(
         behaviors: What becomes of behaviors, where the scenario is to be matched over time; None where it is about one
             instant, and all dynamic parts are refused or ignored.
         loader: Reads files that the program imports.
+        model: The world model of a program that imports none, as Scenic's `--model`.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -75,11 +77,14 @@ def compile_scenario(
     run = world.interpreter
     run.timed = None if initial or behaviors is None else TimedStatements(behaviors)
     try:
-        library = _left_out(module, chosen)
+        given = None if model is None or _imports(module) else model
+        library = given or _left_out(module, chosen)
         names = {} if library is None else dict(world.load(library, 0, _start(source)).names)
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
-        return _scenario(run, module, chosen, network, _borrowed(module, scope, names, library))
+        return _scenario(
+            run, module, chosen, network, _borrowed(module, scope, names, library) if given is None else ()
+        )
     except RecursionError:
         raise fail("budget-exceeded", "the program is nested too deeply", _start(source), "",
                    ("make expressions and calls flatter",)) from None  # fmt: skip
@@ -94,12 +99,16 @@ def _start(source: Source) -> Span:
     return Span(source, 0, min(1, len(source.text)))
 
 
+def _imports(module: ast.Module) -> bool:
+    """Whether a program brings in anything itself."""
+    return any(isinstance(node, _IMPORTS) for node in walk(*module.body))
+
+
 def _left_out(module: ast.Module, version: int) -> str | None:
     """The library that an early program needs without importing any; None where it imports one."""
-    nodes = list(walk(*module.body))
-    if version == 3 or any(isinstance(node, _IMPORTS) for node in nodes):
+    if version == 3 or _imports(module):
         return None
-    return default_library(version, frozenset(node.id for node in nodes if isinstance(node, ast.Name)))
+    return default_library(version, frozenset(node.id for node in walk(*module.body) if isinstance(node, ast.Name)))
 
 
 def _borrowed(

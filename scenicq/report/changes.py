@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, cast
 
+from scenicq.query.execution.result_files import Record
 from scenicq.report.frames import table
 from scenicq.report.page import page
-from scenicq.report.result_files import Record
 from scenicq.report.svg import element, escape
 
 __all__ = ["Change", "changes", "changes_page", "changes_text"]

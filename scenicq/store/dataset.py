@@ -155,6 +155,17 @@ class Dataset:
                 raise DataError(Diagnostic("store-damaged", message, hints=(hint,))) from error
             raise
 
+    def label(self, frame: str) -> Label:
+        """The label of a frame.
+
+        Raises:
+            DataError: option-invalid: there is no such frame.
+        """
+        for label in self.labels([frame]):
+            return label
+        hint = "`scenicq match SCENARIO DATASET --all` lists the frames"
+        raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{frame}`", hints=(hint,)))
+
     def labels_at(self, part: int, first: int, end: int, *, motion: bool = True) -> Iterator[Label]:
         """Labels of one part, in order.
 

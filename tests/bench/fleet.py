@@ -25,7 +25,7 @@ from scenicq.compiler.default_street import street
 from scenicq.geometry.features import REFERENCES, MapFeature, names
 from scenicq.importers.base import Entry, Labels
 from scenicq.importers.report import Report
-from scenicq.importers.segments import CompiledMap, Job, fingerprint, write_segments
+from scenicq.importers.segments import Job, World, fingerprint, write_segments
 from scenicq.store.columns import MemberColumns, RecordingColumns
 from scenicq.store.manifest import Manifest
 from scenicq.store.segment import SEGMENT_OBJECTS, segments_of
@@ -233,7 +233,7 @@ def write_store(fleet: Fleet, target: Path, jobs: int) -> Manifest:
             mark = fingerprint([repr(fleet)], [Entry(name, 0, "") for name in group], frozenset())
             waiting.append(Job(number, FleetReader(fleet, tuple(range(first, first + len(group)))), mark))
             first += len(group)
-        written = write_segments(CompiledMap(writer.folder, maps), waiting, jobs, lambda recording, frames: None)
+        written = write_segments(World(writer.folder, maps), waiting, jobs, lambda recording, frames: None)
         for job, segment in zip(waiting, written, strict=True):
             writer.adopt(job.number, segment)
         return writer.finish(name="fleet", importer="fleet")

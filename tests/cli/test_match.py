@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from scenicq.forest.scenario import BuiltIn
+from scenicq.query.execution.result_tables import read_row
 
 KEYS = ["frame", "recording", "timestamp_us", "verdict", "correspondence", "witness", "sensors"]
 FRAMES = [f"03-busy-intersection/{number:02}" for number in range(9, 14)]
@@ -98,7 +99,10 @@ def test_a_file_s_extension_says_its_format(run, crossroads, crossing, tmp_path)
     table = pq.read_table(tmp_path / "a.parquet")
     assert table.column("frame").to_pylist() == FRAMES
     assert table.column("timestamp_us").to_pylist()[0] == 1700007204500000
-    assert list(json.loads(table.column("sensors").to_pylist()[0])) == ["CAM_FRONT"]
+    assert [channel for channel, _ in table.column("sensors").to_pylist()[0]] == ["CAM_FRONT"]
+    lines = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
+    assert table.column("correspondence").to_pylist() == [line["correspondence"] for line in lines]
+    assert [read_row(row) for row in table.to_pylist()] == lines
     assert (tmp_path / "a.txt").read_text().split() == FRAMES
     assert [json.loads(line)["frame"] for line in (tmp_path / "a.jsonl").read_text().splitlines()] == FRAMES
     assert (tmp_path / "a.csv").read_text().count("\n") == 1 + len(FRAMES)

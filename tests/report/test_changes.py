@@ -5,8 +5,8 @@ import json
 import pytest
 
 from scenicq.errors import DataError
+from scenicq.query.execution.result_files import read_results
 from scenicq.report.changes import changes, changes_page, changes_text
-from scenicq.report.result_files import read_results
 
 
 def _line(frame, verdict="match", recording="r", time=0, **more):

@@ -93,7 +93,7 @@ def test_all_formats_say_the_same(town, tmp_path):
     run(town, name, "-o", str(tmp_path / "found.parquet"))
     table = pq.read_table(tmp_path / "found.parquet").to_pylist()
     for record, row, cells in zip(records, rows, table, strict=True):
-        assert row["first_frame"] == cells["first_frame"] == record["frames"]["first"]
+        assert json.loads(row["frames"]) == cells["frames"] == record["frames"]
         assert int(row["end_us"]) == cells["end_us"] == record["end_us"]
         assert cells["open_ended"] is False
     assert run(town, name, "--format", "ids").split() == [f"{r['recording']}@{r['start_us']}" for r in records]

@@ -51,6 +51,7 @@ class QueryOptions:
         all_matches: Whether every correspondence of a frame is a result of its own.
         behaviors: Whether a program with behaviors is refused, or matched over time without them.
         time: Options of intervals.
+        model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
     """
 
@@ -65,6 +66,7 @@ class QueryOptions:
     all_matches: bool = False
     behaviors: Behaviors = "refuse"
     time: IntervalOptions = field(default_factory=IntervalOptions)
+    model: str | None = None
     strict: bool = False
 
 
@@ -116,6 +118,7 @@ class _Known:
     """What a query has found out once, for it and its copies with other recordings."""
 
     worlds: dict[str, CompiledMap] = field(default_factory=dict["str", "CompiledMap"])
+    lacking: dict[str, ScenarioError] = field(default_factory=dict["str", "ScenarioError"])
     extents: dict[str, list[Extent]] | None = None
     coverage: Coverage | None = None
 
@@ -157,6 +160,7 @@ class Query:
                 initial=options.initial,
                 behaviors=options.behaviors,
                 loader=beside(self.file or Path(self.source.name)),
+                model=options.model,
             )
         except ScenarioError as error:
             raise about_dataset(error, self.dataset, map_name) from None
@@ -190,32 +194,38 @@ class Query:
     def _worlds(self) -> dict[str, CompiledMap | Diagnostic]:
         """The scenario over each map, or what the map lacks; an error if it fits none."""
         self._check_ego()
-        found: dict[str, CompiledMap | Diagnostic] = {}
-        errors: list[ScenarioError] = []
+        lacking = self._known.lacking
         for name in self.dataset.maps:
+            if name in lacking:
+                continue
             try:
-                found[name] = self.world(name)
+                self.world(name)
             except ScenarioError as error:
                 if error.diagnostics[0].code != "map-lacks":
                     raise
-                errors.append(error)
-                found[name] = error.diagnostics[0]
+                lacking[name] = error
+        if lacking and len(lacking) == len(self.dataset.maps):
+            raise next(iter(lacking.values()))
+        told = {name: error.diagnostics[0] for name, error in lacking.items()}
+        return {name: told.get(name) or self.world(name) for name in self.dataset.maps}
+
+    def _warn(self, worlds: Mapping[str, CompiledMap | Diagnostic]) -> None:
+        """Note in the funnel what the author should know, and count the frames on maps that cannot match."""
+        for name, told in worlds.items():
+            if isinstance(told, Diagnostic):
                 count = self.dataset.manifest.by_map.get(name, Counts()).frames
-                message = f"{count} frames on map `{name}` cannot match: {error.diagnostics[0].message}"
+                message = f"{count} frames on map `{name}` cannot match: {told.message}"
                 self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
                 if here := self._frames(name):
                     self.funnel.frames += here
                     self.funnel.excluded[f"map {name}"] += here
-        if errors and len(errors) == len(found):
-            raise errors[0]
-        worlds = [world for world in found.values() if isinstance(world, CompiledMap)]
-        if worlds:
+        compiled = [world for world in worlds.values() if isinstance(world, CompiledMap)]
+        if compiled:
             compared = self.coverage()
-            self.funnel.warnings += [*compared.warnings, *_remarks(worlds[0].scenario)]
+            self.funnel.warnings += [*compared.warnings, *_remarks(compiled[0].scenario)]
             self.funnel.missing.update(compared.missing)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
-        return found
 
     def fitting(self, maps: Iterable[str] | None = None) -> Iterator[CompiledMap]:
         """The scenario over each map that it fits.
@@ -260,6 +270,11 @@ class Query:
     def _between(self, map_name: str) -> tuple[str, str] | None:
         """The first and the last recording of a map that are looked at; None for all."""
         return None if self.recordings is None else (self.recordings[map_name].first, self.recordings[map_name].last)
+
+    def roles(self) -> tuple[str, ...]:
+        """Names of the scenario's objects, of all maps that it fits."""
+        worlds = [each.scenario for each in self._worlds().values() if isinstance(each, CompiledMap)]
+        return tuple(dict.fromkeys(thing.name for scenario in worlds for thing in scenario.objects))
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
@@ -324,6 +339,7 @@ class Query:
             ScenarioError: The program is wrong or not supported.
         """
         worlds = self._worlds()
+        self._warn(worlds)
         left, progress = self.options.limit, progress or _ignore
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())

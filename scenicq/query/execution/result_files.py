@@ -17,15 +17,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.query.execution.result_tables import read_row
 
-__all__ = ["Record", "read_results"]
+__all__ = ["Record", "read_records", "read_results"]
 
 Record = Mapping[str, Any]
 """One result: frame, recording, verdict, and what else `scenicq.query.execution.results.record` gives."""
 
 _TEXTS = ("frame", "recording", "verdict")
 _NEEDED = (*_TEXTS, "timestamp_us", "correspondence", "cause")
-_NESTED = ("correspondence", "cause")
+_NESTED = ("correspondence", "cause", "witness", "frames")
+_TIMES = ("timestamp_us", "start_us", "end_us")
 _LONGEST = 10_000_000
 """Characters of a cell of CSV."""
 
@@ -36,23 +38,40 @@ def read_results(path: Path) -> dict[str, Record]:
     Raises:
         DataError: file-missing, or file-invalid.
     """
+    found: dict[str, Record] = {}
+    for where, each in _records(path, _NEEDED):
+        _check(path, where, each, _TEXTS)
+        old = found.get(each["frame"])
+        if old is None or (each["verdict"] == "match" and old["verdict"] != "match"):
+            found[each["frame"]] = each
+    return found
+
+
+def read_records(path: Path) -> Iterator[Record]:
+    """All results in a file with all that they say: of frames, or of intervals of recordings.
+
+    Raises:
+        DataError: file-missing, or file-invalid.
+    """
+    for where, each in _records(path, None):
+        _check(path, where, each, ("verdict",))
+        _check(path, where, each, ("frame",) if "frame" in each else ("recording",))
+        yield each
+
+
+def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[tuple[str, Record]]:
+    """The results, each with the line or row where it is."""
     try:
         data = path.read_bytes()
     except OSError as error:
         raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror or error}")) from None
     match path.suffix.lower():
         case ".parquet":
-            records = _of_parquet(path, data)
+            return _of_parquet(path, data, columns)
         case ".csv":
-            records = _of_csv(path, _text(path, data))
+            return _of_csv(path, _text(path, data))
         case _:
-            records = _of_lines(path, _text(path, data))
-    found: dict[str, Record] = {}
-    for each in records:
-        old = found.get(each["frame"])
-        if old is None or (each["verdict"] == "match" and old["verdict"] != "match"):
-            found[each["frame"]] = each
-    return found
+            return _of_lines(path, _text(path, data))
 
 
 def _invalid(path: Path, why: str) -> DataError:
@@ -74,38 +93,37 @@ def _json(path: Path, where: str, text: str) -> Any:
         raise _invalid(path, f"{where} is not JSON") from None
 
 
-def _checked(path: Path, where: str, each: Any) -> Record:
-    if not isinstance(each, dict) or not all(isinstance(cast(Record, each).get(key), str) for key in _TEXTS):
+def _check(path: Path, where: str, each: Any, texts: tuple[str, ...]) -> None:
+    if not isinstance(each, dict) or not all(isinstance(cast(Record, each).get(key), str) for key in texts):
         raise _invalid(path, f"{where} is no result")
-    return cast(Record, each)
 
 
-def _of_lines(path: Path, text: str) -> Iterator[Record]:
+def _of_lines(path: Path, text: str) -> Iterator[tuple[str, Any]]:
     for number, line in enumerate(text.split("\n"), 1):
         if line.strip():
             where = f"line {number}"
-            yield _checked(path, where, _json(path, where, line))
+            yield where, _json(path, where, line)
 
 
-def _of_csv(path: Path, text: str) -> Iterator[Record]:
+def _of_csv(path: Path, text: str) -> Iterator[tuple[str, Record]]:
     limit = csv.field_size_limit(_LONGEST)
     try:
         rows = csv.DictReader(io.StringIO(text, newline=""), strict=True)
         for number, row in enumerate(rows, 1):
-            yield _row(path, f"row {number}", row)
+            yield f"row {number}", _row(path, f"row {number}", row)
     except csv.Error as error:
         raise _invalid(path, f"it is not CSV: {error}") from None
     finally:
         csv.field_size_limit(limit)
 
 
-def _of_parquet(path: Path, data: bytes) -> Iterator[Record]:
+def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[tuple[str, Record]]:
     try:
-        table = pq.read_table(pa.BufferReader(data), columns=list(_NEEDED))
+        table = pq.read_table(pa.BufferReader(data), columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError) as error:
         raise _invalid(path, f"it is not Parquet with results: {str(error).partition(chr(10))[0]}") from None
     for number, row in enumerate(table.to_pylist(), 1):
-        yield _row(path, f"row {number}", row)
+        yield f"row {number}", _row(path, f"row {number}", read_row(row))
 
 
 def _row(path: Path, where: str, row: Record) -> Record:
@@ -114,7 +132,8 @@ def _row(path: Path, where: str, row: Record) -> Record:
     for name in _NESTED:
         if isinstance(found.get(name), str):
             found[name] = _json(path, f"{name} in {where}", found[name])
-    time = found.get("timestamp_us")
-    if isinstance(time, str) and time.removeprefix("-").isdecimal() and len(time) < 20:
-        found["timestamp_us"] = int(time)
-    return _checked(path, where, found)
+    for name in _TIMES:
+        time = found.get(name)
+        if isinstance(time, str) and time.removeprefix("-").isdecimal() and len(time) < 20:
+            found[name] = int(time)
+    return found

@@ -1,0 +1,155 @@
+"""`scenicq evaluate`: a model's detections on the frames of a scenario, against other frames."""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import BinaryIO, cast
+
+import click
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.evaluate.detection import Missing
+from scenicq.evaluate.evaluation import Evaluation
+from scenicq.evaluate.evaluation import evaluate as judge
+from scenicq.evaluate.pages import write_pages
+from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, tables
+from scenicq.report.write import check_target
+from scenicq.store.dataset import open_dataset
+
+from .manual import Manual
+from .output import choose_format, destination, writing
+from .report import columns, plain, show
+from .sources import SENSORS, sensor_root
+
+__all__ = ["evaluate"]
+
+_FORMATS = ("table", "json", "csv", "parquet")
+_EXTENSIONS = {".json": "json"}
+
+
+# fmt: off
+@click.command(
+    cls=Manual,
+    arguments={
+        "RESULTS...": "Files that `scenicq match -o` wrote, one a scenario: .jsonl, .csv or .parquet.",
+        "DATASET": "The dataset that they are of.",
+    },
+    topics={
+        "What counts": {"predictions", "distance", "least_score", "missing", "simulated", "seed"},
+        "What comes out": {"format_", "output", "report", "sensors"},
+    },
+    epilog="\b\nExamples:\n"
+    "  scenicq evaluate parked.jsonl dataset --predictions detections.json\n"
+    "  scenicq evaluate parked.jsonl cutin.jsonl dataset --predictions detections.feather --simulated runs.csv\n"
+    "  scenicq evaluate parked.jsonl dataset --predictions detections.jsonl --report pages -o figures.json",
+)
+@click.argument("results", metavar="RESULTS...", type=click.Path(path_type=Path), nargs=-1, required=True)
+@click.argument("dataset", type=click.Path())
+@click.option("--predictions", metavar="FILE", type=click.Path(path_type=Path), required=True,
+              help="Detections of a model: nuScenes results (.json), Argoverse 2 (.feather), or labels of the "
+              "interchange format whose objects have a `score` (.jsonl or .parquet).")
+@click.option("--distance", metavar="M", type=click.Choice(["0.5", "1", "2", "4"]), default="2",
+              help="Centre distance within which an object counts as found.")
+@click.option("--min-score", "least_score", metavar="S", type=float, default=0.0,
+              help="Score from which a detection counts, but for average precision.")
+@click.option("--missing", type=click.Choice(["error", "empty", "skip"]), default="error",
+              help="What a frame without detections is: an error, a frame in which nothing was found, or left out.")
+@click.option("--simulated", metavar="FILE", type=click.Path(path_type=Path),
+              help="Simulated runs to set beside it: CSV with `scenario` (the name of a results file) and `failed` or "
+              "`score` (the share missed, 0 to 1).")
+@click.option("--seed", metavar="N", type=click.IntRange(0), default=0, help="Of the resamples.")
+@click.option("--format", "format_", metavar="NAME", type=click.Choice(_FORMATS),
+              help="table, json, csv or parquet.  [default: by the extension of FILE, else table]")
+@click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write to a file.")
+@click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
+              help="Write a page with pictures, too, the worst frames first: DIR/index.html.")
+@SENSORS
+def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, distance: str, least_score: float,
+             missing: str, simulated: Path | None, seed: int, format_: str | None, output: Path | None,
+             report: Path | None, sensors: Path | None) -> None:
+    # fmt: on
+    """Say whether a model fails on the frames that match.
+
+    The objects that play roles are compared with others of their classes that are alike in distance and visibility,
+    in the same frames and in those that do not match. Frames of one recording resemble each other: intervals (95 %) and
+    tests are over recordings.
+    """
+    file = None if output is None or str(output) == "-" else output
+    form = _format(format_, file)
+    names = [each.stem for each in results]
+    if len(set(names)) < len(names):
+        message = "results files of one evaluation need different names"
+        raise DataError(Diagnostic("option-invalid", message))
+    if report is not None:
+        check_target(report)
+    opened = open_dataset(dataset)
+    found = judge(
+        dict(zip(names, results, strict=True)),
+        opened,
+        predictions,
+        distance_m=float(distance),
+        least_score=least_score,
+        missing=cast("Missing", missing),
+        simulated=simulated,
+        seed=seed,
+    )
+    with destination(file) as sink, writing(file):
+        _write(found, form, sink)
+    show(found.warnings)
+    if report is not None:
+        write_pages(found, opened, report, sensor_root(opened, sensors))
+
+
+def _format(name: str | None, file: Path | None) -> str:
+    if name is not None:
+        return "parquet" if name == "parquet" and choose_format(name, file) else name
+    if file is None:
+        return "table"
+    return _EXTENSIONS.get(file.suffix) or choose_format(None, file)
+
+
+def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
+    match form:
+        case "json":
+            text = json.dumps(evaluation_record(found), ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+        case "csv":
+            lines = io.StringIO(newline="")
+            rows = csv.DictWriter(lines, COLUMNS, lineterminator="\n")
+            rows.writeheader()
+            rows.writerows(flat_rows(found))
+            text = lines.getvalue()
+        case "parquet":
+            _write_parquet(found, sink)
+            return
+        case _:
+            text = _text(found)
+    sink.write(text.encode(errors="backslashreplace"))
+
+
+def _write_parquet(found: Evaluation, sink: BinaryIO) -> None:
+    import pyarrow as pa  # noqa: PLC0415 - not needed for the other formats
+    import pyarrow.parquet as pq  # noqa: PLC0415
+
+    schema = pa.schema([(name, pa.string() if kind is str else pa.float64()) for name, kind in COLUMNS.items()])
+    pq.write_table(pa.Table.from_pylist(list(flat_rows(found)), schema=schema), sink)
+
+
+def _text(found: Evaluation) -> str:
+    lines: list[str] = []
+    for each in found.scenarios:
+        lines.append(f"{each.name}: {each.matching:,} frames match, {each.other:,} do not")
+        for title, head, rows in tables(each, found.distance_m):
+            lines += ["", title, *columns([head, *rows])]
+        lines.append("")
+        lines += [plain(role.sentence) for role in each.headline]
+        if each.simulated is not None:
+            lines.append(plain(each.simulated.sentence))
+        lines.append("")
+    return "\n".join(lines)

@@ -1,0 +1,160 @@
+"""The labels of a dataset as columns: frames, and the label objects in them."""
+
+# duckdb and pyarrow have no complete type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.store.dataset import Dataset
+
+__all__ = ["Annotations", "Frames", "read_annotations"]
+
+Reals = NDArray[np.float64]
+Numbers = NDArray[np.int32]
+T = TypeVar("T")
+
+_UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frames:
+    """The frames of a dataset, in its order.
+
+    Attributes:
+        names: Of the frames.
+        numbers: Number of each name.
+        recordings: Names of the recordings.
+        recording: Number of the recording of each frame, shape (n,).
+        timestamp_us: Shape (n,).
+        ego_x, ego_y, ego_heading: The centre of the ego, shape (n,).
+        params: Global parameters of each frame.
+    """
+
+    names: list[str]
+    numbers: Mapping[str, int]
+    recordings: list[str]
+    recording: Numbers
+    timestamp_us: NDArray[np.int64]
+    ego_x: Reals
+    ego_y: Reals
+    ego_heading: Reals
+    params: list[Mapping[str, Any]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Annotations:
+    """The label objects of a dataset, in the order of its frames and of the source.
+
+    Attributes:
+        ids: Identifiers, unique in a frame.
+        tracks: Identifiers of the physical object; empty where there is none.
+        frame: Number of the frame, shape (n,).
+        classes, source_classes: Names of classes: of the class tree, and the source's own.
+        category, source_category: Numbers of them, shape (n,).
+        x, y, heading, width, length, height, vx, vy: Shape (n,); nan where unknown.
+        points: How many points the source counts in the box, by the attribute that says so; -1 where it does not.
+        visibility: Names of levels, in the order of `visible`.
+        visible: Number of the level, shape (n,).
+    """
+
+    ids: list[str]
+    tracks: list[str]
+    frame: Numbers
+    classes: list[str]
+    category: Numbers
+    source_classes: list[str]
+    source_category: Numbers
+    x: Reals
+    y: Reals
+    heading: Reals
+    width: Reals
+    length: Reals
+    height: Reals
+    vx: Reals
+    vy: Reals
+    points: Mapping[str, Reals]
+    visibility: list[str]
+    visible: Numbers
+
+
+def read_annotations(dataset: Dataset, points: tuple[str, ...] = ()) -> tuple[Frames, Annotations]:
+    """All labels of a dataset.
+
+    Args:
+        dataset: The dataset.
+        points: Attributes that count points.
+    """
+    with dataset.blamed(), closing(dataset.connect()) as connection:
+        rows = connection.sql(
+            "SELECT frame, recording, timestamp_us, ego_x, ego_y, ego_heading, params FROM labels "
+            "ORDER BY recording, timestamp_us, frame"
+        ).to_arrow_table()
+        names: list[str] = rows["frame"].to_pylist()
+        recordings, recording = _codes(rows["recording"])
+        texts, at = _codes(rows["params"], absent="{}")
+        params = [json.loads(text) for text in texts]
+        frames = Frames(
+            names=names,
+            numbers={name: number for number, name in enumerate(names)},
+            recordings=recordings,
+            recording=recording,
+            timestamp_us=rows["timestamp_us"].to_numpy(),
+            ego_x=_reals(rows["ego_x"]),
+            ego_y=_reals(rows["ego_y"]),
+            ego_heading=_reals(rows["ego_heading"]),
+            params=[params[number] for number in at.tolist()],
+        )
+        connection.register("numbered", rows.select(["frame"]).append_column("number", [list(range(len(names)))]))
+        objects = connection.sql(
+            'SELECT n.number, o.id, o.track, o."class", o.source_class, o.x, o.y, o.heading, o.width, o.length, '
+            "o.height, o.vx, o.vy, o.attributes FROM objects o JOIN numbered n ON o.frame = n.frame "
+            "ORDER BY n.number, o.ordinal"
+        ).to_arrow_table()
+    return frames, _annotations(objects, points)
+
+
+def _annotations(objects: Any, points: tuple[str, ...]) -> Annotations:
+    classes, category = _codes(objects["class"])
+    source_classes, source_category = _codes(objects["source_class"])
+    texts, at = _codes(objects["attributes"], absent="{}")
+    told: list[Mapping[str, Any]] = [json.loads(text) for text in texts]
+    levels = [str(each.get("visibility", _UNKNOWN)) for each in told]
+    visibility = sorted(set(levels) | {_UNKNOWN})
+    order = {level: number for number, level in enumerate(visibility)}
+
+    def count(name: str) -> Callable[[Mapping[str, Any]], float]:
+        return lambda each: float(each.get(name, -1))
+
+    return Annotations(
+        ids=objects["id"].to_pylist(),
+        tracks=objects["track"].fill_null("").to_pylist(),
+        frame=objects["number"].to_numpy().astype(np.int32),
+        classes=classes,
+        category=category,
+        source_classes=source_classes,
+        source_category=source_category,
+        **{name: _reals(objects[name]) for name in ("x", "y", "heading", "width", "length", "height", "vx", "vy")},
+        points={name: np.array([*map(count(name), told)], dtype=np.float64)[at] for name in points},
+        visibility=visibility,
+        visible=np.array([order[level] for level in levels], dtype=np.int32)[at],
+    )
+
+
+def _codes(column: Any, absent: str = "") -> tuple[list[str], Numbers]:
+    """Distinct texts, and the number of each row's."""
+    encoded = column.fill_null(absent).combine_chunks().dictionary_encode()
+    return encoded.dictionary.to_pylist(), encoded.indices.to_numpy(zero_copy_only=False).astype(np.int32)
+
+
+def _reals(column: Any) -> Reals:
+    return np.ascontiguousarray(column.to_numpy().astype(np.float64))

@@ -1,0 +1,347 @@
+"""Predictions joined with the labels of a dataset: what counts by the rules of the benchmark, and what was found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.evaluate.annotations import Annotations, Frames, read_annotations
+from scenicq.evaluate.assignment import Centres, Pairs, assign, find_pairs
+from scenicq.evaluate.precision import Errors, box_errors
+from scenicq.importers.predictions import THRESHOLDS_M, Predictions, Protocol
+from scenicq.store.classes import is_class
+from scenicq.store.dataset import Dataset
+
+__all__ = ["ERRORS_AT_M", "Detection", "Missing", "detect"]
+
+Reals = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Numbers = NDArray[np.int32]
+
+Missing = Literal["error", "empty", "skip"]
+"""What a frame without predictions is: an error, a frame in which nothing was found, or left out."""
+
+ERRORS_AT_M = 2.0
+"""Centre distance of the pairs whose errors are told."""
+
+_ABSURD_M = 300.0
+"""No sensor sees so far: boxes whose median distance from the ego is larger are in another frame of reference."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection:
+    """Labels and predictions side by side.
+
+    Attributes:
+        frames, objects: The labels.
+        predictions: Those that count, in the frame of the map, in the order of falling scores.
+        covered: Frames that the predictions speak of, shape (frames,).
+        classes: The classes that are evaluated.
+        object_class: Number of the class of each label object, -1 for those that do not count, shape (objects,).
+        prediction_class: The same for predictions, shape (predictions,).
+        frame: Number of the dataset's frame of each prediction.
+        owner: For each centre distance the label object of each prediction, -1 without.
+        errors: Of the predictions that are label objects within `ERRORS_AT_M`, nan for others; shape (predictions, 4).
+        distance: Of each label object from the ego, metres.
+        score: For each centre distance the score with which each label object was found, -inf where it was not.
+    """
+
+    frames: Frames
+    objects: Annotations
+    predictions: Predictions
+    covered: Bools
+    classes: list[str]
+    object_class: Numbers
+    prediction_class: Numbers
+    frame: Numbers
+    owner: Mapping[float, NDArray[np.int64]]
+    errors: Reals
+    distance: Reals
+    score: Mapping[float, Reals]
+
+
+def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error") -> Detection:
+    """Find which label objects were detected.
+
+    Args:
+        dataset: The labels.
+        predictions: The predictions.
+        missing: What a frame without predictions is.
+
+    Raises:
+        DataError: predictions-missing, predictions-unmatched, predictions-frame; unknown-class for a class of the
+            predictions that the dataset's classes do not have.
+    """
+    protocol = predictions.protocol
+    frames, objects = read_annotations(dataset, protocol.points)
+    places = _places(dataset, frames, predictions, missing)
+    covered = np.zeros(len(frames.names), dtype=np.bool_)
+    covered[places[places >= 0]] = True
+    if missing == "empty":
+        covered[:] = True
+    frame = places[predictions.frame] if len(predictions.frame) else np.zeros(0, dtype=np.int32)
+    known = frame >= 0
+    predictions, frame = _taken(predictions, known), frame[known]
+    origin = _origins(dataset, frames)
+    if predictions.of_ego:
+        predictions = _on_map(predictions, frame, frames, origin)
+    _check_frame_of_reference(predictions, frame, frames)
+    classes, object_class, prediction_class = _classes(objects, predictions)
+    object_class = np.where(covered[objects.frame], object_class, -1).astype(np.int32)
+    keep = np.ones(len(frame), dtype=np.bool_)
+    racks = _Racks(objects, protocol, classes)
+    object_class[~_in_range(objects.x, objects.y, objects.frame, object_class, origin, protocol, classes)] = -1
+    object_class[_without_points(objects)] = -1
+    object_class[racks.hold(objects.x, objects.y, objects.frame, object_class)] = -1
+    keep &= prediction_class >= 0
+    keep &= _in_range(predictions.x, predictions.y, frame, prediction_class, origin, protocol, classes)
+    keep &= ~racks.hold(predictions.x, predictions.y, frame, prediction_class)
+    order = np.flatnonzero(keep)
+    order = order[_by_score(predictions.score[order], last_first=protocol.last_first)]
+    order = order[_first_of_each(frame[order], prediction_class[order], protocol)]
+    predictions, frame, prediction_class = _taken(predictions, order), frame[order], prediction_class[order]
+    pairs = _pairs(predictions, frame, prediction_class, objects, object_class, protocol)
+    rank = np.arange(len(frame))
+    owner = {
+        threshold: assign(pairs, rank, len(objects.ids), threshold, nearest_only=protocol.nearest_only)
+        for threshold in THRESHOLDS_M
+    }
+    score: dict[float, Reals] = {}
+    for threshold, mine in owner.items():
+        score[threshold] = np.full(len(objects.ids), -math.inf)
+        score[threshold][mine[mine >= 0]] = predictions.score[mine >= 0]
+    turned = np.array([name in protocol.half_turn for name in classes], dtype=np.bool_)
+    return Detection(
+        frames=frames,
+        objects=objects,
+        predictions=predictions,
+        covered=covered,
+        classes=classes,
+        object_class=object_class,
+        prediction_class=prediction_class,
+        frame=frame,
+        owner=owner,
+        errors=_errors(predictions, objects, owner[ERRORS_AT_M], turned[prediction_class], hull=protocol.hull),
+        distance=np.hypot(objects.x - frames.ego_x[objects.frame], objects.y - frames.ego_y[objects.frame]),
+        score=score,
+    )
+
+
+def _taken(predictions: Predictions, which: NDArray[np.bool_] | NDArray[np.int64]) -> Predictions:
+    names = ("frame", "category", "x", "y", "heading", "width", "length", "height", "vx", "vy", "score")
+    return replace(predictions, **{name: getattr(predictions, name)[which] for name in names})
+
+
+def _places(dataset: Dataset, frames: Frames, predictions: Predictions, missing: Missing) -> Numbers:
+    """The number of the dataset's frame of each frame of the predictions, -1 for none."""
+    places = np.array([frames.numbers.get(name, -1) for name in predictions.frames], dtype=np.int32)
+    name = predictions.name
+    if missing == "skip":
+        if not (places >= 0).any():
+            message = f"{name} and {dataset.name} have no frame in common"
+            raise DataError(Diagnostic("predictions-unmatched", message))
+        return places
+    unmatched = np.flatnonzero(places < 0)
+    if len(unmatched):
+        first = predictions.frames[int(unmatched[0])]
+        raise DataError(
+            Diagnostic(
+                "predictions-unmatched",
+                f"{name} has {len(unmatched)} frames that {dataset.name} does not have, the first {first}",
+                hints=("`--missing skip` evaluates the frames that both have",),
+            )
+        )
+    without = len(frames.names) - len(places)
+    if without and missing == "error":
+        there = set(places.tolist())
+        first = next(frame for number, frame in enumerate(frames.names) if number not in there)
+        raise DataError(
+            Diagnostic(
+                "predictions-missing",
+                f"{name} has no predictions for {without} of {len(frames.names)} frames, the first {first}",
+                hints=(
+                    "`--missing empty` takes them for frames in which nothing was found, `--missing skip` leaves them "
+                    "out",
+                ),
+            )
+        )
+    return places
+
+
+def _origins(dataset: Dataset, frames: Frames) -> tuple[Reals, Reals]:
+    """Where the source has the ego: its rear axle where the dataset says how far that is."""
+    facts = cast("Mapping[str, object]", dataset.manifest.provenance.get("facts") or {})
+    behind = facts.get("ego_centre_ahead_of_rear_axle_m", 0.0)
+    behind = float(behind) if isinstance(behind, int | float) else 0.0
+    heading = np.nan_to_num(frames.ego_heading)
+    return frames.ego_x + behind * np.sin(heading), frames.ego_y - behind * np.cos(heading)
+
+
+def _on_map(predictions: Predictions, frame: Numbers, frames: Frames, origin: tuple[Reals, Reals]) -> Predictions:
+    """Boxes of the ego's frame in that of the map."""
+    heading = frames.ego_heading[frame]
+    if np.isnan(heading).any():
+        number = int(frame[int(np.argmax(np.isnan(heading)))])
+        message = f"{predictions.name}: boxes lie in the ego's frame, and the ego of {frames.names[number]} has none"
+        raise DataError(Diagnostic("predictions-frame", message))
+    ahead, left = predictions.x, predictions.y
+    # heading 0 is +y: ahead is (-sin, cos), left is (-cos, -sin)
+    sine, cosine = np.sin(heading), np.cos(heading)
+    return replace(
+        predictions,
+        x=origin[0][frame] - sine * ahead - cosine * left,
+        y=origin[1][frame] + cosine * ahead - sine * left,
+        heading=heading + predictions.heading,
+        of_ego=False,
+    )
+
+
+def _check_frame_of_reference(predictions: Predictions, frame: Numbers, frames: Frames) -> None:
+    if len(frame):
+        away = float(np.median(np.hypot(predictions.x - frames.ego_x[frame], predictions.y - frames.ego_y[frame])))
+        if away > _ABSURD_M:
+            message = f"{predictions.name}: half of the boxes lie more than {away:,.0f} m from the ego of their frame"
+            hint = "nuScenes and interchange: the frame of the map; Argoverse 2: the frame of the ego at that time"
+            raise DataError(Diagnostic("predictions-frame", message, hints=(hint,)))
+
+
+def _classes(objects: Annotations, predictions: Predictions) -> tuple[list[str], Numbers, Numbers]:
+    """The classes that are evaluated, and their numbers for label objects and predictions; -1 for those without."""
+    protocol = predictions.protocol
+    sources, first = np.unique(objects.source_category, return_index=True)
+    tree_of: dict[str, str] = {
+        objects.source_classes[int(source)]: objects.classes[int(objects.category[row])]
+        for source, row in zip(sources, first, strict=True)
+    }
+    if protocol.classes is not None:
+        known = sorted(set(protocol.classes.values()))
+        of_source = protocol.classes
+    elif protocol.tree:
+        of_source = tree_of
+        known = sorted(set(tree_of.values()))
+    else:
+        of_source = {name: name for name in objects.source_classes}
+        known = sorted(of_source)
+    numbers = {name: number for number, name in enumerate(known)}
+    of_objects = np.array([numbers.get(of_source.get(name, ""), -1) for name in objects.source_classes], dtype=np.int32)
+    of_predictions: list[int] = []
+    for name in predictions.classes:
+        evaluated = tree_of.get(name, name) if protocol.tree else name
+        if evaluated not in numbers:
+            if protocol.classes is not None or (protocol.tree and not is_class(evaluated)):
+                message = f"{predictions.name}: `{name}` is no class of {protocol.name} predictions"
+                hint = f"known are {', '.join(known)}"
+                raise DataError(Diagnostic("unknown-class", message, hints=(hint,)))
+            # a class without any label object
+            numbers[evaluated] = len(known)
+            known.append(evaluated)
+        of_predictions.append(numbers[evaluated])
+    object_class = of_objects[objects.source_category] if len(of_objects) else np.zeros(0, dtype=np.int32)
+    prediction_class = np.array([*of_predictions, -1], dtype=np.int32)[predictions.category]
+    return known, object_class, prediction_class
+
+
+def _in_range(
+    x: Reals, y: Reals, frame: Numbers, category: Numbers, origin: tuple[Reals, Reals], protocol: Protocol,
+    classes: list[str],
+) -> Bools:  # fmt: skip
+    ranges = np.array([*(protocol.ranges_m.get(name, protocol.range_m) for name in classes), math.inf])
+    return np.hypot(x - origin[0][frame], y - origin[1][frame]) < ranges[category]
+
+
+def _without_points(objects: Annotations) -> Bools:
+    """Label objects whose points are counted, and are none."""
+    if not objects.points:
+        return np.zeros(len(objects.ids), dtype=np.bool_)
+    counts = np.stack(list(objects.points.values()))
+    return (counts >= 0).any(axis=0) & (np.maximum(counts, 0).sum(axis=0) == 0)
+
+
+class _Racks:
+    """Boxes inside which some classes are not evaluated."""
+
+    def __init__(self, objects: Annotations, protocol: Protocol, classes: list[str]) -> None:
+        number = objects.source_classes.index(protocol.racks) if protocol.racks in objects.source_classes else -1
+        racks = np.flatnonzero(objects.source_category == number)
+        self._racks = racks[np.isfinite(objects.heading[racks]) & np.isfinite(objects.width[racks])]
+        self._objects = objects
+        self._racked = np.array([*(name in protocol.racked for name in classes), False], dtype=np.bool_)
+
+    def hold(self, x: Reals, y: Reals, frame: Numbers, category: Numbers) -> Bools:
+        """Which boxes lie inside, shape (n,)."""
+        held = np.zeros(len(x), dtype=np.bool_)
+        if not len(self._racks):
+            return held
+        of, order = np.flatnonzero(self._racked[category]), self._objects
+        of = of[np.isin(frame[of], order.frame[self._racks])]
+        for rack in self._racks.tolist():
+            mine = of[frame[of] == order.frame[rack]]
+            dx, dy = x[mine] - order.x[rack], y[mine] - order.y[rack]
+            sine, cosine = math.sin(order.heading[rack]), math.cos(order.heading[rack])
+            ahead, right = -sine * dx + cosine * dy, cosine * dx + sine * dy
+            held[mine] |= (np.abs(ahead) <= order.length[rack] / 2) & (np.abs(right) <= order.width[rack] / 2)
+        return held
+
+
+def _by_score(score: Reals, *, last_first: bool) -> NDArray[np.int64]:
+    """The order of falling scores."""
+    if last_first:
+        return np.argsort(score, kind="stable")[::-1]
+    return np.argsort(-score, kind="stable")
+
+
+def _first_of_each(frame: Numbers, category: Numbers, protocol: Protocol) -> NDArray[np.int64]:
+    """The first boxes of each frame (and class), as many as count, in their order."""
+    if not protocol.most or not len(frame):
+        return np.arange(len(frame))
+    key = frame.astype(np.int64)
+    if protocol.most_of_class:
+        key = key * (int(category.max()) + 1) + category
+    order = np.argsort(key, kind="stable")
+    starts = np.flatnonzero(np.append(True, key[order][1:] != key[order][:-1]))
+    sizes = np.diff(np.append(starts, len(order)))
+    place = np.arange(len(order)) - np.repeat(starts, sizes)
+    return np.sort(order[place < protocol.most])
+
+
+def _pairs(
+    predictions: Predictions, frame: Numbers, category: Numbers, objects: Annotations, object_class: Numbers,
+    protocol: Protocol,
+) -> Pairs:  # fmt: skip
+    counted = np.flatnonzero(object_class >= 0)
+    found = find_pairs(
+        Centres(frame, category, predictions.x, predictions.y),
+        Centres(objects.frame[counted], object_class[counted], objects.x[counted], objects.y[counted]),
+        max(THRESHOLDS_M),
+        nearest_only=protocol.nearest_only,
+    )
+    return replace(found, object=counted[found.object])
+
+
+def _errors(
+    predictions: Predictions, objects: Annotations, owner: NDArray[np.int64], half_turn: Bools, *, hull: bool
+) -> Reals:
+    errors = np.full((len(owner), 4), np.nan)
+    mine = np.flatnonzero(owner >= 0)
+    its = owner[mine]
+
+    def sizes(of: Predictions | Annotations, which: NDArray[np.int64]) -> Reals:
+        return np.column_stack((of.width[which], of.length[which], of.height[which]))
+
+    compared = Errors(
+        dx=predictions.x[mine] - objects.x[its],
+        dy=predictions.y[mine] - objects.y[its],
+        sizes=sizes(predictions, mine),
+        other_sizes=sizes(objects, its),
+        turn=predictions.heading[mine] - objects.heading[its],
+        dvx=predictions.vx[mine] - objects.vx[its],
+        dvy=predictions.vy[mine] - objects.vy[its],
+    )
+    errors[mine] = box_errors(compared, half_turn[mine], hull=hull)
+    return errors

@@ -1,0 +1,175 @@
+"""The report of an evaluation: the figures, and the worst frames as pictures with both boxes."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.evaluate.detection import Detection
+from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation, WorstFrame
+from scenicq.evaluate.rows import tables
+from scenicq.geometry.boxes import corners
+from scenicq.report.backdrop import Backdrop
+from scenicq.report.frames import table, when
+from scenicq.report.page import page
+from scenicq.report.picture import View, ground, plane_of
+from scenicq.report.scene import draw_object
+from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
+from scenicq.report.svg import Plane, element, escape, points_path
+from scenicq.report.write import check_target
+from scenicq.store.dataset import Dataset
+from scenicq.store.labels import Label
+
+__all__ = ["SHOWN", "write_pages"]
+
+SHOWN = 30
+"""Frames of each scenario that are shown as pictures."""
+
+_NEAREST, _FARTHEST = 25.0, 60.0
+
+
+def write_pages(evaluation: Evaluation, dataset: Dataset, folder: Path, sensors: Path | None = None) -> Path:
+    """Write a page into a folder; an earlier report there is replaced when the new one is complete.
+
+    Args:
+        evaluation: What to show.
+        dataset: The labels.
+        folder: Where to.
+        sensors: The folder that the paths of sensor files start from; only the dataset's own by default.
+
+    Returns:
+        The page.
+
+    Raises:
+        DataError: target-exists, or target-unwritable.
+    """
+    check_target(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        work = Path(tempfile.mkdtemp(prefix=".report-", dir=folder))
+        try:
+            files = SensorFiles(roots_of(dataset, sensors), folder, work, can_make_thumbnails(), inside=True)
+            text = _Pages(evaluation, dataset, files).text()
+            (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
+            for name in ("pictures", "thumbnails"):
+                shutil.rmtree(folder / name, ignore_errors=True)
+            for new in sorted(work.iterdir()):
+                new.replace(folder / new.name)
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+    except OSError as error:
+        message = f"{folder} cannot be written: {error.strerror or error}"
+        raise DataError(Diagnostic("target-unwritable", message)) from None
+    return folder / "index.html"
+
+
+class _Pages:
+    """A page in the making."""
+
+    def __init__(self, evaluation: Evaluation, dataset: Dataset, files: SensorFiles) -> None:
+        self._evaluation, self._dataset, self._files = evaluation, dataset, files
+        self._backdrops: dict[str, Backdrop] = {}
+        shown = {worst.frame for each in evaluation.scenarios for worst in each.worst[:SHOWN]}
+        self._labels = {label.frame: label for label in dataset.labels(shown)}
+
+    def text(self) -> str:
+        """All of it."""
+        found = self._evaluation
+        score = f", score {found.least_score:g} or more" if found.least_score else ""
+        told = f"{found.predictions}: found within {found.distance_m:g} m{score}"
+        warnings = [element("li", escape(each.message)) for each in found.warnings]
+        head = element(
+            "header",
+            element("h1", "Detections on the frames that match"),
+            element("p", escape(told)),
+            element("ul", *warnings, class_="cause") if warnings else "",
+        )
+        sections = [part for each in found.scenarios for part in self._scenario(each)]
+        return page("Detections on the frames that match", [head, element("main", *sections)], script=False)
+
+    def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
+        counts = f"{each.matching:,} frames match, {each.other:,} do not"
+        sentences = [element("p", element("b", escape(role.sentence))) for role in each.headline]
+        if each.simulated is not None:
+            sentences.append(element("p", escape(each.simulated.sentence)))
+        parts = [element("h2", escape(each.name)), element("p", escape(counts)), *sentences]
+        for title, head, rows in tables(each, self._evaluation.distance_m):
+            parts.append(table(title, [name.lower() for name in head], [[*map(escape, row)] for row in rows]))
+        worst = each.worst[:SHOWN]
+        links = [
+            (
+                element("a", escape(one.frame), href=f"#{self._anchor(each, one)}"),
+                escape(one.recording),
+                f"{one.missed} of {one.of}",
+                f"{one.false}",
+            )
+            for one in worst
+        ]
+        parts.append(table("Worst frames", ("frame", "recording", "missed", "false boxes"), links))
+        yield element("section", *parts)
+        for one in worst:
+            yield self._frame(each, one)
+
+    def _anchor(self, each: ScenarioEvaluation, one: WorstFrame) -> str:
+        place = next(number for number, other in enumerate(each.worst) if other is one)
+        return f"frame-{self._evaluation.scenarios.index(each)}-{place}"
+
+    def _frame(self, each: ScenarioEvaluation, one: WorstFrame) -> str:
+        label = self._labels[one.frame]
+        told = f"{one.recording}, {when(label.timestamp_us)}: {one.missed} of {one.of} missed, {one.false} false boxes"
+        images = [
+            element("a", element("img", src=sensor.thumbnail, alt=sensor.channel), href=sensor.link)
+            for sensor in self._files.find(label.sensors)
+            if sensor.thumbnail
+        ]
+        return element(
+            "section",
+            element("h3", escape(one.frame)),
+            element("p", escape(told), class_="hint"),
+            self._picture(each, label),
+            element("p", *images) if images else "",
+            id=self._anchor(each, one),
+        )
+
+    def _picture(self, each: ScenarioEvaluation, label: Label) -> str:
+        if label.map not in self._backdrops:
+            self._backdrops[label.map] = Backdrop(self._dataset.network(label.map))
+        detection = self._evaluation.detection
+        frame = detection.frames.numbers[label.frame]
+        numbers = np.flatnonzero(detection.objects.frame == frame)
+        far = detection.distance[numbers][each.mine[numbers]].max(initial=0.0)
+        plane = plane_of(label)
+        view = View((label.ego.x, label.ego.y), min(_FARTHEST, max(_NEAREST, 1.25 * float(far))))
+        left, top, width, _ = view.box(plane)
+        boxes = [draw_object(label.ego, plane)] if label.has_ego else []
+        for number, thing in zip(numbers.tolist(), label.objects, strict=True):
+            kind = "missed" if each.missed[number] else "found" if detection.object_class[number] >= 0 else "uncounted"
+            role = "asked" if each.mine[number] else ""
+            boxes.append(element("g", draw_object(thing, plane), class_=f"{kind} {role}".strip()))
+        return element(
+            "svg",
+            element("title", escape(label.frame)),
+            ground(plane, view.bounds) + self._backdrops[label.map].draw(plane, view.drawn),
+            *boxes,
+            *_predictions(detection, frame, plane, self._evaluation.least_score),
+            class_="frame-picture",
+            role="img",
+            viewBox=f"{left} {top} {width} {width}",
+            width=600,
+            height=600,
+        )
+
+
+def _predictions(detection: Detection, frame: int, plane: Plane, least: float) -> Iterator[str]:
+    found = detection.predictions
+    for number in np.flatnonzero((detection.frame == frame) & (found.score >= least)).tolist():
+        outline = corners(found.x[number], found.y[number], found.heading[number], found.width[number],
+                          found.length[number])  # fmt: skip
+        told = f"predicted {detection.classes[detection.prediction_class[number]]}, score {found.score[number]:.2f}"
+        path = points_path(plane.to_picture(outline).tolist(), closed=True)
+        yield element("g", element("title", escape(told)), element("path", d=path), class_="prediction")

@@ -1,0 +1,234 @@
+"""An evaluation as plain values: nested for JSON, one flat table for CSV and Parquet, aligned text for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from scenicq.evaluate.classes import ClassFigures
+from scenicq.evaluate.comparison import Comparison, Share, p_text
+from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation
+from scenicq.evaluate.precision import ERRORS
+from scenicq.evaluate.slices import Slice
+
+__all__ = ["COLUMNS", "Table", "evaluation_record", "flat_rows", "tables"]
+
+Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
+"""Title, names of the columns, and rows of texts."""
+
+COLUMNS: dict[str, type] = {
+    "scenario": str,
+    "table": str,
+    "about": str,
+    "part": str,
+    "group": str,
+    "distance_m": float,
+    "measure": str,
+    "value": float,
+    "low": float,
+    "high": float,
+    "objects": float,
+    "other_value": float,
+    "other_low": float,
+    "other_high": float,
+    "other_objects": float,
+    "p_value": float,
+    "p_corrected": float,
+    "recordings": float,
+}
+"""Columns of the flat table: one row a figure with its interval."""
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _share(share: Share) -> dict[str, Any]:
+    low, high = map(_number, share.interval)
+    return {"missed": share.missed, "of": share.of, "rate": _number(share.rate), "low": low, "high": high}
+
+
+def _comparison(each: Comparison) -> dict[str, Any]:
+    return {
+        "about": each.about,
+        "missed": _share(each.share),
+        "others": _share(each.other),
+        "difference": _number(each.difference),
+        "difference_low": _number(each.interval[0]),
+        "difference_high": _number(each.interval[1]),
+        "p_value": _number(each.p_value),
+        "p_corrected": _number(each.p_corrected),
+        "recordings": each.recordings,
+        "effective_recordings": round(each.effective, 2),
+        "alone": each.alone,
+        "sentence": each.sentence,
+    }
+
+
+def _figures(each: ClassFigures) -> dict[str, Any]:
+    measures = {"recall": each.recall, "precision": each.precision, "average_precision": each.average_precision}
+    return {
+        "class": each.category,
+        "group": each.group,
+        "distance_m": each.distance_m,
+        "objects": each.objects,
+        "predictions": each.predictions,
+        "effective_recordings": round(each.recordings, 2),
+        **{
+            name: {"value": _number(value), "low": _number(low), "high": _number(high)}
+            for name, (value, (low, high)) in {**measures, **each.errors}.items()
+        },
+    }
+
+
+def _slice(each: Slice) -> dict[str, Any]:
+    others = None if each.other is None else _share(each.other)
+    return {"by": each.by, "part": each.part, "missed": _share(each.share), "others": others}
+
+
+def evaluation_record(evaluation: Evaluation) -> dict[str, Any]:
+    """All figures as nested values, ready for JSON."""
+    return {
+        "predictions": evaluation.predictions,
+        "found_within_m": evaluation.distance_m,
+        "least_score": evaluation.least_score,
+        "scenarios": [_scenario(each) for each in evaluation.scenarios],
+        "warnings": [each.message for each in evaluation.warnings],
+    }
+
+
+def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "scenario": each.name,
+        "matching_frames": each.matching,
+        "other_frames": each.other,
+        "roles": [_comparison(role) for role in each.roles],
+        "all_objects": _comparison(each.all_objects),
+        "classes": [_figures(figures) for figures in each.classes],
+        "slices": [_slice(part) for part in each.slices],
+        "worst_frames": [
+            {"frame": one.frame, "recording": one.recording, "missed": one.missed, "of": one.of, "false": one.false}
+            for one in each.worst
+        ],
+    }
+    if each.simulated is not None:
+        simulated = each.simulated
+        found["simulated"] = {
+            "failed": _share(simulated.share), "says": simulated.says, "sentence": simulated.sentence
+        }  # fmt: skip
+    return found
+
+
+def flat_rows(evaluation: Evaluation) -> Iterator[dict[str, Any]]:
+    """One row a figure, with the keys of `COLUMNS`."""
+    for one in evaluation.scenarios:
+        for table, each in (*(("roles", role) for role in one.roles), ("all", one.all_objects)):
+            yield _row(
+                one.name, table, each.about, measure="missed", **_of(each.share), **_of_others(each.other),
+                p_value=each.p_value, p_corrected=each.p_corrected, recordings=each.effective,
+            )  # fmt: skip
+        for figures in one.classes:
+            measures = {
+                "recall": figures.recall,
+                "precision": figures.precision,
+                "average_precision": figures.average_precision,
+                **figures.errors,
+            }
+            for name, (value, (low, high)) in measures.items():
+                yield _row(
+                    one.name, "classes", figures.category, group=figures.group, distance_m=figures.distance_m,
+                    measure=name, value=value, low=low, high=high, objects=float(figures.objects),
+                    recordings=figures.recordings,
+                )  # fmt: skip
+        for part in one.slices:
+            others: Mapping[str, float] = {} if part.other is None else _of_others(part.other)
+            yield _row(one.name, "slices", part.by, part=part.part, measure="missed", **_of(part.share), **others)
+        if one.simulated is not None:
+            yield _row(one.name, "simulated", one.simulated.says, measure="failed", **_of(one.simulated.share))
+        for worst in one.worst:
+            share = worst.missed / worst.of if worst.of else math.nan
+            yield _row(one.name, "frames", worst.frame, measure="missed", value=share, objects=float(worst.of))
+
+
+def _row(scenario: str, table: str, about: str, **given: Any) -> dict[str, Any]:
+    row: dict[str, Any] = {**dict.fromkeys(COLUMNS), "scenario": scenario, "table": table, "about": about, **given}
+    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}
+
+
+def _of(share: Share) -> Mapping[str, float]:
+    return {"value": share.rate, "low": share.interval[0], "high": share.interval[1], "objects": share.of}
+
+
+def _of_others(share: Share) -> Mapping[str, float]:
+    return {f"other_{name}": value for name, value in _of(share).items()}
+
+
+def _percent(value: float, interval: tuple[float, float] | None = None) -> str:
+    if math.isnan(value):
+        return "-"
+    text = f"{100 * value:.0f} %"
+    if interval is not None and not math.isnan(interval[0]):
+        text += f" [{100 * interval[0]:.0f}, {100 * interval[1]:.0f}]"
+    return text
+
+
+def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
+    """What people look at: roles, classes at one centre distance, slices."""
+    found: list[Table] = [
+        (
+            "missed",
+            ("WHAT", "OBJECTS", "MISSED", "OTHERS ALIKE", "P", "CORRECTED", "RECORDINGS"),
+            [_compared(each) for each in (*scenario.roles, scenario.all_objects)],
+        )
+    ]
+    classes = [each for each in scenario.classes if each.distance_m == distance_m]
+    errors = {(each.category, each.group): each.errors for each in scenario.classes if each.errors}
+    heads = ("CLASS", "FRAMES", "OBJECTS", "RECALL", "PRECISION", "AP", *(name.upper() for name in ERRORS))
+    rows = [
+        (
+            each.category,
+            each.group,
+            f"{each.objects}",
+            _percent(*each.recall),
+            _percent(*each.precision),
+            _percent(*each.average_precision),
+            *(_error(errors.get((each.category, each.group), {}).get(name)) for name in ERRORS),
+        )
+        for each in sorted(classes, key=lambda each: each.category)
+    ]
+    found.append((f"classes, found within {distance_m:g} m, errors within 2 m", heads, rows))
+    cut = [
+        (
+            each.by,
+            each.part,
+            f"{each.share.of:g}",
+            _percent(each.share.rate, each.share.interval),
+            "-" if each.other is None else _percent(each.other.rate, each.other.interval),
+        )
+        for each in scenario.slices
+    ]
+    found.append(("slices", ("BY", "PART", "OBJECTS", "MISSED", "OTHERS"), cut))
+    return [table for table in found if table[2]]
+
+
+def _compared(each: Comparison) -> tuple[str, ...]:
+    def shown(value: float) -> str:
+        return "-" if math.isnan(value) else p_text(value).removeprefix("p ").removeprefix("= ")
+
+    return (
+        each.about,
+        f"{each.share.of:g}",
+        _percent(each.share.rate, each.share.interval),
+        _percent(each.other.rate, each.other.interval),
+        shown(each.p_value),
+        shown(each.p_corrected),
+        f"{each.recordings}" + (f" (as {each.effective:.1f})" if each.effective < each.recordings - 0.05 else ""),
+    )
+
+
+def _error(figure: tuple[float, tuple[float, float]] | None) -> str:
+    if figure is None or math.isnan(figure[0]):
+        return "-"
+    value, (low, high) = figure
+    return f"{value:.2f}" if math.isnan(low) else f"{value:.2f} [{low:.2f}, {high:.2f}]"

@@ -1,0 +1,146 @@
+"""Where a model fails: shares missed by distance, class, visibility, parameters, and values of random variables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.evaluate.comparison import DISTANCES_M, Share, distance_names, share_of
+from scenicq.evaluate.detection import Detection
+from scenicq.evaluate.matched import Matched
+
+__all__ = ["Slice", "slices"]
+
+Reals = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Numbers = NDArray[np.int64]
+_Pair = Sequence[Any]
+
+_PARTS = 5
+"""Into how many parts of like size numbers are cut."""
+_NAMES = 12
+"""More distinct texts than this are no slices."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slice:
+    """A part of the objects in question.
+
+    Attributes:
+        by: What divides them.
+        part: Which part.
+        share: Of the part's objects that were missed.
+        other: The same among the other objects; None where that makes no sense.
+    """
+
+    by: str
+    part: str
+    share: Share
+    other: Share | None
+
+
+def slices(
+    detection: Detection, matched: Matched, missed: Bools, mine: Bools, others: Bools, weights: Reals
+) -> Iterator[Slice]:
+    """All slices with at least two parts.
+
+    Args:
+        detection: Labels and predictions.
+        matched: What the query found.
+        missed: Whether each label object was missed, shape (objects,).
+        mine: The objects in question.
+        others: Those that they are compared with.
+        weights: How often each recording counts in each resample, shape (resamples, recordings).
+    """
+    objects, frames = detection.objects, detection.frames
+    recording = frames.recording[objects.frame].astype(np.int64)
+
+    def told(by: str, names: Sequence[str], part: Numbers, *, others_too: bool = True) -> Iterator[Slice]:
+        """Slices by the number of each object's part, -1 for none."""
+        there = [number for number in range(len(names)) if (mine & (part == number)).any()]
+        # what differs between any two recordings, as their names do, is no slice
+        shared = any(len(np.unique(recording[mine & (part == number)])) > 1 for number in there)
+        if len(there) > 1 and shared:
+            for number in there:
+                of = part == number
+                other = share_of(missed, others & of, recording, weights) if others_too else None
+                yield Slice(by, names[number], share_of(missed, mine & of, recording, weights), other)
+
+    distance = np.searchsorted(DISTANCES_M, detection.distance, side="right")
+    yield from told("distance", distance_names(), distance)
+    yield from told("class", detection.classes, detection.object_class.astype(np.int64))
+    yield from told("visibility", objects.visibility, objects.visible.astype(np.int64))
+    in_question = np.unique(objects.frame[mine])
+    for name in sorted({name for params in frames.params for name in params}):
+        values = [params.get(name) for params in frames.params]
+        names, part = _parts(values, in_question)
+        yield from told(f"param {name}", names, part[objects.frame])
+    keys = {key for frame in in_question.tolist() for key in matched.witness.get(frame, {})}
+    for key in sorted(keys):
+        if key.startswith("<"):
+            continue  # a variable of a library, which the author has not named
+        for suffix, take in (("", _itself), (" x", _first), (" y", _second)):
+            drawn = [None] * len(frames.names)
+            for frame in in_question.tolist():
+                drawn[frame] = take(matched.witness.get(frame, {}).get(key))
+            names, part = _parts(drawn, in_question)
+            yield from told(f"{key}{suffix}", names, part[objects.frame], others_too=False)
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, list | tuple) and len(cast(_Pair, value)) == 2
+
+
+def _itself(value: Any) -> Any:
+    return None if isinstance(value, list | tuple) else value
+
+
+def _first(value: Any) -> Any:
+    return cast(_Pair, value)[0] if _is_pair(value) else None
+
+
+def _second(value: Any) -> Any:
+    return cast(_Pair, value)[1] if _is_pair(value) else None
+
+
+def _parts(values: Sequence[Any], of: NDArray[np.int32]) -> tuple[list[str], Numbers]:
+    """Names of the parts of some values, and the number of each value's; -1 for none.
+
+    Args:
+        values: One a frame, None where there is none.
+        of: The frames whose values are cut into parts of like size.
+    """
+    none = np.full(len(values), -1, dtype=np.int64)
+    known = [values[number] for number in of.tolist() if values[number] is not None]
+    if len(known) < 2:
+        return [], none
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in known):
+        return _cut(values, known, none)
+    names = sorted({str(value) for value in known})
+    if len(names) > _NAMES:
+        return [], none
+    numbers = {name: number for number, name in enumerate(names)}
+    return names, np.array([numbers.get(str(value), -1) if value is not None else -1 for value in values])
+
+
+def _cut(values: Sequence[Any], known: Sequence[float], none: Numbers) -> tuple[list[str], Numbers]:
+    numbers = np.array(known, dtype=np.float64)
+    ends = np.unique(np.quantile(numbers, np.linspace(0, 1, _PARTS + 1)))
+    if len(ends) < 2:
+        return [], none
+    if len(np.unique(numbers)) <= _PARTS:
+        ends = np.append(np.unique(numbers), math.inf)
+        names = [f"{end:.4g}" for end in ends[:-1]]
+    else:
+        names = [f"{low:.4g} to {high:.4g}" for low, high in pairwise(ends.tolist())]
+    part = none.copy()
+    for place, value in enumerate(values):
+        if isinstance(value, int | float) and ends[0] <= value <= ends[-1]:
+            part[place] = min(int(np.searchsorted(ends, value, side="right")) - 1, len(names) - 1)
+    return names, part

@@ -1,0 +1,349 @@
+"""Files of predictions: nuScenes detection results, Argoverse 2 detections, and the interchange format with scores."""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, PLAIN, Predictions, Protocol
+from scenicq.store.schema import ArrowTable
+
+__all__ = ["read_predictions"]
+
+Reals = NDArray[np.float64]
+
+_compute: Any = import_module("pyarrow.compute")
+"""Of which no stubs know the functions."""
+
+_HINT = (
+    "known are nuScenes detection results (.json), Argoverse 2 detections (.feather), and labels of the interchange "
+    "format whose objects have a `score` (.jsonl or .parquet)"
+)
+_NUMBERS = ("x", "y", "heading", "width", "length", "height", "vx", "vy", "score")
+_NEEDED = ("x", "y", "heading", "width", "length", "score")
+
+
+class _Detection(msgspec.Struct):
+    """A box of nuScenes detection results."""
+
+    translation: tuple[float, float, float]
+    size: tuple[float, float, float]
+    rotation: tuple[float, float, float, float]
+    detection_name: str
+    detection_score: float
+    velocity: tuple[float | None, float | None] = (None, None)
+
+
+class _Results(msgspec.Struct):
+    """nuScenes detection results, those of each sample left as they are written."""
+
+    results: dict[str, msgspec.Raw]
+
+
+class _Object(msgspec.Struct, rename={"category": "class"}):
+    """An object of the interchange format."""
+
+    category: str
+    position: tuple[float, float]
+    width: float
+    length: float
+    score: float
+    heading: float | None = None
+    yaw: float | None = None
+    height: float | None = None
+    velocity: tuple[float, float] | None = None
+
+
+class _Line(msgspec.Struct):
+    """A label of the interchange format, as far as its predictions go."""
+
+    id: str
+    objects: list[_Object]
+
+
+def read_predictions(path: Path) -> Predictions:
+    """Read a file of predictions; its extension says which format it is.
+
+    Raises:
+        DataError: file-missing; file-invalid; predictions-invalid where a value makes no sense; predictions-duplicate
+            where a frame or a box is there twice.
+    """
+    match path.suffix.lower():
+        case ".json":
+            found = _nuscenes(path)
+        case ".feather":
+            found = _argoverse2(path)
+        case ".jsonl":
+            found = _lines(path)
+        case ".parquet":
+            found = _parquet(path)
+        case _:
+            message = f"{path}: its name does not say which kind of predictions it holds"
+            raise DataError(Diagnostic("file-invalid", message, hints=(_HINT,)))
+    _check(found)
+    return found
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror or error}")) from None
+
+
+def _invalid(path: Path, why: object) -> DataError:
+    text = " ".join(str(why).split())
+    return DataError(Diagnostic("file-invalid", f"{path} holds no predictions: {text}", hints=(_HINT,)))
+
+
+class _Gathered:
+    """Boxes one after the other."""
+
+    def __init__(self) -> None:
+        self.frames: list[str] = []
+        self.classes: dict[str, int] = {}
+        self._frame: list[NDArray[np.int32]] = []
+        self._category: list[NDArray[np.int32]] = []
+        self._values: list[Reals] = []
+
+    def add(self, frame: str, classes: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
+        """A frame with its boxes: columns as in `_NUMBERS`."""
+        numbers = [self.classes.setdefault(name, len(self.classes)) for name in classes]
+        self._frame.append(np.full(len(rows), len(self.frames), dtype=np.int32))
+        self._category.append(np.array(numbers, dtype=np.int32))
+        self._values.append(np.array(rows, dtype=np.float64).reshape(-1, len(_NUMBERS)))
+        self.frames.append(frame)
+
+    def predictions(self, path: Path, protocol: Protocol) -> Predictions:
+        """All of them."""
+        none = np.zeros(0, dtype=np.int32)
+        values = np.concatenate([np.zeros((0, len(_NUMBERS))), *self._values])
+        self._values.clear()
+        columns: dict[str, Any] = {name: np.ascontiguousarray(values[:, place]) for place, name in enumerate(_NUMBERS)}
+        return Predictions(
+            name=str(path),
+            protocol=protocol,
+            frames=self.frames,
+            frame=np.concatenate([none, *self._frame]),
+            classes=list(self.classes),
+            category=np.concatenate([none, *self._category]),
+            **columns,
+        )
+
+
+def _nuscenes(path: Path) -> Predictions:
+    try:
+        whole = msgspec.json.decode(_bytes(path), type=_Results)
+        decoder = msgspec.json.Decoder(list[_Detection])
+        gathered = _Gathered()
+        for sample, text in whole.results.items():
+            boxes = decoder.decode(text)
+            gathered.add(sample, [box.detection_name for box in boxes], [_nuscenes_row(box) for box in boxes])
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        raise _invalid(path, error) from None
+    return gathered.predictions(path, NUSCENES)
+
+
+def _nuscenes_row(box: _Detection) -> tuple[float, ...]:
+    a, b, c, d = box.rotation
+    norm = a * a + b * b + c * c + d * d
+    yaw = math.atan2(2 * (a * d + b * c), norm - 2 * (c * c + d * d)) if norm > 0 else math.nan
+    vx, vy = (math.nan if value is None else value for value in box.velocity)
+    x, y, _ = box.translation
+    return (x, y, yaw - math.pi / 2, *box.size, vx, vy, box.detection_score)
+
+
+def _lines(path: Path) -> Predictions:
+    gathered, decoder = _Gathered(), msgspec.json.Decoder(_Line)
+    for number, line in enumerate(_bytes(path).splitlines(), 1):
+        if line.strip():
+            try:
+                label = decoder.decode(line)
+            except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+                raise _invalid(path, f"line {number}: {error}") from None
+            rows = [_line_row(box) for box in label.objects]
+            gathered.add(label.id, [box.category for box in label.objects], rows)
+    return gathered.predictions(path, PLAIN)
+
+
+def _line_row(box: _Object) -> tuple[float, ...]:
+    heading = box.heading
+    if heading is None:
+        heading = math.nan if box.yaw is None else box.yaw - math.pi / 2
+    height = math.nan if box.height is None else box.height
+    return (*box.position, heading, box.width, box.length, height, *(box.velocity or (math.nan, math.nan)), box.score)
+
+
+def _table(path: Path) -> ArrowTable:
+    data = _bytes(path)
+    try:
+        if path.suffix.lower() == ".feather":
+            return pa.ipc.open_file(pa.BufferReader(data)).read_all()
+        return pq.read_table(pa.BufferReader(data))
+    except (pa.ArrowException, OSError) as error:
+        raise _invalid(path, error) from None
+
+
+def _argoverse2(path: Path) -> Predictions:
+    table = _table(path)
+    turn = ("qw", "qx", "qy", "qz")
+    sizes = ("width_m", "length_m", "height_m")
+    needed = ("log_id", "timestamp_ns", "category", "score", "tx_m", "ty_m", *sizes, *turn)
+    _require(path, table, needed)
+    frames, frame = _frames_of(table, ("log_id", "timestamp_ns"))
+    classes, category = _codes(path, table["category"])
+    a, b, c, d = (_reals(path, table, name) for name in turn)
+    yaw = np.arctan2(2 * (a * d + b * c), a * a + b * b - c * c - d * d)
+    yaw[(a * a + b * b + c * c + d * d) == 0] = np.nan
+    unknown = np.full(len(yaw), np.nan)
+    return Predictions(
+        name=str(path),
+        protocol=ARGOVERSE2,
+        frames=frames,
+        frame=frame,
+        classes=classes,
+        category=category,
+        x=_reals(path, table, "tx_m"),
+        y=_reals(path, table, "ty_m"),
+        heading=yaw,
+        width=_reals(path, table, "width_m"),
+        length=_reals(path, table, "length_m"),
+        height=_reals(path, table, "height_m"),
+        vx=unknown,
+        vy=unknown,
+        score=_reals(path, table, "score"),
+        of_ego=True,
+    )
+
+
+def _frames_of(table: ArrowTable, names: Sequence[str]) -> tuple[list[str], NDArray[np.int32]]:
+    """The names of frames in the order in which they come, and the number of the frame of each row."""
+    texts = [_compute.cast(table[name], pa.string()) for name in names]
+    joined = _compute.binary_join_element_wise(*texts, "/") if len(texts) > 1 else texts[0]
+    encoded = joined.combine_chunks().dictionary_encode()
+    return encoded.dictionary.to_pylist(), encoded.indices.to_numpy(zero_copy_only=False).astype(np.int32)
+
+
+def _codes(path: Path, column: Any) -> tuple[list[str], NDArray[np.int32]]:
+    """Distinct texts, and the number of each row's."""
+    if column.null_count:
+        raise _invalid(path, "a class is missing")
+    encoded = _compute.cast(column, pa.string()).combine_chunks().dictionary_encode()
+    return encoded.dictionary.to_pylist(), encoded.indices.to_numpy(zero_copy_only=False).astype(np.int32)
+
+
+def _require(path: Path, table: ArrowTable, names: Iterable[str]) -> None:
+    missing = [name for name in names if name not in table.column_names]
+    if missing:
+        raise _invalid(path, f"it lacks the columns {', '.join(f'`{name}`' for name in missing)}")
+
+
+def _reals(path: Path, table: ArrowTable, name: str) -> Reals:
+    """A column of numbers; nan where it has none, or is not there."""
+    if name not in table.column_names:
+        return np.full(len(table), np.nan)
+    try:
+        column = _compute.cast(table[name], pa.float64())
+    except pa.ArrowException as error:
+        raise _invalid(path, f"`{name}`: {error}") from None
+    values: Reals = column.to_numpy()
+    return np.ascontiguousarray(values)
+
+
+def _parquet(path: Path) -> Predictions:
+    """Labels with a list of objects each, or one row a box with a column for each value."""
+    table = _table(path)
+    known: list[str] | None = None
+    if "objects" in table.column_names:
+        _require(path, table, ("id", "objects"))
+        table, known = _unnested(path, table)
+    _require(path, table, ("frame", "class", *_NEEDED))
+    frames, frame = _frames_of(table, ("frame",))
+    if known is not None:
+        numbers = {name: number for number, name in enumerate(known)}
+        frame = np.array([numbers[name] for name in frames], dtype=np.int32)[frame] if frames else frame
+        frames = known
+    classes, category = _codes(path, table["class"])
+    columns: dict[str, Any] = {name: _reals(path, table, name) for name in _NUMBERS}
+    return Predictions(str(path), PLAIN, frames, frame, classes, category, **columns)
+
+
+def _unnested(path: Path, table: ArrowTable) -> tuple[ArrowTable, list[str]]:
+    """One row a box of labels with lists of objects, and the names of all labels."""
+    names: list[str] = _compute.cast(table["id"], pa.string()).to_pylist()
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise _duplicate(str(path), f"frame {twice} is there more than once")
+    objects = table["objects"].combine_chunks()
+    try:
+        boxes = pa.Table.from_struct_array(objects.flatten())
+        rows = boxes.append_column(
+            "frame", _compute.take(pa.array(names, pa.string()), _compute.list_parent_indices(objects))
+        )
+        for pair, ends in (("position", ("x", "y")), ("velocity", ("vx", "vy"))):
+            if pair in rows.column_names:
+                for place, name in enumerate(ends):
+                    rows = rows.append_column(name, _compute.list_element(rows[pair], place))
+        if "heading" not in rows.column_names and "yaw" in rows.column_names:
+            rows = rows.append_column("heading", _compute.subtract(rows["yaw"], math.pi / 2))
+    except (pa.ArrowException, AttributeError, TypeError) as error:
+        raise _invalid(path, f"`objects` are no boxes: {error}") from None
+    return rows, names
+
+
+def _duplicate(name: str, what: str) -> DataError:
+    return DataError(Diagnostic("predictions-duplicate", f"{name}: {what}"))
+
+
+def _check(found: Predictions) -> None:
+    """Refuse what is there twice or makes no sense."""
+    if len(set(found.frames)) < len(found.frames):
+        seen: set[str] = set()
+        twice = next(name for name in found.frames if name in seen or seen.add(name))
+        raise _duplicate(found.name, f"frame {twice} is there more than once")
+    for name in _NEEDED:
+        values: Reals = getattr(found, name)
+        wrong = ~np.isfinite(values)
+        if name in ("width", "length"):
+            wrong |= values <= 0
+        if wrong.any():
+            first = int(np.argmax(wrong))
+            message = (
+                f"{found.name}: {int(wrong.sum())} boxes have a {name} that makes no sense, the first in frame "
+                f"{found.frames[found.frame[first]]}: {values[first]:g}"
+            )
+            raise DataError(Diagnostic("predictions-invalid", message))
+    # equal boxes lie together when sorted by all that tells them apart
+    order = np.lexsort((found.y, found.x, found.category, found.frame))
+    same = np.ones(max(len(order) - 1, 0), dtype=np.bool_)
+    compared: tuple[NDArray[Any], ...] = (
+        found.frame,
+        found.category,
+        found.x,
+        found.y,
+        found.heading,
+        found.width,
+        found.score,
+    )
+    for each in compared:
+        ordered = each[order]
+        same &= ordered[1:] == ordered[:-1]
+    if same.any():
+        box = int(order[int(np.argmax(same))])
+        frame, category = found.frames[found.frame[box]], found.classes[found.category[box]]
+        message = f"{int(same.sum())} boxes are there more than once, such as a {category} in frame {frame}"
+        raise _duplicate(found.name, message)

@@ -1,0 +1,154 @@
+"""What a model has detected, and by which rules its kind of file is evaluated.
+
+Predictions are boxes with a score in the frame of the map. `prediction_files` reads them; `scenicq.evaluate` compares
+them with labels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ARGOVERSE2", "NUSCENES", "PLAIN", "THRESHOLDS_M", "Predictions", "Protocol"]
+
+Reals = NDArray[np.float64]
+
+THRESHOLDS_M = (0.5, 1.0, 2.0, 4.0)
+"""Centre distances up to which a prediction counts as that of a label object."""
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """The rules of a benchmark's own evaluation, as far as they can be followed in the plane.
+
+    Attributes:
+        name: What messages call it.
+        classes: The class that is evaluated for each class of the source; None for the source's own classes, or those
+            of the class tree where `tree` is set.
+        tree: Whether classes are those of the class tree.
+        ranges_m: Distance from the ego up to which each class is evaluated; `range_m` for the others.
+        range_m: The same for classes without a range of their own.
+        points: Attributes that count the points in a label object's box; those without any point are left out.
+        racks: Class of the source that marks places where none of `racked` is evaluated.
+        racked: Classes that are not evaluated inside a rack.
+        most: Predictions of a frame that count, those with the highest scores; of each class if `most_of_class`.
+        most_of_class: See `most`.
+        nearest_only: Whether a prediction can only be that of the nearest label object, even if another prediction is
+            that one's already.
+        clipped: Whether precision and recall below 10 % do not count in the average precision, and errors are averaged
+            over recall; else precision is made monotone, and errors are averaged over what was found.
+        hull: Whether the scale error takes the box around two aligned boxes for their union.
+        half_turn: Classes whose two directions are the same.
+        no_orientation, no_velocity: Classes for which these errors mean nothing.
+        last_first: Whether of boxes with one score the later one comes first.
+        velocity: Whether velocities are predicted.
+    """
+
+    name: str
+    classes: Mapping[str, str] | None = None
+    tree: bool = False
+    ranges_m: Mapping[str, float] = field(default_factory=dict[str, float])
+    range_m: float = math.inf
+    points: tuple[str, ...] = ()
+    racks: str = ""
+    racked: frozenset[str] = frozenset()
+    most: int = 0
+    most_of_class: bool = False
+    nearest_only: bool = False
+    clipped: bool = True
+    hull: bool = False
+    half_turn: frozenset[str] = frozenset()
+    no_orientation: frozenset[str] = frozenset()
+    no_velocity: frozenset[str] = frozenset()
+    last_first: bool = True
+    velocity: bool = True
+
+
+NUSCENES = Protocol(
+    "nuscenes",
+    classes={
+        "human.pedestrian.adult": "pedestrian",
+        "human.pedestrian.child": "pedestrian",
+        "human.pedestrian.construction_worker": "pedestrian",
+        "human.pedestrian.police_officer": "pedestrian",
+        "movable_object.barrier": "barrier",
+        "movable_object.trafficcone": "traffic_cone",
+        "vehicle.bicycle": "bicycle",
+        "vehicle.bus.bendy": "bus",
+        "vehicle.bus.rigid": "bus",
+        "vehicle.car": "car",
+        "vehicle.construction": "construction_vehicle",
+        "vehicle.motorcycle": "motorcycle",
+        "vehicle.trailer": "trailer",
+        "vehicle.truck": "truck",
+    },
+    ranges_m={"pedestrian": 40, "motorcycle": 40, "bicycle": 40, "traffic_cone": 30, "barrier": 30},
+    range_m=50,
+    points=("num_lidar_pts", "num_radar_pts"),
+    racks="static_object.bicycle_rack",
+    racked=frozenset({"bicycle", "motorcycle"}),
+    most=500,
+    half_turn=frozenset({"barrier"}),
+    no_orientation=frozenset({"traffic_cone"}),
+    no_velocity=frozenset({"traffic_cone", "barrier"}),
+)
+"""The nuScenes detection task (configuration `detection_cvpr_2019`)."""
+
+ARGOVERSE2 = Protocol(
+    "argoverse2",
+    range_m=150,
+    points=("num_interior_pts",),
+    most=100,
+    most_of_class=True,
+    nearest_only=True,
+    clipped=False,
+    hull=True,
+    last_first=False,
+    velocity=False,
+)
+"""The Argoverse 2 detection task, without its region of interest."""
+
+PLAIN = Protocol("interchange", tree=True)
+"""Predictions in the interchange format: everything counts, classes are those of the class tree."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Predictions:
+    """Detected boxes, in the order of their file.
+
+    Attributes:
+        name: Of the file.
+        protocol: The rules that go with the format.
+        frames: Names of the frames that the file speaks of, those without any box too.
+        frame: Number of the frame of each box, shape (n,).
+        classes: Names of the classes.
+        category: Number of the class of each box, shape (n,).
+        x, y: Centres in metres, shape (n,); in the frame of the map unless `of_ego`.
+        heading: Radians, 0 along +y, counter-clockwise; shape (n,).
+        width, length, height: Metres, shape (n,); a height of nan is not known.
+        vx, vy: Metres per second, shape (n,); nan where unknown.
+        score: Confidence, shape (n,).
+        of_ego: Whether boxes lie in the ego's own frame: x ahead, y to the left, from the middle of the rear axle, and
+            `heading` counts from the ego's.
+    """
+
+    name: str
+    protocol: Protocol
+    frames: list[str]
+    frame: NDArray[np.int32]
+    classes: list[str]
+    category: NDArray[np.int32]
+    x: Reals
+    y: Reals
+    heading: Reals
+    width: Reals
+    length: Reals
+    height: Reals
+    vx: Reals
+    vy: Reals
+    score: Reals
+    of_ego: bool = False

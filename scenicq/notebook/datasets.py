@@ -1,0 +1,123 @@
+"""A dataset opened for a notebook or a script: `scenicq.open`."""
+
+# DuckDB's relations have no useful types.
+# pyright: reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Unpack
+
+import duckdb
+
+from scenicq.errors import DataError, Diagnostic, Source
+from scenicq.notebook.frames import Frame
+from scenicq.notebook.matches import Matches
+from scenicq.query.execution.option_texts import OptionTexts, read_options
+from scenicq.query.execution.run import Query, read_program
+from scenicq.store.dataset import Dataset, open_dataset
+
+__all__ = ["OpenedDataset", "open"]
+
+_DRIVING = "scenic.domains.driving.model"
+
+
+@dataclass(eq=False, repr=False)
+class OpenedDataset:
+    """A dataset: frames by name, programs to match, SQL to ask.
+
+    Attributes:
+        dataset: The dataset itself.
+    """
+
+    dataset: Dataset
+    _connection: duckdb.DuckDBPyConnection | None = field(default=None, init=False)
+
+    def match(self, program: str | Path, **options: Unpack[OptionTexts]) -> Matches:
+        """Find the frames that match a program.
+
+        Args:
+            program: A file, as a path or a name that ends in `.scenic`; else the program itself, for which the driving
+                world model is there unless it imports another.
+            options: As of `scenicq match`, such as `tolerance="position=0.3"`, `every=True` for frames that do not
+                match, too, or `jobs=4`.
+
+        Raises:
+            ScenarioError: The program is wrong, or fits no map of the dataset.
+            DataError: file-missing, file-invalid or option-invalid.
+        """
+        unknown = sorted(options.keys() - OptionTexts.__annotations__.keys())
+        if unknown:
+            hint = f"known are {', '.join(OptionTexts.__annotations__)}"
+            raise DataError(Diagnostic("option-invalid", f"there is no option `{unknown[0]}`", hints=(hint,)))
+        is_file = isinstance(program, Path) or (program.endswith(".scenic") and "\n" not in program)
+        source = read_program(program) if is_file else Source("<program>", str(program))
+        texts = options if is_file else _with_model(options)
+        return Matches(Query(self.dataset, source, read_options(**texts)))
+
+    def sql(self, query: str) -> duckdb.DuckDBPyRelation:
+        """Ask the dataset's tables, which are read and never written; tables and columns as in README.
+
+        Args:
+            query: SQL as DuckDB knows it.
+
+        Raises:
+            DataError: sql-invalid.
+        """
+        if self._connection is None:
+            self._connection = self.dataset.connect()
+        try:
+            return self._connection.sql(query)
+        except duckdb.Error as error:
+            raise DataError(Diagnostic("sql-invalid", str(error).strip().partition("\n\n")[0])) from None
+
+    def __getitem__(self, frame: str) -> Frame:
+        """A frame by its name.
+
+        Raises:
+            DataError: option-invalid: there is no such frame.
+        """
+        return Frame(self.dataset, self.dataset.label(frame))
+
+    def __contains__(self, frame: object) -> bool:
+        """Whether there is a frame of that name."""
+        return isinstance(frame, str) and any(True for _ in self.dataset.labels([frame]))
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames in the order of recording, time and frame, read in batches."""
+        return (Frame(self.dataset, label) for label in self.dataset.labels())
+
+    def __len__(self) -> int:
+        """How many frames there are."""
+        return self.dataset.manifest.total.frames
+
+    @property
+    def maps(self) -> tuple[str, ...]:
+        """Names of the maps."""
+        return self.dataset.maps
+
+    def __repr__(self) -> str:
+        """Name and counts."""
+        total = self.dataset.manifest.total
+        return f"<dataset {self.dataset.name}: {total.frames:,} frames, {total.objects:,} objects>"
+
+
+def _with_model(options: OptionTexts) -> OptionTexts:
+    """The options with the driving world model, unless they name one."""
+    texts: OptionTexts = {"model": _DRIVING}
+    texts.update(options)
+    return texts
+
+
+def open(address: str | Path) -> OpenedDataset:
+    """Open a dataset that `scenicq ingest` made.
+
+    Args:
+        address: A folder, or what fsspec understands, such as `s3://bucket/dataset`.
+
+    Raises:
+        DataError: store-missing, store-version or store-damaged.
+    """
+    return OpenedDataset(open_dataset(address))

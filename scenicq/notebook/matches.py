@@ -1,0 +1,251 @@
+"""What a query has found: results to go through, as a table, in words, as pictures and as a report."""
+
+# pyarrow and pandas have no type stubs here.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenicq.errors import render
+from scenicq.match.matcher import Matcher
+from scenicq.match.verdict import NoMatch
+from scenicq.notebook.pictures import Picture, Text
+from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.result_tables import result_schema, result_table
+from scenicq.query.execution.results import Funnel, Result, record
+from scenicq.query.execution.run import Query
+from scenicq.query.explain.frame_explanation import explain, show_explanation
+from scenicq.report.backdrop import Backdrop
+from scenicq.report.picture import Shot, draw
+from scenicq.report.write import write_report
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+__all__ = ["FrameResult", "Matches"]
+
+_ROWS, _PICTURES = 20, 3
+"""Results that a notebook shows at most: as rows, and as pictures."""
+_SMALL = 260
+"""Width in pixels of a picture beside others."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameResult:
+    """The verdict on one frame.
+
+    Attributes:
+        matches: The query that it came out of.
+        result: Frame, verdict and sensor files.
+    """
+
+    matches: Matches
+    result: Result
+
+    @property
+    def record(self) -> Mapping[str, Any]:
+        """The values that a line of `scenicq match --format jsonl` has."""
+        return record(self.result)
+
+    @property
+    def frame(self) -> str:
+        """Name of the frame."""
+        return self.result.frame
+
+    @property
+    def recording(self) -> str:
+        """Name of the recording."""
+        return self.result.recording
+
+    @property
+    def timestamp_us(self) -> int:
+        """When, in microseconds."""
+        return self.result.timestamp_us
+
+    @property
+    def verdict(self) -> str:
+        """`match`, `no_match` or `unknown`."""
+        return self.record["verdict"]
+
+    @property
+    def roles(self) -> Mapping[str, str]:
+        """The label object of each object of the program."""
+        return self.record["correspondence"]
+
+    @property
+    def witness(self) -> Mapping[str, Any]:
+        """A value of each random variable that proves a match, by its place in the program."""
+        return self.record["witness"]
+
+    @property
+    def sensors(self) -> Mapping[str, str]:
+        """The sensor file of each channel."""
+        return self.record["sensors"]
+
+    def explain(self) -> Text:
+        """Why the frame matches, or what keeps it from it."""
+        return self.matches.explain(self.frame)
+
+    def show(self, *, half: float | None = None, width: int = 600) -> Picture:
+        """The frame from above, with what the program says of it."""
+        return self.matches.show(self.frame, half=half, width=width)
+
+    def _repr_svg_(self) -> str:
+        return self.show().svg
+
+    def __repr__(self) -> str:
+        """Frame, verdict and roles."""
+        roles = " ".join(f"{role}={thing}" for role, thing in self.roles.items() if (role, thing) != ("ego", "ego"))
+        return f"<{self.verdict} {self.frame}{': ' if roles else ''}{roles}>"
+
+
+@dataclass(eq=False, repr=False)
+class Matches(Sequence[FrameResult]):
+    """The results of a query, found while one goes through them and kept.
+
+    `len`, an index and a table need all of them. Whatever is wrong with the program is said when the query is made.
+
+    Attributes:
+        query: Dataset, program and options.
+    """
+
+    query: Query
+    _found: list[FrameResult] = field(default_factory=list["FrameResult"])
+    _rest: Iterator[Result] | None = None
+    _backdrops: dict[str, Backdrop] = field(default_factory=dict[str, Backdrop])
+
+    def __post_init__(self) -> None:
+        """Compile the program, so that its errors come now."""
+        self.query.plans()
+
+    def __iter__(self) -> Iterator[FrameResult]:
+        """The results in the order of recording, time and frame."""
+        number = 0
+        while number < len(self._found) or self._take():
+            yield self._found[number]
+            number += 1
+
+    def _take(self) -> bool:
+        """Find one more result."""
+        if self._rest is None:
+            self._rest = self.query.results()
+        for result in self._rest:
+            self._found.append(FrameResult(self, result))
+            return True
+        return False
+
+    def _all(self) -> list[FrameResult]:
+        while self._take():
+            pass
+        return self._found
+
+    def __len__(self) -> int:
+        """How many results there are."""
+        return len(self._all())
+
+    def __getitem__(self, which: Any) -> Any:
+        """A result by its number, several by a slice."""
+        return self._all()[which]
+
+    @property
+    def funnel(self) -> Funnel:
+        """How many frames each step has left, and what the others failed at; complete once all results are found."""
+        self._all()
+        return self.query.funnel
+
+    @property
+    def warnings(self) -> tuple[Text, ...]:
+        """What the author of the program should know."""
+        return tuple(Text(render(each)) for each in self.funnel.warnings)
+
+    def to_arrow(self) -> pa.Table:
+        """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
+        return result_table((each.record for each in self._all()), result_schema(self.query.roles()))
+
+    def to_pandas(self) -> Any:
+        """The results as a data frame; pandas is to be installed."""
+        return self.to_arrow().to_pandas()
+
+    def _shot(self, frame: str) -> tuple[Shot, Backdrop]:
+        label = self.query.dataset.label(frame)
+        world = self.query.world(label.map)
+        with LazySolver(self.query.options.solver) as solver:
+            matcher = Matcher(world.scenario, self.query.options.match, solver)
+            verdict = matcher.match(label)
+            why = explain(matcher, label) if isinstance(verdict, NoMatch) else None
+        if label.map not in self._backdrops:
+            self._backdrops[label.map] = Backdrop(self.query.dataset.network(label.map))
+        return Shot(label, world.scenario, verdict, why), self._backdrops[label.map]
+
+    def explain(self, frame: str) -> Text:
+        """Why a frame matches, or what keeps it from it and which tolerance would do.
+
+        Args:
+            frame: Its name; any frame of the dataset.
+
+        Raises:
+            DataError: option-invalid: there is no such frame.
+        """
+        label = self.query.dataset.label(frame)
+        with LazySolver(self.query.options.solver) as solver:
+            matcher = Matcher(self.query.world(label.map).scenario, self.query.options.match, solver)
+            return Text(show_explanation(explain(matcher, label)))
+
+    def show(self, frame: str, *, half: float | None = None, width: int = 600) -> Picture:
+        """A frame from above, with what the program says of it.
+
+        Args:
+            frame: Its name; any frame of the dataset.
+            half: Metres from the ego to the edges; chosen if None.
+            width: In pixels.
+
+        Raises:
+            DataError: option-invalid: there is no such frame.
+        """
+        shot, backdrop = self._shot(frame)
+        return Picture(draw(shot, backdrop, half=half, pixels=width))
+
+    def report(self, folder: str | Path, *, sensors: str | Path | None = None) -> Path:
+        """Write a page with pictures of the results.
+
+        Args:
+            folder: New, empty, or with an older report.
+            sensors: The folder that the paths of sensor files start from.
+
+        Returns:
+            The page.
+
+        Raises:
+            DataError: target-exists, or target-unwritable.
+        """
+        results = [each.result for each in self._all()]
+        return write_report(self.query, results, Path(folder), sensors=None if sensors is None else Path(sensors))
+
+    def __repr__(self) -> str:
+        """What was asked and, once known, how many results there are."""
+        known = f"{len(self._found)} results" if self._rest is not None else "not yet looked for"
+        return f"<{self.query.source.name} on {self.query.dataset.name}: {known}>"
+
+    def _repr_html_(self) -> str:
+        funnel = self.funnel
+        pictures = "".join(
+            f'<div style="display:inline-block;margin:4px">{self.show(each.frame, width=_SMALL).svg}</div>'
+            for each in self._found[:_PICTURES]
+        )
+        head = "".join(f"<th>{name}</th>" for name in ("frame", "recording", "verdict", "objects"))
+        rows = "".join(f"<tr>{_cells(each)}</tr>" for each in self._found[:_ROWS])
+        more = f"<p>and {len(self._found) - _ROWS} more</p>" if len(self._found) > _ROWS else ""
+        told = f"{funnel.matches} of {funnel.frames} frames match, {funnel.unknowns} unknown"
+        notes = "".join(f"<pre>{escape(text)}</pre>" for text in self.warnings)
+        return f"<p>{told}</p>{notes}<div>{pictures}</div><table><tr>{head}</tr>{rows}</table>{more}"
+
+
+def _cells(each: FrameResult) -> str:
+    objects = ", ".join(f"{role}={thing}" for role, thing in each.roles.items() if (role, thing) != ("ego", "ego"))
+    return "".join(f"<td>{escape(text)}</td>" for text in (each.frame, each.recording, each.verdict, objects))

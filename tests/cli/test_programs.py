@@ -1,0 +1,82 @@
+"""Programs that are no file: standard input, and text on the command line."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from scenicq_cli.main import cli
+
+PEDESTRIAN = "ego = new Car; new Pedestrian at ego offset by Range(-10, 10) @ Range(0, 20)"
+
+
+def fed(text, *arguments):
+    return CliRunner().invoke(cli, [str(argument) for argument in arguments], input=text)
+
+
+def test_standard_input_is_a_program_for_every_command(run, crossroads, scenarios):
+    file = scenarios / "02_crossing_cars.scenic"
+    text = file.read_text(encoding="utf-8")
+    frame = "03-busy-intersection/09"
+    for before, after in (
+        (["match"], [crossroads, "--format", "ids"]),
+        (["check"], [crossroads]),
+        (["explain"], [crossroads, frame]),
+        (["sample"], [crossroads, "-n", "2"]),
+        (["show", crossroads, frame, "--scenario"], []),
+    ):
+        expected = run(*before, file, *after)
+        found = fed(text, *before, "-", *after)
+        assert (found.exit_code, found.stderr) == (expected.exit_code, expected.stderr), before
+        assert found.stdout.replace("<stdin>", str(file)).split() == expected.stdout.split(), before
+
+
+def test_a_mistake_on_standard_input_has_its_place(crossroads):
+    found = fed("model scenic.domains.driving.model\nego = new Caar\n", "match", "-", crossroads)
+    assert found.exit_code == 2
+    assert "--> <stdin>:2:11" in found.stderr
+    assert fed(b"\xff\xfe", "match", "-", crossroads).stderr.startswith("error[file-invalid]")
+
+
+def test_a_program_on_the_command_line_has_the_driving_model(run, crossroads, tmp_path):
+    file = tmp_path / "same.scenic"
+    file.write_text("model scenic.domains.driving.model\n" + PEDESTRIAN.replace("; ", "\n") + "\n")
+    found = run("match", "-e", PEDESTRIAN, crossroads, "--tolerance", "position=1")
+    expected = run("match", file, crossroads, "--tolerance", "position=1")
+    frames = [json.loads(line)["frame"] for line in found.stdout.splitlines()]
+    assert frames == [json.loads(line)["frame"] for line in expected.stdout.splitlines()]
+    assert frames
+
+
+def test_a_model_of_its_own_is_not_replaced(run, crossroads):
+    found = run("match", "-e", "model scenic.simulators.carla.model; ego = new Car", crossroads, "--limit", "1")
+    assert found.exit_code == 0
+    assert run("match", "-e", "import nowhere; ego = new Car", crossroads).stderr.startswith("error[unknown-model]")
+
+
+def test_shards_and_resumed_runs_take_it_too(run, crossroads, tmp_path):
+    alone = run("match", "-e", PEDESTRIAN, crossroads, "--tolerance", "position=1")
+    for number in (1, 2):
+        shard = run("match", "-e", PEDESTRIAN, crossroads, "--tolerance", "position=1", "--shard", f"{number}/2", "-o",
+                    tmp_path / "pieces", "--exit-zero")  # fmt: skip
+        assert shard.exit_code == 0, shard.stderr
+    assert run("gather", tmp_path / "pieces").stdout == alone.stdout
+    resumed = run("match", "-e", PEDESTRIAN, crossroads, "--tolerance", "position=1", "--resume", "-o",
+                  tmp_path / "all.jsonl")  # fmt: skip
+    assert resumed.exit_code == 0
+    assert (tmp_path / "all.jsonl").read_text(encoding="utf-8") == alone.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-e", "ego = new Car", "one", "two"], "cannot both be the dataset"),
+        (["-e", "ego = new Car"], "Missing argument 'DATASET'"),
+        (["only.scenic"], "Missing argument 'DATASET'"),
+        ([], "Missing argument 'SCENARIO'"),
+    ],
+)
+def test_missing_and_superfluous_arguments_are_told(run, arguments, message):
+    found = run("match", *arguments)
+    assert found.exit_code == 2
+    assert message in found.stderr

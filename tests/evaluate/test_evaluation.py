@@ -1,0 +1,252 @@
+"""A whole evaluation on the sample data: figures, errors by name, intervals of recordings, several scenarios."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenicq.errors import DataError
+from scenicq.evaluate.detection import detect
+from scenicq.evaluate.evaluation import Evaluation, evaluate
+from scenicq.evaluate.pages import write_pages
+from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows
+from scenicq.evaluate.simulation import read_simulated
+from scenicq.importers.ingest import ingest
+from scenicq.importers.prediction_files import read_predictions
+from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, Predictions
+from scenicq.query.execution.results import Result, record
+from scenicq.query.execution.run import Query, read_program
+from scenicq.store.dataset import Dataset, open_dataset
+
+SAMPLES = Path(__file__).parents[2] / "sample_data"
+PARKED = SAMPLES / "parked"
+
+
+@pytest.fixture(scope="module")
+def street(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    folder = tmp_path_factory.mktemp("street") / "street"
+    ingest(PARKED, folder)
+    return open_dataset(folder)
+
+
+@pytest.fixture(scope="module")
+def results(street: Dataset) -> list[Result]:
+    return list(Query(street, read_program(PARKED / "parked_car.scenic")).results())
+
+
+@pytest.fixture(scope="module")
+def predictions() -> Predictions:
+    return read_predictions(PARKED / "predictions.jsonl")
+
+
+@pytest.fixture(scope="module")
+def judged(street: Dataset, results: list[Result], predictions: Predictions) -> Evaluation:
+    return evaluate({"parked_car": results}, street, predictions, simulated=PARKED / "runs.csv")
+
+
+def refused(code: str, run: Callable[[], object]) -> str:
+    with pytest.raises(DataError) as caught:
+        run()
+    assert caught.value.diagnostics[0].code == code
+    return caught.value.diagnostics[0].message
+
+
+def test_the_planted_failure_is_found(judged: Evaluation) -> None:
+    (found,) = judged.scenarios
+    (role,) = found.roles
+    assert role.about == "role parkedCar"
+    assert role.share.of == found.matching
+    assert role.share.interval[0] < role.share.rate < role.share.interval[1]
+    assert role.interval[0] > 0
+    assert role.p_value < 0.01
+    assert role.sentence.startswith("missed ")
+    assert found.simulated is not None
+    assert found.simulated.says == "for"
+    gap = [each for each in found.slices if each.by.endswith("parked_car.scenic:6:7")]
+    assert len(gap) == 5
+    assert gap[0].share.rate > 0.5 > gap[-1].share.rate
+
+
+def test_counts_are_those_of_a_loop(judged: Evaluation, street: Dataset, results: list[Result]) -> None:
+    """Without other cars near, the parked car is found where a box of its class lies within two metres."""
+    boxes = {
+        label["id"]: label["objects"]
+        for label in map(json.loads, (PARKED / "predictions.jsonl").read_text().splitlines())
+    }
+    missed = 0
+    for label in street.labels(result.frame for result in results):
+        thing = next(each for each in label.objects if each.id == "parked")
+        near = [
+            b for b in boxes[label.frame] if b["class"] == "Car" and math.dist(b["position"], (thing.x, thing.y)) < 2
+        ]
+        missed += not near
+    assert judged.scenarios[0].roles[0].share.missed == missed
+
+
+def test_the_score_that_counts(street: Dataset, results: list[Result], predictions: Predictions) -> None:
+    strict = evaluate({"a": results}, street, predictions, least_score=2.0).scenarios[0]
+    assert strict.roles[0].share.rate == 1
+    assert {each.recall[0] for each in strict.classes} == {0.0}
+    assert max(each.average_precision[0] for each in strict.classes) > 0.5
+
+
+def test_a_perfect_model(street: Dataset, results: list[Result], predictions: Predictions) -> None:
+    perfect = [
+        {
+            "id": label.frame,
+            "objects": [
+                {"class": o.category, "position": [o.x, o.y], "heading": o.heading, "width": o.width,
+                 "length": o.length, "score": 0.9, "velocity": o.velocity}
+                for o in label.objects
+            ],
+        }
+        for label in street.labels()
+    ]  # fmt: skip
+    file = street.path.parent / "perfect.jsonl"
+    file.write_text("\n".join(map(json.dumps, perfect)))
+    found = evaluate({"a": results}, street, file).scenarios[0]
+    assert found.roles[0].share.rate == 0
+    assert found.roles[0].share.interval[1] < 0.3
+    assert found.roles[0].p_value == 1
+    for each in found.classes:
+        assert (each.recall[0], each.precision[0]) == (1, 1)
+        assert each.average_precision[0] == pytest.approx(1)
+        assert all(value == pytest.approx(0, abs=1e-9) for value, _ in each.errors.values())
+    assert found.worst[0].missed == 0
+
+
+def test_intervals_of_recordings_are_results(street: Dataset, results: list[Result], predictions: Predictions) -> None:
+    """Roles are played by tracks, in every frame of the interval."""
+    times: dict[str, list[int]] = {}
+    for each in results:
+        times.setdefault(each.recording, []).append(each.timestamp_us)
+    records = [
+        {"recording": name, "start_us": min(mine), "end_us": max(mine), "verdict": "match", "witness": {},
+         "correspondence": {"ego": "ego", "parkedCar": "parked"}, "frames": {"count": len(mine)}}
+        for name, mine in times.items()
+    ]  # fmt: skip
+    by_frame = evaluate({"a": results}, street, predictions).scenarios[0]
+    by_interval = evaluate({"a": records}, street, predictions).scenarios[0]
+    assert by_interval.roles[0].share == by_frame.roles[0].share
+    assert by_interval.matching == by_frame.matching
+
+
+def test_unknown_frames_are_in_neither_group(street: Dataset, results: list[Result], predictions: Predictions) -> None:
+    records = [record(each) for each in results]
+    records[0] = {**records[0], "verdict": "unknown"}
+    found = evaluate({"a": records}, street, predictions).scenarios[0]
+    assert found.matching == len(results) - 1
+    assert found.matching + found.other == street.manifest.total.frames - 1
+
+
+def test_several_scenarios_are_corrected_together(
+    street: Dataset, results: list[Result], predictions: Predictions
+) -> None:
+    half = [each for each in results if each.recording < "09"]
+    both = evaluate({"all": results, "half": half}, street, predictions)
+    for each in both.scenarios:
+        assert each.roles[0].p_corrected >= each.roles[0].p_value
+    assert any("few" in each.code for each in evaluate({"few": results[:3]}, street, predictions).warnings)
+
+
+def test_the_same_seed_gives_the_same(street: Dataset, results: list[Result], predictions: Predictions) -> None:
+    first, second = (evaluation_record(evaluate({"a": results}, street, predictions, seed=4)) for _ in range(2))
+    assert first == second
+
+
+def test_rows_have_the_columns(judged: Evaluation) -> None:
+    rows = list(flat_rows(judged))
+    assert all(tuple(row) == tuple(COLUMNS) for row in rows)
+    assert {row["table"] for row in rows} == {"roles", "all", "classes", "slices", "simulated", "frames"}
+    json.dumps(evaluation_record(judged), allow_nan=False)
+
+
+def test_pages(judged: Evaluation, street: Dataset, tmp_path: Path) -> None:
+    text = write_pages(judged, street, tmp_path / "pages").read_text(encoding="utf-8")
+    assert judged.scenarios[0].roles[0].sentence.replace("<", "&lt;") in text
+    assert 'class="prediction"' in text
+    assert 'class="missed asked"' in text
+    worst = judged.scenarios[0].worst[0]
+    assert text.index('id="frame-0-0"') < text.index('id="frame-0-1"')
+    assert f'href="#frame-0-0">{worst.frame}<' in text
+    write_pages(judged, street, tmp_path / "pages")
+
+
+def test_what_does_not_fit_is_told(street: Dataset, results: list[Result], predictions: Predictions) -> None:
+    def run(found: Predictions, **more: Any) -> Callable[[], Evaluation]:
+        return lambda: evaluate({"a": results}, street, found, **more)
+
+    without = np.flatnonzero(predictions.frame < len(predictions.frames) - 1)
+    names = ("frame", "category", "x", "y", "heading", "width", "length", "height", "vx", "vy", "score")
+    fewer = replace(
+        predictions, frames=predictions.frames[:-1], **{name: getattr(predictions, name)[without] for name in names}
+    )
+    assert predictions.frames[-1] in refused("predictions-missing", run(fewer))
+    assert run(fewer, missing="empty")().scenarios[0].matching == len(results)
+    assert run(fewer, missing="skip")().scenarios[0].matching <= len(results)
+    other = replace(predictions, frames=[*predictions.frames[:-1], "elsewhere"])
+    assert "elsewhere" in refused("predictions-unmatched", run(other))
+    assert run(other, missing="skip")().scenarios
+    nowhere = replace(predictions, frames=[f"x{name}" for name in predictions.frames])
+    refused("predictions-unmatched", run(nowhere, missing="skip"))
+    refused("predictions-frame", run(replace(predictions, x=predictions.x + 5000)))
+    refused("unknown-class", run(replace(predictions, classes=["Car", "spaceship"])))
+    refused("option-invalid", run(predictions, distance_m=3.0))
+    refused("file-invalid", lambda: evaluate([{**record(results[0]), "frame": "other"}], street, predictions))
+    cast = {"correspondence": {"parkedCar": "nobody"}}
+    refused("file-invalid", lambda: evaluate([{**record(results[0]), **cast}], street, predictions))
+
+
+def test_boxes_of_the_ego_frame(street: Dataset, predictions: Predictions) -> None:
+    """Boxes seen from the ego are found as the same boxes on the map are."""
+    labels = {label.frame: label for label in street.labels()}
+    egos = [labels[predictions.frames[number]].ego for number in predictions.frame.tolist()]
+    heading = np.array([ego.heading for ego in egos])
+    dx = predictions.x - np.array([ego.x for ego in egos])
+    dy = predictions.y - np.array([ego.y for ego in egos])
+    seen = replace(
+        predictions,
+        x=-np.sin(heading) * dx + np.cos(heading) * dy,
+        y=-np.cos(heading) * dx - np.sin(heading) * dy,
+        heading=predictions.heading - heading,
+        of_ego=True,
+    )
+    one, other = detect(street, predictions), detect(street, seen)
+    for threshold, owner in one.owner.items():
+        assert owner.tolist() == other.owner[threshold].tolist()
+    assert one.errors == pytest.approx(other.errors, abs=1e-9, nan_ok=True)
+
+
+def test_rules_of_the_benchmarks(street: Dataset, predictions: Predictions) -> None:
+    """Ranges, numbers of boxes and boxes without points are as the protocol says."""
+    near = replace(predictions, protocol=replace(predictions.protocol, range_m=15.0))
+    found = detect(street, near)
+    assert found.distance[found.object_class >= 0].max() < 15
+    assert (found.object_class >= 0).sum() < len(found.object_class)
+    few = replace(predictions, protocol=replace(predictions.protocol, most=2))
+    found = detect(street, few)
+    assert np.bincount(found.frame).max() == 2
+    assert (found.predictions.score[:-1] >= found.predictions.score[1:]).all()
+    assert NUSCENES.ranges_m["barrier"] == 30
+    assert ARGOVERSE2.range_m == 150
+
+
+def test_simulated_runs(tmp_path: Path) -> None:
+    file = tmp_path / "runs.csv"
+    file.write_text("scenario,failed\na,1\na,0\na,true\nb,no\n")
+    found = read_simulated(file)
+    assert found["a"].rate == pytest.approx(2 / 3)
+    assert found["b"].rate == 0
+    file.write_text("scenario,score\na,0.25\na,0.75\n")
+    assert read_simulated(file)["a"].rate == pytest.approx(0.5)
+    for text in ("scenario,score\na,1.5\n", "scenario,failed\na,maybe\n", "scenario\na\n", "failed\n1\n"):
+        file.write_text(text)
+        refused("file-invalid", lambda: read_simulated(file))
+    refused("file-missing", lambda: read_simulated(tmp_path / "none.csv"))
