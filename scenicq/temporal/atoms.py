@@ -20,6 +20,7 @@ from scenicq.forest.condition import expand
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
+    Bearing,
     Compare,
     CompareOp,
     Constant,
@@ -42,6 +43,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.geometry.angles import heading_of_array, normalize_array
 from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
@@ -111,6 +113,10 @@ class AtomColumns:
     def expanded(self, condition: Node) -> Node:
         """A condition with the program's own value of what no label observes and what does not change."""
         return expand(condition, self._definition)
+
+    def unknown(self) -> Truth:
+        """Unknown at each sample, shape (n,)."""
+        return np.full(len(self.samples), UNKNOWN)
 
     def truth(self, condition: Node) -> Truth:
         """The value of a condition at each sample, shape (n,).
@@ -320,6 +326,8 @@ def _vectorised(node: Node, args: Sequence[_Data]) -> _Data | None:
             return args[0][node.axis]
         case Norm() if isinstance(args[0], tuple):
             return np.hypot(*args[0])
+        case Bearing() if isinstance(args[0], tuple):
+            return heading_of_array(*args[0])
         case VectorSum() if isinstance(args[0], tuple) and isinstance(args[1], tuple):
             return args[0][0] + args[1][0], args[0][1] + args[1][1]
         case Scale() if isinstance(args[0], tuple) and isinstance(args[1], np.ndarray):
@@ -337,8 +345,7 @@ def _arithmetic(op: ArithmeticOp, args: Sequence[Numbers]) -> Numbers | None:
     if op in _UNARY:
         return _UNARY[op](args[0])
     if op is ArithmeticOp.WRAP:
-        turned = np.remainder(args[0] + np.pi, 2 * np.pi) - np.pi
-        return np.where(turned == -np.pi, np.pi, turned)
+        return normalize_array(args[0])
     if op not in _FOLDED:
         return None
     found = args[0]

@@ -8,8 +8,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import groupby
 
-from scenicq.forest.scenario import Scenario
+from scenicq.forest.groups import Condition
+from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.match.matcher import Finding, Matcher
+from scenicq.match.problem.candidates import Candidates
+from scenicq.match.problem.constraints import describe_constraint
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
 from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.prefilter.executor import Block, Candidate
@@ -17,7 +20,8 @@ from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader, track_of
 from scenicq.temporal.intervals import Interval, IntervalMatcher, Start
-from scenicq.temporal.truth import TRUE, UNKNOWN
+from scenicq.temporal.start_columns import StartColumns
+from scenicq.temporal.truth import TRUE, UNKNOWN, Truth
 
 __all__ = ["DecidedRecordings", "RecordingMatcher", "lost_recording", "starts_of"]
 
@@ -40,7 +44,7 @@ class DecidedRecordings:
     failed: Counter[str] = field(default_factory=Counter[str])
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False)
 class RecordingMatcher:
     """What a process keeps between blocks.
 
@@ -53,6 +57,14 @@ class RecordingMatcher:
     dataset: Dataset
     matcher: Matcher
     intervals: IntervalMatcher
+
+    def __post_init__(self) -> None:
+        """Choose what is decided before labels are matched."""
+        options = self.matcher.options
+        self._columns = StartColumns(self.matcher.scenario, options)
+        self._rest = self.matcher
+        if self._columns.by_role:
+            self._rest = Matcher(self._columns.rest(), options, self.matcher.solver)
 
     def decide(self, block: Block, left: Iterable[Candidate]) -> DecidedRecordings:
         """Decide a block of whole recordings.
@@ -67,28 +79,71 @@ class RecordingMatcher:
             rows: dict[str, tuple[int, int]] = {}
             for name, group in groupby(left, key=lambda each: each.label.recording):
                 candidates = list(group)
-                starts = [(each, self._starts(each, found)) for each in candidates]
-                if not any(mine for _, mine in starts):
-                    continue
                 if reader is None:
                     reader = stack.enter_context(TrackReader(self.dataset, block.part))
                     names = reader.names([first for first, _ in block.runs])
                     rows = dict(zip(names, block.runs, strict=True))
                 tracks = reader.read(*rows[name])
+                starts = self._starts(tracks, candidates, found)
                 self._recording(tracks, starts, found)
         found.counts["recordings"] += len(block.runs)
         return found
 
-    def _starts(self, candidate: Candidate, found: DecidedRecordings) -> list[Finding]:
-        """How a label can be the start, if it can."""
-        places = self.matcher.look_up([(candidate.label, candidate.among)])
-        findings = list(self.matcher.findings(candidate.label, among=candidate.among, places=places))
-        for each in findings:
-            if isinstance(each.verdict, NoMatch):
-                found.failed[each.verdict.cause.what] += 1
-        kept = [each for each in findings if not isinstance(each.verdict, NoMatch)]
-        found.counts["starts"] += bool(kept)
-        return kept
+    def _starts(
+        self, tracks: RecordingTracks, candidates: Iterable[Candidate], found: DecidedRecordings
+    ) -> list[tuple[Candidate, list[Finding]]]:
+        """How labels can be the start, those that can."""
+        numbers = {frame: number for number, frame in enumerate(tracks.frames)}
+        known: dict[tuple[int, TrackKey], list[tuple[Requirement, Truth]]] = {}
+        starts: list[tuple[Candidate, list[Finding]]] = []
+        for candidate in candidates:
+            narrowed = self._narrowed(tracks, candidate, numbers[candidate.label.frame], known)
+            if isinstance(narrowed, Requirement):
+                found.failed[describe_constraint(self.matcher.scenario, Condition(narrowed, narrowed.condition))] += 1
+                continue
+            among, matcher = narrowed
+            places = matcher.look_up([(candidate.label, among)])
+            findings = list(matcher.findings(candidate.label, among=among, places=places))
+            for each in findings:
+                if isinstance(each.verdict, NoMatch):
+                    found.failed[each.verdict.cause.what] += 1
+            kept = [each for each in findings if not isinstance(each.verdict, NoMatch)]
+            found.counts["starts"] += bool(kept)
+            if kept:
+                starts.append((candidate, kept))
+        return starts
+
+    def _narrowed(
+        self,
+        tracks: RecordingTracks,
+        candidate: Candidate,
+        sample: int,
+        known: dict[tuple[int, TrackKey], list[tuple[Requirement, Truth]]],
+    ) -> tuple[Candidates | None, Matcher] | Requirement:
+        """Who may play whom, and who decides the rest; or the requirement that nobody satisfies."""
+        label, scenario = candidate.label, self.matcher.scenario
+        if not self._columns.by_role or not label.has_ego:
+            return candidate.among, self.matcher
+        among = dict(candidate.among or {})
+        sure = True
+        for role in self._columns.by_role:
+            numbers = (0,) if role == scenario.ego else among.get(role, range(1, len(label.objects) + 1))
+            kept: list[int] = []
+            blamed: Requirement | None = None
+            for number in numbers:
+                key = track_of(label, label.objects[number - 1] if number else label.ego)
+                if (role, key) not in known:
+                    known[role, key] = self._columns.decide(tracks, role, key)
+                broken = self._columns.excluded(known[role, key], sample)
+                if broken is None:
+                    kept.append(number)
+                    sure = sure and all(truth[sample] == TRUE for _, truth in known[role, key])
+                blamed = blamed or broken
+            if not kept and blamed is not None:
+                return blamed
+            if role != scenario.ego:
+                among[role] = tuple(kept)
+        return among, self._rest if sure else self.matcher
 
     def _recording(
         self, tracks: RecordingTracks, starts: Iterable[tuple[Candidate, list[Finding]]], found: DecidedRecordings
