@@ -40,6 +40,7 @@ test: $(READY) ## All tests but the slow ones
 	$(PYTEST) -n $(WORKERS) -m 'not slow'
 
 test-all: $(READY) ## All tests
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev,notebook]'
 	$(PYTEST) -n $(WORKERS)
 
 golden: $(READY) ## Rewrite the golden files that tests compare with
@@ -59,8 +60,12 @@ bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=100
 MAP ?= Town01.xodr
 RANDOM ?= 200
 SEED ?= 1
-conformance: $(READY) ## Compare with Scenic 3.1.1 and 2.1.0 (MAP=an OpenDRIVE file, RANDOM=programs, SEED=)
+conformance: $(READY) ## Compare with Scenic 3.1.1 and 2.1.0 (MAP=an OpenDRIVE file, RANDOM=, SEED=; or SCENIC=a checkout)
+ifdef SCENIC
+	$(BIN)/python tests/conformance/published.py $(SCENIC)
+else
 	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(SEED)
+endif
 
 browser: ## Install the Chromium that the tests of reports are driven in, where the system has it
 	@$(call install_browser)

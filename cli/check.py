@@ -24,9 +24,10 @@ from scenicq.query.execution.compiled_map import program_network, read_network
 from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.option_texts import VERSIONS
 from scenicq.query.execution.run import beside
-from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.dataset import Dataset
 
 from .cache import user_cache
+from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
 from .programs import SCENARIO, read_scenario
@@ -58,7 +59,7 @@ def networks_of(
             Diagnostic("option-invalid", "a dataset brings its own maps: `--map` is too much", hints=(hint,))
         )
     if dataset is not None:
-        opened = open_dataset(dataset)
+        opened = open_checked(dataset)
         yield from (opened.network(name) for name in opened.maps)
     elif map_file is not None:
         yield read_network(map_file, user_cache() / "maps")
@@ -199,7 +200,7 @@ def check(ctx: click.Context, scenario: Path, dataset: str | None, *, map_file: 
         version, warnings = read_version(scenic), list[Diagnostic]()
         source = read_scenario(scenario)
         networks = networks_of(dataset, map_file, source, version, warnings)
-        opened = None if dataset is None else open_dataset(dataset)
+        opened = None if dataset is None else open_checked(dataset)
         asked = _Asked(MatchOptions(classes=classes), opened, opened is not None or map_file is not None, strict)
         lines, diagnostics = _found(source, networks, version, initial, details, asked)
         diagnostics += warnings

@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 
 from scenicq.query.execution.result_files import read_results
-from scenicq.report.changes import changes, changes_page, changes_text
+from scenicq.report.changes import changes, changes_page, changes_text, check_datasets
 
 from .manual import Manual
 from .output import destination, writing
-from .report import plain
+from .report import plain, show
 
 __all__ = ["report"]
 
@@ -33,7 +33,11 @@ def report(before: Path, after: Path, *, every: bool, output: Path | None) -> No
 
     This shows what a changed line of a program did. With `match --all` the files also say why a frame does not match.
     """
-    found = changes(read_results(before), read_results(after))
+    old, new = read_results(before), read_results(after)
+    doubt = check_datasets(old, new)
+    if doubt is not None:
+        show([doubt])
+    found = changes(old, new)
     if output is None or str(output) == "-":
         click.echo(plain(changes_text(found, every=every)))
         return

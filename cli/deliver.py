@@ -11,14 +11,18 @@ from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import click
+
 from scenicq.exporters.export import Exporter
+from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target, write_report
+from scenicq.store.atomic_files import sole_writer
 
 from .formats import make_writer
 from .output import ProgressBar, destination, writing
-from .report import show_few
+from .report import count, show_few
 from .sources import sensor_root
 
 __all__ = ["Wanted", "deliver"]
@@ -49,27 +53,44 @@ def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wa
     """Take results, and then those that come close, and hand them on.
 
     Raises:
-        DataError: target-exists or target-unwritable.
+        DataError: target-exists, target-busy or target-unwritable.
     """
+    if wanted.report is None:
+        _deliver(query, results, near, wanted, bar)
+        return
+    check_target(wanted.report)
+    with sole_writer(wanted.report):
+        _deliver(query, results, near, wanted, bar)
+
+
+def _deliver(
+    query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar
+) -> None:
     started = time.perf_counter()
+    unlisted = 0
     file, report = wanted.file, wanted.report
     exporter = None
     if wanted.export is not None:
         exporter = Exporter(wanted.export[0], query.dataset, wanted.export[1], Path(query.source.name).stem)
-    if report is not None:
-        check_target(report)
     shown: list[Result] | None = None if report is None else []
     close: list[Result] | None = None if report is None else []
     with destination(file, wanted.work) as sink, bar, contextlib.closing(results):
         with writing(file):
-            writer = make_writer(wanted.form, sink, query.roles, over_time=query.is_over_time())
+            over_time = query.is_over_time()
+            shorten = query.dataset.short_frames
+            writer = make_writer(wanted.form, sink, query.roles, shorten, over_time=over_time)
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
                 writer.write(record(result))
+            unlisted += wanted.form == "ids" and isinstance(result.verdict, NoMatch)
             if exporter is not None:
                 exporter.add(result)
         with bar.aside(), writing(file):
             writer.finish()
+        if unlisted:
+            told = f"`ids` lists frames that match: {count(unlisted, 'other frame')} left out"
+            with bar.aside():
+                click.echo(told, err=True)
         if exporter is not None:
             with bar.aside():
                 show_few(exporter.finish().left_out)

@@ -21,8 +21,8 @@ from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, tables
 from scenicq.report.write import check_target
-from scenicq.store.dataset import open_dataset
 
+from .datasets import open_checked
 from .manual import Manual
 from .output import choose_format, destination, writing
 from .report import columns, plain, show
@@ -89,7 +89,7 @@ def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, dist
         raise DataError(Diagnostic("option-invalid", message))
     if report is not None:
         check_target(report)
-    opened = open_dataset(dataset)
+    opened = open_checked(dataset)
     found = judge(
         dict(zip(names, results, strict=True)),
         opened,

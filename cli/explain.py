@@ -15,14 +15,14 @@ from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.query.explain.interval_explanation import explain_recording
-from scenicq.store.dataset import open_dataset
 
+from .datasets import open_checked
 from .main import NOTHING
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
 from .programs import SCENARIO, read_scenario
-from .remarks import show_remarks
+from .remarks import remarks, show_remarks
 from .report import plain
 
 __all__ = ["explain"]
@@ -42,14 +42,14 @@ def _recording(query: Query, named: str) -> tuple[str, int | None] | None:
     arguments={
         "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it; of a program about "
-        "what happens over time the name of a recording, and after `@` the timestamp at which the interval begins.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a program "
+        "about what happens over time that of a recording, and after `@` the timestamp at which the interval begins.",
     },
     exits={0: "the frame or recording matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
     topics={"What counts as a match": SHARED},
     epilog="\b\nExamples:\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c\n"
-    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.25,heading=5deg --smt2 formulas\n"
+    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.5,heading=5deg --smt2 formulas\n"
     "  scenicq explain cut_in.scenic dataset scene-0061@1532402928147847",
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
@@ -66,7 +66,7 @@ def explain(
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
-    query = Query(open_dataset(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
+    query = Query(open_checked(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
     if query.is_over_time() and (named := _recording(query, frame)) is not None:
         with LazySolver(query.options.solver) as solver:
             told = explain_recording(query, solver, *named)
@@ -75,7 +75,7 @@ def explain(
             ctx.exit(NOTHING)
         return
     label = query.dataset.label(frame)
-    show_remarks(query, [label.map])
+    show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)

@@ -15,6 +15,8 @@ import pyarrow.parquet as pq
 
 from scenicq.query.execution.result_tables import result_schema, result_table
 
+from .report import CONTROL as _CONTROL
+from .report import plain
 from .table import Table, Text
 
 __all__ = ["FORMATS", "Writer", "make_writer"]
@@ -24,6 +26,8 @@ FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 
 _json = json.JSONEncoder(ensure_ascii=False).encode
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What makes a spreadsheet take a cell for a formula."""
 _COLUMNS: tuple[str, ...] = (
     "frame",
     "recording",
@@ -86,7 +90,21 @@ def _flat(record: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
 def _name(record: Mapping[str, Any]) -> str | None:
     if record["verdict"] != "match":
         return None
-    return record["frame"] if "frame" in record else f"{record['recording']}@{record['start_us']}"
+    name = record["frame"] if "frame" in record else f"{record['recording']}@{record['start_us']}"
+    return plain(name).replace("\n", "\\n")
+
+
+def _escaped(record: Mapping[str, Any]) -> str:
+    """JSON in which nothing moves a cursor or turns text round; what it says is the same."""
+    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", _json(record))
+
+
+def _cell(value: Any) -> Any:
+    """A text that a terminal shows as it is, and that no spreadsheet takes for a formula."""
+    if not isinstance(value, str):
+        return value
+    shown = plain(value)
+    return f"'{shown}" if shown.startswith(_FORMULA) else shown
 
 
 class _Csv:
@@ -96,7 +114,7 @@ class _Csv:
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.writerow(_flat(record, self._names))
+        self._rows.writerow({name: _cell(value) for name, value in _flat(record, self._names).items()})
         self._text.flush()
 
     def finish(self) -> None:
@@ -123,13 +141,21 @@ class _Parquet:
         self._file.close()
 
 
-def make_writer(name: str, sink: BinaryIO, roles: Callable[[], Sequence[str]], *, over_time: bool = False) -> Writer:
+def make_writer(
+    name: str,
+    sink: BinaryIO,
+    roles: Callable[[], Sequence[str]],
+    shorten: Callable[[], Callable[[str], str]] | None = None,
+    *,
+    over_time: bool = False,
+) -> Writer:
     """The writer of a format.
 
     Args:
         name: One of `FORMATS`.
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
+        shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
         over_time: Whether the results are intervals.
     """
     names = _INTERVAL_COLUMNS if over_time else _COLUMNS
@@ -138,10 +164,10 @@ def make_writer(name: str, sink: BinaryIO, roles: Callable[[], Sequence[str]], *
     text = Text(sink)
     match name:
         case "table":
-            return Table(text, over_time=over_time)
+            return Table(text, shorten, over_time=over_time)
         case "csv":
             return _Csv(text, names)
         case "ids":
             return _Lines(text, _name)
         case _:
-            return _Lines(text, _json)
+            return _Lines(text, _escaped)

@@ -67,5 +67,6 @@ def show_funnel(query: Query, elapsed_s: float) -> None:
     waived = [requirement.value for requirement in BuiltIn if requirement not in query.options.match.enforce]
     if waived:
         lines.append(f"  waived: {', '.join(waived)} (see --enforce)")
+    lines.append(f"  tolerance: {query.options.match.tolerance} (see --tolerance)")
     lines.append(f"  {count(query.funnel.frames, 'frame')} in {elapsed_s:.1f} s")
     click.echo("\n".join(lines), err=True)

@@ -7,16 +7,19 @@ from collections.abc import Mapping
 
 import click
 
-from scenicq.store.dataset import open_dataset
 from scenicq.store.manifest import Counts, Manifest
 from scenicq.store.schema import SCHEMAS
+from scenicq.store.soundness import check_dataset
+from scenicq.store.verification import verify_computed
 
+from .datasets import open_checked
 from .ingest import defects
 from .manual import Manual
-from .report import columns, count, moment, plain
+from .report import columns, count, is_date, moment, plain
 
 __all__ = ["info"]
 
+_VERIFIED = ("every checksum is right, and every value is sound",)
 _TOP = 10
 """Recordings and classes of the source that are listed."""
 
@@ -53,11 +56,12 @@ def _lines(manifest: Manifest) -> list[str]:
     span = manifest.span_us
     source, made = manifest.provenance.get("source", "unknown"), manifest.provenance.get("time", "unknown")
     versions = ", ".join(f"{name} {number}" for name, number in manifest.provenance.get("versions", {}).items())
+    clock = "UTC" if span is None or is_date(span[0]) else "by the source's own clock, which tells no date"
     without_map = sorted(set(manifest.by_map) - set(manifest.maps))
     return [
         f"{manifest.name}: {count(manifest.total.frames, 'frame')}, {count(manifest.total.objects, 'object')}, "
         f"{count(manifest.tracks, 'track')} in {count(len(manifest.by_recording), 'recording')}",
-        *([f"from {moment(span[0])} to {moment(span[1])} (UTC)"] if span else []),
+        *([f"from {moment(span[0])} to {moment(span[1])} ({clock})"] if span else []),
         f"read as {manifest.importer} from {source} on {made}",
         f"with {versions}",
         "",
@@ -76,15 +80,30 @@ def _lines(manifest: Manifest) -> list[str]:
     epilog="\b\nExample:\n  scenicq info dataset --verify",
 )
 @click.argument("dataset", type=click.Path())
-@click.option("--verify", is_flag=True, help="Compare every file with its checksum.")
+@click.option(
+    "--verify",
+    is_flag=True,
+    help="Compare every file with its checksum, look at every value, and compute anew what was computed at ingest.",
+)
 @click.option("--format", "format_", type=click.Choice(["text", "json"]), default="text",
               help="json gives the whole manifest.")  # fmt: skip
 def info(dataset: str, *, verify: bool, format_: str) -> None:
     """Say what a dataset holds and what was left out of it."""
-    opened = open_dataset(dataset)
+    opened = open_checked(dataset)
     if verify:
         opened.verify()
+        check_dataset(opened)
+        verify_computed(opened)
     if format_ == "json":
         click.echo(opened.manifest.to_json(), nl=False)
     else:
-        click.echo(plain("\n".join([*_lines(opened.manifest), *(["every checksum is right"] if verify else [])])))
+        click.echo(
+            plain(
+                "\n".join(
+                    [
+                        *_lines(opened.manifest),
+                        *(["every checksum is right, and every value is sound"] if verify else []),
+                    ]
+                )
+            )
+        )

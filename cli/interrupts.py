@@ -28,11 +28,17 @@ _AT_ONCE_S = 0.001
 
 
 class Interrupts:
-    """Whether this process was asked to stop."""
+    """Whether this process was asked to stop.
+
+    Attributes:
+        noticed: Whether it was.
+        advice: What the user is told then, besides that it has stopped.
+    """
 
     def __init__(self) -> None:
         """Nothing is heeded yet."""
         self.noticed = False
+        self.advice = ""
         self._until = 0.0
 
     def heed(self) -> None:

@@ -19,6 +19,7 @@ from scenicq import __version__
 from scenicq.errors import Diagnostic, ScenicqError
 from scenicq.garbage import seldom_collected
 
+from .failures import refused_by_system
 from .interrupts import Interrupts
 from .manual import write_examples, write_exit_codes
 from .report import show
@@ -114,6 +115,9 @@ class Commands(click.Group):
                 _interrupted(ctx)
             if _is_of_output(error):
                 raise
+            if (refused := refused_by_system(error)) is not None:
+                show([Diagnostic("resources-exhausted", refused)])
+                ctx.exit(ERROR)
             # our own mistake, whatever it is
             click.echo(f"internal error: this is a mistake in scenicq; please report it with {_written()}", err=True)
             ctx.exit(ERROR)
@@ -136,6 +140,8 @@ def _let_go_of_output() -> None:
 def _interrupted(ctx: click.Context) -> NoReturn:
     INTERRUPTS.done()
     click.echo("interrupted", err=True)
+    if INTERRUPTS.advice:
+        click.echo(INTERRUPTS.advice, err=True)
     ctx.exit(INTERRUPTED)
 
 

@@ -19,21 +19,23 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
-from scenicq.store.dataset import open_dataset
+from scenicq.store.atomic_files import sole_writer
 from scenicq.temporal.intervals import DEFAULT_GAP_S
 
+from .advise import advise, is_nearly_empty
+from .datasets import open_checked
 from .deliver import Wanted, deliver
 from .engine import parse_engine
 from .formats import FORMATS
 from .funnel import show_funnel
-from .main import NOTHING
+from .main import INTERRUPTS, NOTHING
 from .manual import Manual
 from .options import DEFAULTS, TOPICS, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
 from .programs import SCENARIO, given_program
-from .remarks import show_remarks
+from .remarks import remarks, show_remarks
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -55,7 +57,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
     exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
     topics=TOPICS,
     epilog="\b\nExamples:\n"
-    "  scenicq match crossing.scenic dataset --tolerance position=0.25,heading=5deg\n"
+    "  scenicq match crossing.scenic dataset --tolerance position=0.5,ego.heading=15deg\n"
     "  scenicq match crossing.scenic dataset --format ids | head\n"
     "  scenicq match crossing.scenic dataset -o matches.parquet --summary\n"
     "  scenicq match -e 'ego = new Car; new Pedestrian ahead of ego by Range(0, 20)' dataset --tolerance position=2\n"
@@ -66,8 +68,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("-e", "--program", metavar="TEXT", help="The program itself, in place of SCENARIO; `;` separates "
               "statements, and the driving world model is there unless it imports another.")
 @click.option("--tolerance", metavar="LIST",
-              help="How far labels may be off: position=0.25,heading=5deg, or x=, y=, heading=. Lengths in metres, "
-              "angles in deg or rad.  [default: 1e-3 m, 1e-3 rad]")
+              help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
+              "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
+              "[default: position=0.25,heading=5deg]")
 @click.option("--classes", type=click.Choice(["fine", "coarse"]), default="fine",
               help="coarse folds all vehicles into Car and all people into Pedestrian.")
 @click.option("--ego", type=click.Choice(["label", "any"]), default="label",
@@ -86,7 +89,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--jobs", metavar="N", type=click.IntRange(1), help="Processes that match.  [default: one a processor, "
               "at most 8, once it is clear that it takes long; with --shard 1]")
 @click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULTS.timeout_s,
-              help="Seconds for one question to the solver; then the frame is unknown.")
+              help="Seconds for one frame, the solver's included; then it is unknown.")
 @click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
               help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
 @click.option("--limit", metavar="N", type=click.IntRange(1), help="Stop after so many matches.")
@@ -95,6 +98,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               "interchangeable objects in one order only.")
 @click.option("--near", metavar="K", type=click.IntRange(1), help="Show the K frames, too, that do not match but come "
               "closest, each with the tolerance under which it would.")
+@click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most, and how many frames each "
+              "single change of the program would leave. Without it, this is said where hardly any frame matches.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, parquet or ids.  [default: by the extension of FILE, else table on a terminal "
               "and jsonl in a pipe]")
@@ -132,7 +137,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.pass_context
 def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
           output: Path | None, export: tuple[str, Path] | None, near: int | None, report: Path | None,
-          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool,
+          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool, advised: bool,
           exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames or intervals of a dataset that match a scenario.
@@ -146,18 +151,24 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
     source, target, model = given_program(ctx, program, scenario, dataset)
-    query = Query(open_dataset(target), source, query_options({**given, "model": model}))
+    query = Query(open_checked(target), source, query_options({**given, "model": model}))
     if near is not None and query.is_over_time():
         raise click.UsageError("--near looks for frames: it cannot be had with intervals", ctx)
     if explain:
         show_plan(query)
         return
-    show_remarks(query)
+    with ProgressBar(query.dataset.manifest.total.frames, quiet=quiet) as bar:
+        told = remarks(query)
+        with bar.aside():
+            show_remarks(query, *told)
     if shard is not None:
         _in_shard(ctx, query, shard, file, quiet=quiet)
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
     pieces = None
+    if file is not None:
+        again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
+        INTERRUPTS.advice = f"  = hint: {again}"
     if resume:
         if file is None:
             raise click.UsageError("--resume needs -o FILE, beside which it keeps what is done", ctx)
@@ -166,15 +177,18 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         engine = kept(engine or run_here, pieces)
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
     results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
-    try:
-        deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
-    except BaseException:
+    with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
+        try:
+            deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
+        except BaseException:
+            if pieces is not None:
+                with contextlib.suppress(OSError):
+                    pieces.rmdir()  # if nothing is done yet
+            raise
         if pieces is not None:
-            with contextlib.suppress(OSError):
-                pieces.rmdir()  # if nothing is done yet
-        raise
-    if pieces is not None:
-        shutil.rmtree(pieces, ignore_errors=True)
+            shutil.rmtree(pieces, ignore_errors=True)
+    if advised or (not quiet and query.options.limit is None and is_nearly_empty(query)):
+        advise(query, asked=advised)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 

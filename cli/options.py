@@ -28,6 +28,7 @@ TOPICS = {
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
         "limit", "every", "all_matches", "near", "format_", "output", "report", "sensors", "export", "explain",
+        "advised",
     },
     "Long runs": {"shard", "resume"},
     "Messages and exit code": {"strict", "exit_zero", "summary", "quiet", "help"},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import islice
 
@@ -39,17 +39,14 @@ def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagn
     return unseen, found
 
 
-def show_remarks(query: Query, maps: Sequence[str] | None = None) -> None:
+def show_remarks(query: Query, unseen: Iterable[Diagnostic], found: Sequence[Diagnostic]) -> None:
     """Print on standard error what is never compared, and a line for each thing that cannot be meant.
 
     Args:
         query: The query.
-        maps: As of `remarks`.
-
-    Raises:
-        ScenarioError: As of `remarks`.
+        unseen: The first list that `remarks` gives.
+        found: The second.
     """
-    unseen, found = remarks(query, maps)
     show(unseen)
     for each in found[:_LINES]:
         place = f"{each.span.place}: " if each.span is not None else ""

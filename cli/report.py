@@ -12,19 +12,24 @@ import click
 
 from scenicq.errors import Diagnostic, Span, render
 
-__all__ = ["as_json", "columns", "count", "moment", "plain", "show", "show_few"]
+__all__ = ["CONTROL", "as_json", "columns", "count", "is_date", "moment", "plain", "show", "show_few"]
 
 _FEW = 5
 """Diagnostics of one code shown at most, where there may be many."""
 
 
-_CONTROL = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+_FIRST_US, _LAST_US = 946_684_800_000_000, 4_102_444_800_000_000
+"""Start of the years 2000 and 2100: no label was recorded before, or will be after."""
+
+CONTROL = re.compile(
+    "[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff]"
+)
 """What moves a terminal's cursor, changes its colours or turns text round, except a new line."""
 
 
 def plain(text: str) -> str:
     """A text of somebody else's as it is safe on a terminal: control characters are shown, not obeyed."""
-    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def show(diagnostics: Iterable[Diagnostic]) -> None:
@@ -55,12 +60,16 @@ def count(number: int, what: str) -> str:
 
 
 def moment(timestamp_us: int) -> str:
-    """A timestamp as date and time (UTC), or as the number where it is no date."""
-    try:
-        time = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=timestamp_us)
-    except OverflowError:
-        return str(timestamp_us)
+    """A timestamp as date and time (UTC), or as seconds where it is that of a clock without a date."""
+    if not is_date(timestamp_us):
+        return f"{timestamp_us / 1e6:.2f} s"
+    time = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=timestamp_us)
     return time.strftime("%Y-%m-%d %H:%M:%S.%f")[:-4]
+
+
+def is_date(timestamp_us: int) -> bool:
+    """Whether a timestamp tells when something was recorded: Argoverse's clock starts in 1980, others at 0."""
+    return _FIRST_US <= timestamp_us < _LAST_US
 
 
 def columns(rows: Sequence[Sequence[str]], *, right: frozenset[int] = frozenset(), indent: str = "  ") -> list[str]:

@@ -19,15 +19,16 @@ from scenicq.report.frames import frame_page
 from scenicq.report.picture import Shot, Style, draw
 from scenicq.report.png import can_make_png, png
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
-from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 
+from .datasets import open_checked
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
 from .programs import read_scenario
-from .remarks import show_remarks
+from .remarks import remarks, show_remarks
 from .sources import SENSORS, sensor_root
 
 __all__ = ["show"]
@@ -51,7 +52,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     if scenario is None:
         return Shot(label), Backdrop(dataset.network(label.map))
     query = Query(dataset, read_scenario(scenario), query_options({**given, **ONE_FRAME}))
-    show_remarks(query, [label.map])
+    show_remarks(query, *remarks(query, [label.map]))
     compiled, network = query.compile(label.map)
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(compiled, query.options.match, solver)
@@ -64,7 +65,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     cls=Manual,
     arguments={
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has.",
     },
     topics={"What counts as a match, with --scenario": SHARED},
     epilog="\b\nExamples:\n"
@@ -104,7 +105,7 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
     """
     file = None if output is None or str(output) == "-" else output
     kind = _kind(file)
-    opened = open_dataset(dataset)
+    opened = open_checked(dataset)
     shot, backdrop = _shot(opened, opened.label(frame), scenario, given)
     picture = draw(shot, backdrop, half=half, pixels=width, style=_STYLES[kind], captioned=kind != ".html")
     match kind:

@@ -17,14 +17,15 @@ from typing import TYPE_CHECKING
 import click
 
 from scenicq.errors import Diagnostic
-from scenicq.store.manifest import MANIFEST
+from scenicq.store.manifest import MANIFEST, Manifest, read_manifest
+from scenicq.store.place import Place, find_place, stamp_of
 
 from .report import show
 
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which comes with this
     from scenicq.store.dataset import Dataset
 
-__all__ = ["SENSORS", "recorded", "remember", "sensor_root"]
+__all__ = ["SENSORS", "is_noted_sound", "note_sound", "recorded", "remember", "sensor_root", "state_folder"]
 
 SENSORS = click.option(
     "--sensors",
@@ -36,7 +37,9 @@ SENSORS = click.option(
 
 
 def remember(folder: Path, source: Path) -> None:
-    """Note that this user has made a dataset from a source; a home that cannot be written costs no more than that.
+    """Note that this user has made a dataset from a source, and that it is sound.
+
+    A home that cannot be written costs no more than that.
 
     Args:
         folder: Of the dataset.
@@ -48,6 +51,33 @@ def remember(folder: Path, source: Path) -> None:
         notes.parent.mkdir(parents=True, exist_ok=True)
         with notes.open("a", encoding="utf-8") as file:
             file.write(line + "\n")
+        place = find_place(folder)
+        note_sound(place, read_manifest(place.name, place.manifest()))
+
+
+def note_sound(place: Place, manifest: Manifest) -> None:
+    """Note that a dataset need not be looked at again as long as its files stay as they are.
+
+    Args:
+        place: Of the dataset.
+        manifest: Of the dataset.
+    """
+    with contextlib.suppress(OSError, RuntimeError):
+        note = _sound(place, manifest)
+        note.parent.mkdir(parents=True, exist_ok=True)
+        note.touch()
+
+
+def is_noted_sound(place: Place, manifest: Manifest) -> bool:
+    """Whether a dataset was made or found to be sound by this user, and is as it was then."""
+    try:
+        return _sound(place, manifest).exists()
+    except (OSError, RuntimeError):
+        return False
+
+
+def _sound(place: Place, manifest: Manifest) -> Path:
+    return state_folder() / "sound" / stamp_of(place, manifest)
 
 
 def recorded(dataset: Dataset) -> Path | None:
@@ -81,7 +111,11 @@ def _digest(manifest: bytes) -> str:
 
 
 def _notes() -> Path:
-    """The file of this user with one line a dataset.
+    return state_folder() / "ingested.jsonl"
+
+
+def state_folder() -> Path:
+    """The folder of what this program remembers for this user; it need not be there.
 
     Raises:
         RuntimeError: The user has no home.
@@ -94,4 +128,4 @@ def _notes() -> Path:
     else:
         base = os.environ.get("XDG_STATE_HOME", "")
         folder = Path(base) if Path(base).is_absolute() else Path.home() / ".local" / "state"
-    return folder / "scenicq" / "ingested.jsonl"
+    return folder / "scenicq"

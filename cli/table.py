@@ -1,21 +1,30 @@
-"""Results as a table for people: one line a frame, columns aligned a block at a time."""
+"""Results as a table for people: one result a row, columns aligned a block at a time, as wide as the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import shutil
+import textwrap
+from collections.abc import Callable, Mapping
 from typing import IO, Any, BinaryIO, cast
 
 import click
 
-from .report import columns, moment
+from .report import columns, moment, plain
 
-__all__ = ["Table", "Text"]
+__all__ = ["Table", "Text", "fitted"]
 
 _INTERVAL_HEAD = ("RECORDING", "START", "SECONDS", "VERDICT", "OBJECTS", "FRAMES")
 _HEAD = ("FRAME", "RECORDING", "TIME", "VERDICT", "OBJECTS", "SENSOR")
+_FRAME, _RECORDING, _TIME, _VERDICT, _OBJECTS, _SENSOR = range(6)
 _BLOCK = 100
 """Rows that are aligned together."""
 _COLOURS = {"match": "green", "unknown": "yellow"}
+_DATE = len("2018-09-18 ")
+_SHORTEST_ID = 6
+_NARROWEST = 12
+
+Row = tuple[str, ...]
 
 
 class Text:
@@ -41,28 +50,125 @@ class Text:
 class Table:
     """Aligned columns for a terminal; a block of rows at a time."""
 
-    def __init__(self, text: Text, *, over_time: bool = False) -> None:
-        """Take where to write, and whether the results are intervals."""
-        self._text = text
-        self._head = _INTERVAL_HEAD if over_time else _HEAD
-        self._rows: list[tuple[str, ...]] = []
+    def __init__(
+        self, text: Text, shorten: Callable[[], Callable[[str], str]] | None = None, *, over_time: bool = False
+    ) -> None:
+        """Take where to write.
+
+        Args:
+            text: The stream; on a terminal, or where COLUMNS says how wide it is, the table fits.
+            shorten: Gives what cuts names of frames short; asked only where the table does not fit.
+            over_time: Whether the results are intervals, whose table is as wide as it is.
+        """
+        self._text, self._over_time = text, over_time
+        self._width = shutil.get_terminal_size().columns if text.isatty() or os.environ.get("COLUMNS") else None
+        self._shorten = shorten
+        self._short: Callable[[str], str] | None = None
+        self._rows: list[Row] = []
 
     def write(self, record: Mapping[str, Any]) -> None:
         """Add a row."""
-        self._rows = self._rows or [self._head]
         self._rows.append(_cells(record))
-        if len(self._rows) > _BLOCK:
+        if len(self._rows) >= _BLOCK:
             self.finish()
 
     def finish(self) -> None:
         """Write the rows that are held back."""
-        for row, line in zip(self._rows, columns(self._rows, indent=""), strict=True):
-            colour = _COLOURS.get(row[3].partition(":")[0])
-            click.echo(click.style(line, fg=colour, bold=row is self._head or None), file=cast("IO[str]", self._text))
+        if not self._rows:
+            return
+        lines = columns([_INTERVAL_HEAD if self._over_time else _HEAD, *self._rows], indent="")
+        if not self._over_time and self._width is not None and max(map(len, lines)) > self._width:
+            if self._short is None:
+                self._short = self._shorten() if self._shorten is not None else str
+            lines = fitted(self._rows, self._width, self._short)
+        verdicts = iter(self._rows)
+        colour = None
+        for number, line in enumerate(lines):
+            if number and not line.startswith(" "):
+                colour = _COLOURS.get(next(verdicts)[_VERDICT].partition(":")[0])
+            click.echo(click.style(line, fg=colour, bold=number == 0 or None), file=cast("IO[str]", self._text))
         self._rows.clear()
 
 
-def _cells(record: Mapping[str, Any]) -> tuple[str, ...]:
+def fitted(rows: list[Row], width: int, short: Callable[[str], str]) -> list[str]:
+    """Rows as lines of a table that is no wider than it may be, the head first; no word is broken.
+
+    Names are cut to what tells them apart; what all rows share, or other columns say, is left out; long cells go on
+    below.
+
+    Args:
+        rows: The cells, as many as the head has.
+        width: Columns of the terminal.
+        short: Cuts names of frames short.
+    """
+    ids = _cut([part.partition("=")[2] for row in rows for part in row[_OBJECTS].split()])
+    table = [
+        (short(row[_FRAME]), row[_RECORDING], row[_TIME], row[_VERDICT], _with_ids(row[_OBJECTS], ids)) for row in rows
+    ]
+    head: list[str] = [*_HEAD[:_SENSOR]]
+    kept = list(range(_SENSOR))
+    dates = {row[_TIME][:_DATE] for row in table}
+    if len(dates) == 1 and all(row[_TIME][_DATE - 1 : _DATE] == " " for row in table):
+        head[_TIME] = dates.pop().strip()
+        table = [(*row[:_TIME], row[_TIME][_DATE:], *row[_VERDICT:]) for row in table]
+    named = all(row[_FRAME].startswith(f"{row[_RECORDING]}/") for row in rows)
+    for dispensable in [_RECORDING] * named + [_TIME, _RECORDING]:
+        if dispensable in kept and _narrowest(table, kept) > width:
+            kept.remove(dispensable)
+    return _wrapped([tuple(head), *table], kept, width)
+
+
+def _cut(ids: list[str]) -> dict[str, str]:
+    """Ids by their beginnings, as long as needed to tell them apart."""
+    distinct = set(ids)
+    length = min(_SHORTEST_ID, max(map(len, distinct), default=0))
+    while len({each[:length] for each in distinct}) < len(distinct):
+        length += 1
+    return {each: each[:length] for each in distinct}
+
+
+def _with_ids(objects: str, ids: Mapping[str, str]) -> str:
+    parts = [part.partition("=") for part in objects.split()]
+    return " ".join(f"{role}={ids[label]}" if equals else role for role, equals, label in parts)
+
+
+def _longest_word(table: list[Row], column: int) -> int:
+    return max(len(word) for row in table for word in (row[column].split() or [""]))
+
+
+def _narrowest(table: list[Row], kept: list[int]) -> int:
+    """The width below which a word would have to be broken, with some room for long cells."""
+    widths = [
+        max(_NARROWEST, _longest_word(table, column)) if column >= _VERDICT else max(len(row[column]) for row in table)
+        for column in kept
+    ]
+    return sum(widths) + 2 * (len(kept) - 1)
+
+
+def _wrapped(table: list[Row], kept: list[int], width: int) -> list[str]:
+    widths = {column: max(len(plain(row[column])) for row in table) for column in kept}
+    room = width - sum(widths[column] for column in kept if column < _VERDICT) - 2 * (len(kept) - 1)
+    least = _longest_word(table, _VERDICT)
+    if widths[_VERDICT] + widths[_OBJECTS] > room:
+        wanted = max(least, room - widths[_OBJECTS], room // 2)
+        widths[_VERDICT] = min(widths[_VERDICT], wanted)
+        widths[_OBJECTS] = max(_longest_word(table, _OBJECTS), room - widths[_VERDICT])
+    lines: list[str] = []
+    for row in table:
+        cells = [
+            textwrap.wrap(plain(row[column]), widths[column], break_long_words=False, break_on_hyphens=False) or [""]
+            for column in kept
+        ]
+        for number in range(max(map(len, cells))):
+            parts = [
+                (cell[number] if number < len(cell) else "").ljust(widths[column])
+                for cell, column in zip(cells, kept, strict=True)
+            ]
+            lines.append("  ".join(parts).rstrip())
+    return lines
+
+
+def _cells(record: Mapping[str, Any]) -> Row:
     cause = record.get("cause", {})
     near = cause.get("what") == "tolerance"
     why = cause.get("reason") or cause.get("detail" if near else "what", "")

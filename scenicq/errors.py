@@ -63,8 +63,11 @@ CODES: dict[str, str] = {
     "store-missing": "the folder is not a dataset of ours",
     "store-version": "the dataset was written by another version",
     "store-damaged": "a file of the dataset is missing or changed",
+    "dataset-invalid": "a table of the dataset holds what no dataset may",
     "target-exists": "the target is there already",
+    "target-busy": "another run writes to the target",
     "target-unwritable": "the target cannot be written",
+    "resources-exhausted": "the system gives no more memory, files or processes",
     "predictions-invalid": "a predicted box has a value that makes no sense",
     "predictions-duplicate": "a predicted box or frame is there more than once",
     "predictions-missing": "a frame of the dataset has no predictions",
@@ -104,6 +107,11 @@ class Source:
     name: str
     text: str
 
+    @property
+    def file_name(self) -> str:
+        """The name without folders."""
+        return self.name.replace("\\", "/").rpartition("/")[2]
+
     @cached_property
     def line_starts(self) -> tuple[int, ...]:
         """Offsets at which the lines start."""
@@ -138,6 +146,12 @@ class Span:
         """`file:line:column` of the start."""
         line, column = self.source.position(self.start)
         return f"{self.source.name}:{line}:{column}"
+
+    @property
+    def mark(self) -> str:
+        """The same without the file's folder: what results call the place, wherever one stands."""
+        line, column = self.source.position(self.start)
+        return f"{self.source.file_name}:{line}:{column}"
 
     @property
     def text(self) -> str:

@@ -19,6 +19,7 @@ from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import property_node, to_heading, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING, names_of, of_element, of_network
 from scenicq.compiler.environment import Runner
+from scenicq.compiler.following import follow
 from scenicq.compiler.lookups import look_up
 from scenicq.compiler.unavailable import unavailable_attribute
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
@@ -171,8 +172,8 @@ def _guarded(name: str, owner: ModelValue) -> Callable[..., ModelValue]:
         if name == "sort" and ("key" in named or not is_flat(owner)):
             raise fail("unsupported-construct", "`sort` of these values is not supported", span, "not plain values",
                        ("write `items = sorted(items, key=...)`",))  # fmt: skip
-        if name == "join" and args and isinstance(args[0], list | tuple):
-            held = cast("list[ModelValue]", args[0])
+        if name == "join" and args and isinstance(args[0], str | list | tuple | dict | set):
+            held = cast("list[ModelValue]", [*args[0]])
             _check_length(sum(len(owner) + len(each) for each in held if isinstance(each, str)), span)
         if isinstance(owner, dict | set) and name in _KEYED:
             args = (hashed(args[0], span), *args[1:]) if args else args
@@ -233,10 +234,10 @@ def _of_field(run: Runner, value: Node, name: str) -> ModelValue:
     if name != "followFrom":
         return MISSING
 
-    def follow(span: Span, start: ModelValue, distance: ModelValue) -> ModelValue:
-        return operators.follow(value, start, distance, run.version, span).properties["position"]
+    def follow_from(span: Span, start: ModelValue, distance: ModelValue) -> ModelValue:
+        return follow(run, value, start, distance, span).properties["position"]
 
-    return Builtin(name, follow)
+    return Builtin(name, follow_from)
 
 
 def _of_node(value: Node, name: str, span: Span) -> ModelValue:

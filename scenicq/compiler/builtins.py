@@ -249,8 +249,13 @@ def _whole_numbers(span: Span, *args: ModelValue) -> ModelValue:
                    ("write one program per number of objects",))  # fmt: skip
     if any(not isinstance(arg, int) for arg in args):
         raise fail("wrong-type", "`range` needs whole numbers", span)
+    if not 1 <= len(args) <= 3:
+        raise fail("wrong-arity", "`range` takes one to three numbers", span)
+    if len(args) == 3 and args[2] == 0:
+        raise fail("wrong-value", "the step of a `range` must not be zero", span)
     numbers = range(*args)
-    if len(numbers) > LARGEST:
+    first, last, step = numbers.start, numbers.stop, numbers.step
+    if (last - first) // step > LARGEST:  # `len` cannot count so far
         raise fail("budget-exceeded", f"more than {LARGEST:,} numbers", span, "counts too far")
     return numbers
 

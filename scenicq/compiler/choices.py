@@ -16,7 +16,16 @@ from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
 
-__all__ = ["distribute", "each_existing", "holds_instances", "is_choice", "make_choice", "map_choice", "regions_apart"]
+__all__ = [
+    "distribute",
+    "each_existing",
+    "each_option",
+    "holds_instances",
+    "is_choice",
+    "make_choice",
+    "map_choice",
+    "regions_apart",
+]
 
 _MOST_OPTIONS = 20_000
 """Options of a choice, those of nested choices included."""
@@ -60,7 +69,8 @@ def each_existing(run: Runner, choice: Choice, function: Callable[[ModelValue], 
     missing: ScenarioError | None = None
     for number, option in enumerate(choice.options):
         try:
-            found[number] = function(option)
+            with run.assuming(choice.index, number, len(choice.options)):
+                found[number] = function(option)
         except ScenarioError as error:
             if option is not None and error.diagnostics[0].code not in _LACKING:
                 raise
@@ -72,6 +82,15 @@ def each_existing(run: Runner, choice: Choice, function: Callable[[ModelValue], 
     run.exclude(choice.index, [number for number in range(count) if number not in found], count, span)
     spare = next(iter(found.values()))
     return make_choice(choice.index, [found.get(number, spare) for number in range(count)], span)
+
+
+def each_option(run: Runner, choice: Choice, function: Callable[[ModelValue], ModelValue], span: Span) -> ModelValue:
+    """Apply a function that runs the program to each option; what one of them lacks excludes that option alone."""
+    options: list[ModelValue] = []
+    for number, option in enumerate(choice.options):
+        with run.assuming(choice.index, number, len(choice.options)):
+            options.append(function(option))
+    return make_choice(choice.index, options, span)
 
 
 def regions_apart(value: ModelValue) -> ModelValue:

@@ -10,7 +10,7 @@ from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.values import Function, ModelValue, PropertyDefinition, ScenicClass, describe, fail
 from scenicq.errors import Span
-from scenicq.store.classes import is_class, is_subclass
+from scenicq.store.classes import is_class
 from scenicq.syntax import ast
 
 __all__ = ["bind_arguments", "define_class", "refuse_decorators"]
@@ -76,9 +76,9 @@ def define_class(run: _Definer, node: ast.ClassDef, scope: Environment) -> Sceni
             case _:
                 raise fail("unsupported-construct", "this cannot stand in a class", line.span, "not a property line",
                            ("give properties their defaults, as in `width: 2`",))  # fmt: skip
-    known = is_class(node.name)
-    own = known and (scope.library or not is_class(base.category) or is_subclass(node.name, base.category))
-    return ScenicClass(node.name, base, definitions, inner.names, node.name if own else base.category, node.span)
+    # a class of the class tree is that class, whatever the program derives it from
+    category = node.name if is_class(node.name) else base.category
+    return ScenicClass(node.name, base, definitions, inner.names, category, node.span)
 
 
 def _check_final(base: ScenicClass, name: str, span: Span) -> None:

@@ -84,7 +84,10 @@ def _need(value: ModelValue, what: str, span: Span | None) -> Exception:
     shown = describe(value)
     if is_node(value):
         shown = {"other": "a value", "boolean": "a truth value"}.get(kind_of(value), f"a {kind_of(value)}")
-    return fail("wrong-type", f"{what} is needed here, not {shown}", span, f"this is {shown}")
+    pair = isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 2 and "number" in what
+    return fail("wrong-type", f"{what} is needed here, not {shown}", span, f"this is {shown}",
+                ("`Range(a, b)` is a random number of an interval; only Scenic 1 spells it `(a, b)`: `--scenic 1`",)
+                if pair else ())  # fmt: skip
 
 
 def to_node(value: ModelValue, span: Span | None) -> Node:

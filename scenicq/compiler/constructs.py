@@ -13,6 +13,7 @@ from scenicq.compiler.attributes import part_of
 from scenicq.compiler.choices import distribute
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.following import follow
 from scenicq.compiler.values import ModelValue, fail, lift
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -53,6 +54,7 @@ def construct(
         case ast.Vector():
             return lift(lambda x, y: to_vector((x, y), span), value(node.x), value(node.y))
         case ast.FieldAt():
+            run.budget.step(span, run.budget.LOOK_UP_STEPS)
             return _apply(
                 span, lambda f, p: operators.direction_at(f, p, span), value(node.field), value(node.position)
             )
@@ -64,8 +66,10 @@ def construct(
             operands = value(node.origin), value(node.direction), value(node.offset)
             return _apply(span, lambda o, d, by: operators.along(o, d, by, span), *operands)
         case ast.Follow():
+            # a hundred look-ups at most
+            run.budget.step(span, 100 * run.budget.LOOK_UP_STEPS)
             operands = value(node.field), origin(node.origin), value(node.distance)
-            return _apply(span, lambda f, o, d: operators.follow(f, o, d, run.version, span), *operands)
+            return _apply(span, lambda f, o, d: follow(run, f, o, d, span), *operands)
         case ast.PartOf():
             return _apply(span, lambda target: part_of(node.part, target, span), value(node.target))
         case _:
@@ -93,6 +97,7 @@ def _measure(
                 span, lambda t, o: operators.apparent_heading(t, o, span), value(node.target), origin(node.origin)
             )
         case ast.Distance():
+            run.budget.step(span, run.budget.LOOK_UP_STEPS)
             return _apply(span, lambda t, o: operators.distance_to(t, o, span), value(node.target), origin(node.origin))
         case ast.DistancePast():
             return _apply(

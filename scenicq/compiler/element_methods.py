@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
-from scenicq.compiler import operators
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.environment import Runner
+from scenicq.compiler.following import follow
 from scenicq.compiler.known_properties import settled
 from scenicq.compiler.lookups import among
 from scenicq.compiler.road_attributes import worked_out
@@ -72,7 +72,7 @@ def method_of(run: Runner, value: NetworkElement, name: str) -> Builtin | None:
         field = build.constant(value.orientation)
 
         def flow(span: Span, point: ModelValue, distance: ModelValue, **_: ModelValue) -> ModelValue:
-            return operators.follow(field, point, distance, run.version, span).properties["position"]
+            return follow(run, field, point, distance, span).properties["position"]
 
         return Builtin(name, flow)
     return None

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from difflib import get_close_matches
 from typing import Protocol
 
+from scenicq.budget import look
 from scenicq.compiler.element_lookups import Lookups
 from scenicq.compiler.unavailable import unavailable_name
 from scenicq.compiler.values import Function, Instance, ModelValue, fail
@@ -34,6 +36,8 @@ class Budget:
     MOST_STEPS = 400_000
     MOST_CALLS = 40
     ITEMS_PER_STEP = 8
+    LOOK_UP_STEPS = 20
+    """What asking the map about one known place takes."""
 
     def __init__(self) -> None:
         """Start with everything left."""
@@ -45,7 +49,13 @@ class Budget:
         self.step(span, items // self.ITEMS_PER_STEP)
 
     def step(self, span: Span | None, count: int = 1) -> None:
-        """Use up steps."""
+        """Use up steps.
+
+        Raises:
+            ScenarioError: budget-exceeded.
+            TimeIsUp: See `scenicq.budget`.
+        """
+        look()
         self.steps -= count
         if self.steps < 0:
             raise fail("budget-exceeded", f"the program takes more than {self.MOST_STEPS:,} steps", span,
@@ -211,4 +221,8 @@ class Runner(Protocol):
 
     def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:
         """Require that a choice between `count` options does not come out as one of some: they have no value."""
+        ...
+
+    def assuming(self, index: Node, option: int, count: int) -> AbstractContextManager[None]:
+        """What is excluded meanwhile is so only where a choice comes out as an option of `count`."""
         ...

@@ -1,12 +1,46 @@
-"""Outcomes of random choices that no scene has, because something that the program asks for is not there."""
+"""Outcomes of random choices that no scene has, because something that the program asks for is not there.
+
+What one option of a choice lacks excludes that option and no other: an exclusion holds under the options of other
+choices for which it was found.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import Identity, Index, Node, Select
+from scenicq.forest.nodes import Identity, Index, LogicOp, Node, Select
 
 __all__ = ["Exclusions"]
+
+_Key: TypeAlias = "Identity | int"
+
+
+def _key(index: Node) -> _Key:
+    return index.identity if isinstance(index, Index) else id(index)
+
+
+@dataclass(slots=True, eq=False)
+class _Choice:
+    """What is known of one choice, under the options of those around it.
+
+    Attributes:
+        index: Which option it comes out as.
+        count: Options.
+        span: The first place that excludes something.
+        excluded: Options without a scene.
+        under: Choices of which something is excluded under one of the options.
+    """
+
+    index: Node
+    count: int
+    span: Span
+    excluded: set[int] = field(default_factory=set[int])
+    under: dict[int, dict[_Key, _Choice]] = field(default_factory=dict[int, "dict[_Key, _Choice]"])
 
 
 class Exclusions:
@@ -14,18 +48,48 @@ class Exclusions:
 
     def __init__(self) -> None:
         """Start with none."""
-        self._found: dict[Identity | int, tuple[Node, set[int], int, Span]] = {}
+        self._found: dict[_Key, _Choice] = {}
+        self._assumed: list[tuple[Node, int, int]] = []
+
+    @contextmanager
+    def assuming(self, index: Node, option: int, count: int) -> Generator[None]:
+        """What is excluded meanwhile is so only where a choice comes out as an option of `count`."""
+        self._assumed.append((index, option, count))
+        try:
+            yield
+        finally:
+            self._assumed.pop()
 
     def add(self, index: Node, options: list[int], count: int, span: Span) -> None:
         """Exclude some of the `count` options of a choice."""
-        if options:
-            key = index.identity if isinstance(index, Index) else id(index)
-            self._found.setdefault(key, (index, set(), count, span))[1].update(options)
+        path: dict[_Key, tuple[Node, int, int]] = {}
+        for step in self._assumed:
+            if path.setdefault(_key(step[0]), step)[1] != step[1]:
+                return  # one choice does not come out as two options
+        key = _key(index)
+        own = path.pop(key, None)
+        if own is not None:
+            options = [option for option in options if option == own[1]]
+        if not options:
+            return
+        level = self._found
+        for around, (outer, option, width) in path.items():
+            level = level.setdefault(around, _Choice(outer, width, span)).under.setdefault(option, {})
+        level.setdefault(key, _Choice(index, count, span)).excluded.update(options)
 
     def conditions(self) -> list[tuple[Node, Span]]:
         """That the choices come out as something else, each with the place that needs it."""
-        yes, no = build.constant(True), build.constant(False)
-        return [
-            (Select(index, tuple(no if n in options else yes for n in range(count)), span=span), span)
-            for index, options, count, span in self._found.values()
-        ]
+        return [(_condition(choice), choice.span) for choice in self._found.values()]
+
+
+def _condition(choice: _Choice) -> Node:
+    """That no excluded option comes out; choices hang on each other as deep as the program nests its own."""
+    yes, no = build.constant(True), build.constant(False)
+
+    def option(number: int) -> Node:
+        if number in choice.excluded:
+            return no
+        parts = [_condition(inner) for inner in choice.under.get(number, {}).values()]
+        return build.logic(LogicOp.AND, *parts, span=choice.span) if len(parts) > 1 else parts[0] if parts else yes
+
+    return Select(choice.index, tuple(option(number) for number in range(choice.count)), span=choice.span)

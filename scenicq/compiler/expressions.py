@@ -24,7 +24,7 @@ from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
 from scenicq.compiler.items import items_of, length_of, subscript
 from scenicq.compiler.known_properties import decided, settled
 from scenicq.compiler.logic import condition, connected, inverted
-from scenicq.compiler.texts import formatted
+from scenicq.compiler.texts import checked_text, formatted
 from scenicq.compiler.values import (
     Builtin,
     Choice,
@@ -73,6 +73,10 @@ def _arguments(run: Runner, items: tuple[ast.Argument, ...], scope: Environment)
     return found
 
 
+_ONE_BY_ONE = frozenset({"sum", "min", "max", "sorted"})
+"""Functions that take each item on its own by the rules of the language, not of Python."""
+
+
 def call(
     run: Runner, function: ModelValue, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span
 ) -> ModelValue:
@@ -81,7 +85,8 @@ def call(
     if isinstance(function, Function):
         return run.call_function(function, args, named, span)
     if isinstance(function, Builtin):
-        run.budget.pay(sum(length_of(value) for value in (function.owner, *args, *named.values())), span)
+        items = sum(length_of(value) for value in (function.owner, *args, *named.values()))
+        run.budget.step(span, items if function.name in _ONE_BY_ONE else items // run.budget.ITEMS_PER_STEP)
         run.budget.step(span, function.cost)
         if function.known:
             args = [settled(run, value) for value in args]
@@ -207,7 +212,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
         case ast.Constant():
             if isinstance(node.value, complex | bytes | type(...)):
                 raise fail("unsupported-construct", "a literal of this kind is not supported", span)
-            return node.value
+            return node.value if not isinstance(node.value, str) else checked_text(node.value, span)
         case ast.Attribute():
             return lift(lambda value: _attribute(run, value, node), evaluate(run, node.value, scope))
         case ast.Call():

@@ -66,6 +66,7 @@ def _at(
     span: Span,
     known: Callable[[float, float], NetworkElement | None] | None,
 ) -> ModelValue:
+    run.budget.step(span, run.budget.LOOK_UP_STEPS)
     place = to_vector(point, span)
     certain = settled(run, place)
     options = (*table.options, None)

@@ -8,6 +8,7 @@ over time has no meaning at one instant. The driving domain itself has CARLA's c
 from __future__ import annotations
 
 import sys
+from difflib import get_close_matches
 from functools import cache
 from importlib import resources
 
@@ -151,8 +152,11 @@ def plain_module(name: str, span: Span) -> Module:
             raise fail("unsupported-construct", f"Python's module `{name}` is not supported", span, "not imported",
                        ("of Python's modules only `math` is known: write what the scene needs in Scenic",))  # fmt: skip
         case _:
+            close = get_close_matches(name, sorted(_LIBRARIES), 1, 0.6)
+            nearest = (f"`{close[0]}` is the nearest that is known",) if close else ()
             raise fail("unknown-model", f"`{name}` is not a model or module known here", span, "not found",
-                       ("known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "
+                       (*nearest,
+                        "known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "
                         "and `math`",
                         "a scenario never imports Python code: write what it needs in Scenic"))  # fmt: skip
 

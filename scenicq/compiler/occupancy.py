@@ -84,13 +84,15 @@ class Occupancy:
         for layer, tree in zip(self.layers, self._trees, strict=True):
             areas = shapes.array([area for area, _, _ in layer])
             first, second = shapes.tree_pairs_within(tree, areas, 0.0)
-            apart = first < second
+            owners = np.array([owner for _, _, owner in layer], dtype=np.intp)
+            apart = (first < second) & (owners[first] != owners[second])
+            first, second = first[apart], second[apart]
+            overlap = shapes.shared_areas(areas[first], areas[second]) > _OVERLAP
             shared: dict[int, set[int]] = {}
-            pairs: list[tuple[int, int]] = list(zip(first[apart].tolist(), second[apart].tolist(), strict=True))
+            pairs: list[tuple[int, int]] = list(zip(first[overlap].tolist(), second[overlap].tolist(), strict=True))
             for one, other in pairs:
-                if layer[one][2] != layer[other][2] and self._overlap(layer[one][0], layer[other][0]):
-                    shared.setdefault(one, set()).add(layer[other][2])
-                    shared.setdefault(other, set()).add(layer[one][2])
+                shared.setdefault(one, set()).add(layer[other][2])
+                shared.setdefault(other, set()).add(layer[one][2])
             most = max(most, 1 + max(map(len, shared.values()), default=0))
         return most
 

@@ -36,7 +36,6 @@ from scenicq.forest.nodes import (
     Intersects,
     LogicOp,
     Node,
-    Range,
     RegionDifference,
     RegionIntersection,
     RegionUnion,
@@ -63,7 +62,6 @@ __all__ = [
     "distance_past",
     "distance_to",
     "existing",
-    "follow",
     "intersects",
     "is_field",
     "negate",
@@ -79,10 +77,6 @@ __all__ = [
     "within",
 ]
 
-FOLLOW_STEPS = 4
-"""Steps of forward Euler along a field (language paper, appendix B), the least number in later versions."""
-_FOLLOW_STEP = 5.0
-"""Metres of the longest step in later versions."""
 _LARGEST_REGION = 5_000
 """Parts of a region that is combined from others."""
 
@@ -348,26 +342,6 @@ def region_difference(left: ModelValue, right: ModelValue, span: Span) -> Node:
     """What lies in the left region only."""
     parts = to_region(left, span), to_region(right, span)
     return _combined(parts, RegionDifference(*parts, span=span), span)
-
-
-def _follow_steps(distance: Node, version: int) -> int:
-    """How many steps: later versions take steps of at most 5 m where the distance, or the most it can be, is known."""
-    if version == 1:
-        return FOLLOW_STEPS
-    ends = (distance.low, distance.high) if isinstance(distance, Range) else (distance,)
-    known = [end.value for end in ends if isinstance(end, Constant) and isinstance(end.value, float)]
-    return max([FOLLOW_STEPS, *(min(math.ceil(value / _FOLLOW_STEP), 100) for value in known)])
-
-
-def follow(field: ModelValue, start: ModelValue, distance: ModelValue, version: int, span: Span) -> Instance:
-    """`follow F from V for S`: forward Euler, and the field's heading at the end (appendix B)."""
-    point, length = to_vector(start, span), to_scalar(distance, span)
-    count = _follow_steps(length, version)
-    step = build.arithmetic(ArithmeticOp.DIV, length, build.constant(float(count)), span=span)
-    for _ in range(count):
-        ahead = build.vector(build.constant(0.0), step, span)
-        point = build.vector_sum(point, build.rotate(ahead, direction_at(field, point, span), span), span)
-    return oriented(point, direction_at(field, point, span))
 
 
 def degrees(value: ModelValue, span: Span) -> ModelValue:

@@ -14,7 +14,8 @@ from scenicq.compiler import operators
 from scenicq.compiler.choices import holds_instances, make_choice
 from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to_scalar, to_vector
 from scenicq.compiler.deviations import DEVIATIONS, deviation, leaves_the_plane
-from scenicq.compiler.environment import FIRST_NAMES
+from scenicq.compiler.environment import FIRST_NAMES, Budget
+from scenicq.compiler.following import follow
 from scenicq.compiler.orientations import orientation
 from scenicq.compiler.specifiers import BoundSpecifier
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, lift
@@ -36,16 +37,19 @@ class Surroundings:
         version: The version of Scenic.
         ego: Gives the ego, or fails where there is none yet.
         workspace: The workspace's region.
+        budget: What the program may still use.
         is_object: Whether an object, rather than a point, is being placed.
     """
 
     def __init__(
-        self, version: int, ego: Callable[[Span], Instance], workspace: Callable[[], Node], *, is_object: bool
-    ) -> None:
+        self, version: int, ego: Callable[[Span], Instance], workspace: Callable[[], Node], budget: Budget, *,
+        is_object: bool,
+    ) -> None:  # fmt: skip
         """Take what the interpreter knows."""
         self.version = version
         self.ego = ego
         self.workspace = workspace
+        self.budget = budget
         self.is_object = is_object
 
 
@@ -210,12 +214,12 @@ def _beyond(
     return _position(span, position, either)
 
 
-def _following(span: Span, end: Instance) -> BoundSpecifier:
-    position, direction = end.properties["position"], end.properties["heading"]
+def _following(span: Span, field: ModelValue, end: Instance) -> BoundSpecifier:
+    position = end.properties["position"]
 
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         here = _own_position(instance, position, span)
-        return {"position": position, "heading": operators.direction_at(direction.field, here, span)}
+        return {"position": position, "heading": operators.direction_at(field, here, span)}
 
     return _specifier(span, "position", evaluate, optionally="heading")
 
@@ -359,8 +363,8 @@ def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Boun
             return _beside(node, evaluate(node.reference), by)
         case ast.FollowingSpecifier():
             way, start, length = evaluate(node.field), origin(node.origin), evaluate(node.distance)
-            end = operators.follow(way, start, length, around.version, span)
-            return _following(span, end)
+            end = follow(around, way, start, length, span)
+            return _following(span, way, end)
         case ast.FacingSpecifier():
             return _facing(node, evaluate(node.heading))
         case ast.FacingTowardSpecifier():

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import cast
 
+from scenicq.budget import TimeIsUp, limited
 from scenicq.compiler import operators
 from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
@@ -42,6 +43,9 @@ from scenicq.syntax.walk import walk
 
 __all__ = ["Loader", "compile_scenario"]
 
+MOST_SECONDS = 60.0
+"""Processor seconds that evaluating a program may take; what it does has its price in steps, but maps differ."""
+
 Loader = Callable[[str], Source | None]
 """Gives the text of a file beside the program, by its name relative to the program's folder; None if there is none."""
 
@@ -71,6 +75,23 @@ def compile_scenario(
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
     """
+    try:
+        with limited(MOST_SECONDS):
+            return _compiled(source, network, version, initial=initial, loader=loader, model=model)
+    except TimeIsUp:
+        raise fail("budget-exceeded", f"evaluating the program takes more than {MOST_SECONDS:g} s", _start(source), "",
+                   ("make loops shorter, and ask less of the map in them",)) from None  # fmt: skip
+
+
+def _compiled(
+    source: Source,
+    network: Network,
+    version: int | None,
+    *,
+    initial: bool,
+    loader: Loader | None,
+    model: str | None,
+) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
     world = _World(network, chosen, initial, loader)

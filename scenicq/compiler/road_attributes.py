@@ -65,7 +65,7 @@ def _curb(network: Network, group: LaneGroup) -> ModelValue:
     if not edges:
         return None
     strip = shapes.band(shapes.union_all(edges), _CURB)
-    near = [shapes.intersection(network.roadDirection.forward(curb.line), strip) for curb in network.curbs]
+    near = [shapes.intersection(line, strip) for line in network.curbs_near(strip)]
     own = [part for part in shapes.simple_parts(near) if part.length > 0]
     # inside intersections maps have none of the kind: what comes near there belongs to other roads
     crossing = group.road is not None and group.road.intersection is not None

@@ -13,7 +13,7 @@ from typing import Any
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random, plain_binary
 from scenicq.compiler.builtins import extreme, language_names, truth
-from scenicq.compiler.choices import map_choice
+from scenicq.compiler.choices import each_option
 from scenicq.compiler.comparisons import iterate
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.expressions import call
@@ -43,7 +43,7 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
 
     def filtered(span: Span, function: ModelValue, items: ModelValue) -> ModelValue:
         if isinstance(items, Choice):
-            return map_choice(items, lambda option: filtered(span, function, option), span)
+            return each_option(run, items, lambda option: filtered(span, function, option), span)
         return [item for item in iterate(items, span) if decided(run, apply(function, item, span), span)]
 
     def mapped(span: Span, function: ModelValue, *lists: ModelValue) -> ModelValue:

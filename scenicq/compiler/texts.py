@@ -16,10 +16,21 @@ from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
 from scenicq.syntax import ast
 
-__all__ = ["formatted"]
+__all__ = ["checked_text", "formatted"]
 
 _FORMAT = re.compile(r"(.?[<>=^])?[-+ ]?#?0?\d{0,3}[,_]?(\.\d{1,2})?[bcdeEfFgGnosxX%]?", re.DOTALL)
 """Format specifications whose result is at most about a thousand characters long."""
+
+
+def checked_text(text: str, span: Span) -> str:
+    """A string of the program, which must be text that can be written and compared anywhere.
+
+    Raises:
+        ScenarioError: It has half of a surrogate pair.
+    """
+    if not text.isascii() and any("\ud800" <= character <= "\udfff" for character in text):
+        raise fail("wrong-value", "half of a surrogate pair is no character", span, "in this string")
+    return text
 
 
 def formatted(run: Runner, node: ast.FormattedString, scope: Environment) -> str:
@@ -31,7 +42,7 @@ def formatted(run: Runner, node: ast.FormattedString, scope: Environment) -> str
     text: list[str] = []
     for part in node.parts:
         if isinstance(part, ast.Constant):
-            text.append(str(part.value))
+            text.append(checked_text(str(part.value), part.span))
             continue
         value = settled(run, run.evaluate(part.value, scope))
         value = value.value if isinstance(value, Constant) else value

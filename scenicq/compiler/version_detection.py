@@ -12,6 +12,8 @@ from scenicq.syntax.walk import walk
 
 __all__ = ["decide_version"]
 
+_FIRST_FUNCTIONS = frozenset({"createPlatoonAt", "carAheadOfCar"})
+"""Functions of the 2019 paper's library: they take no vectors."""
 _SCALAR_PROPERTIES = frozenset(
     {"width", "length", "height", "roadDeviation", "heading", "speed", "viewAngle", "visibleDistance"}
 )
@@ -71,6 +73,9 @@ def _has_interval(module: ast.Module) -> bool:
         for p in f.parameters
         if _is_pair(p.default)
     }
+    if _calls_first_library(module):
+        return True
+    named |= _given_pairs(module)
 
     def interval(node: ast.Node | None) -> bool:
         return _is_pair(node) or (isinstance(node, ast.Name) and node.id in named)
@@ -79,6 +84,33 @@ def _has_interval(module: ast.Module) -> bool:
         isinstance(node, ast.Tuple) and _is_pair(node) and any(isinstance(item, ast.Deg) for item in node.items)
         for node in walk(*module.body)
     )
+
+
+def _calls_first_library(module: ast.Module) -> bool:
+    """Whether a function of the 2019 paper's library is given a pair, as in `createPlatoonAt(car, 6, dist=(2, 8))`."""
+    return any(
+        isinstance(call, ast.Call)
+        and isinstance(call.function, ast.Name)
+        and call.function.id in _FIRST_FUNCTIONS
+        and any(_is_pair(argument.value) for argument in call.arguments)
+        for call in walk(*module.body)
+    )
+
+
+def _given_pairs(module: ast.Module) -> set[str]:
+    """Parameters of the program's functions that some call gives a pair."""
+    functions = {node.name: node.parameters for node in walk(*module.body) if isinstance(node, ast.FunctionDef)}
+    found: set[str] = set()
+    for call in walk(*module.body):
+        if not (isinstance(call, ast.Call) and isinstance(call.function, ast.Name)):
+            continue
+        parameters = functions.get(call.function.id, ())
+        for number, argument in enumerate(call.arguments):
+            if argument.name is not None:
+                found |= {argument.name} if _is_pair(argument.value) else set()
+            elif _is_pair(argument.value) and number < len(parameters):
+                found.add(parameters[number].name)
+    return found
 
 
 def _number_places(node: ast.Node) -> tuple[ast.Node | None, ...]:

@@ -59,6 +59,7 @@ from scenicq.geometry.regions import (
     intersection,
     union,
 )
+from scenicq.geometry.shapes import GeometryError
 from scenicq.geometry.terms import UndecidedError
 
 __all__ = ["CannotEvaluate", "compute", "directions", "fold"]
@@ -199,6 +200,9 @@ def compute(node: Node, args: tuple[Value, ...]) -> Value:
         return _compute(node, args)
     except UndecidedError as error:
         raise CannotEvaluate(str(error)) from None
+    except (ArithmeticError, TypeError, ValueError, GeometryError) as error:
+        # such as numbers that are finite and whose sum is not
+        raise CannotEvaluate(f"{type(node).__name__} of these values: {error}") from None
 
 
 def _compute(node: Node, args: tuple[Value, ...]) -> Value:

@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import look
 from scenicq.geometry.cell_guards import Guard, narrowed
 from scenicq.geometry.shapes import Bounds
 
@@ -41,6 +42,7 @@ class FieldCell:
         """The same cell for points of a box only: fewer guards, exact if none is left; None if no point is meant."""
         if self.exact or not self.guards:
             return self
+        look()
         left = narrowed(self.guards, bounds)
         return None if left is None else FieldCell(self.polygon, self.heading, not left, left)
 

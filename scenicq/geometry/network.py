@@ -14,7 +14,8 @@ from functools import cached_property
 from typing import TypeVar, cast
 
 import numpy as np
-from shapely.geometry import MultiPolygon, Polygon
+from shapely import STRtree
+from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
 from scenicq.geometry.centerlines import direction_along, road_direction
@@ -36,6 +37,7 @@ from scenicq.geometry.fields import VectorField
 from scenicq.geometry.network_builder import link
 from scenicq.geometry.regions import SLACK, PolygonSet, PolylineSet, Region
 from scenicq.geometry.road_direction import along_lines
+from scenicq.geometry.shapes import Shape
 
 __all__ = ["MapFeature", "Network", "read_geojson"]
 
@@ -102,6 +104,18 @@ class Network:
 
     # --- regions
 
+    def curbs_near(self, area: Shape) -> list[LineString]:
+        """The curbs of the map that meet an area, in the direction of traffic."""
+        return [self._curb_lines[number] for number in sorted(shapes.tree_query(self._curb_tree, area).tolist())]
+
+    @cached_property
+    def _curb_lines(self) -> tuple[LineString, ...]:
+        return tuple(self.roadDirection.forward(curb.line) for curb in self.curbs)
+
+    @cached_property
+    def _curb_tree(self) -> STRtree:
+        return STRtree(self._curb_lines)
+
     @cached_property
     def laneRegion(self) -> PolygonSet:
         """All lanes."""
@@ -139,7 +153,7 @@ class Network:
 
         Scenic makes its curbs so from its lane groups. Inside intersections there are none.
         """
-        lines = tuple(self.roadDirection.forward(curb.line) for curb in self.curbs)
+        lines = self._curb_lines
         if not lines:
             lines = right_edges(self.lanes, [crossing.polygon for crossing in self.intersections])
         return PolylineSet(lines, "curb", along_lines(lines, "curb"))

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import LineString, STRtree
 
+from scenicq.budget import look
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import heading_of_array
 from scenicq.geometry.cell_guards import Guard, Nearer, Off, Within, segment_distances
@@ -283,6 +284,7 @@ class RoadDirection:
 
     def _near(self, square: Bounds) -> list[_Candidate]:
         """The lanes that may be nearest to a point of a square off the lanes."""
+        look()
         west, south, east, north = square
         x, y = (west + east) / 2, (south + north) / 2
         center, radius = shapes.point(x, y), float(np.hypot(east - west, north - south)) / 2

@@ -21,6 +21,8 @@ Shape: TypeAlias = BaseGeometry
 """Any shapely geometry."""
 XY: TypeAlias = tuple[float, float]
 """A point, in metres."""
+GeometryError = shapely.errors.ShapelyError
+"""Raised where shapes cannot be made or compared, such as those with coordinates that are not finite."""
 Bounds: TypeAlias = tuple[float, float, float, float]
 """A box: xmin, ymin, xmax, ymax."""
 Coordinates: TypeAlias = NDArray[np.float64]
@@ -146,6 +148,11 @@ def intersection(a: Shape, b: Shape) -> Shape:
         return shapely.intersection(a, b)
     except shapely.GEOSException:
         return shapely.intersection(a, b, grid_size=_GRID)
+
+
+def shared_areas(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
+    """What each pair of polygons has in common, in square metres."""
+    return shapely.area(shapely.intersection(a, b))
 
 
 def intersections(geometries: Sequence[Shape], window: Shape) -> list[Shape]:

@@ -18,6 +18,7 @@ from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.labels import Label, LabelObject, Recording
+from scenicq.store.wkb import FARTHEST_M
 
 if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature, ProblemSink
@@ -30,6 +31,7 @@ __all__ = [
     "Options",
     "Reader",
     "Source",
+    "on_the_map",
     "read_class_map",
     "read_maps",
 ]
@@ -209,10 +211,12 @@ class Labels:
             elif label.timestamp_us in times:
                 message = f"label `{label.frame}` has the time of label `{times[label.timestamp_us]}`"
                 self._leave_out(f"{place}: {message} in recording `{name}`")
+            elif not _is_place(label.ego):
+                self._leave_out(f"{place}: the ego of label `{label.frame}` is at no place on a map")
             else:
                 self._frames.add(label.frame)
                 times[label.timestamp_us] = label.frame
-                sound.append(self._without_duplicates(label, place))
+                sound.append(self._with_sound_objects(label, place))
         if not sound:
             self._report.left_out("recording", "record-invalid", f"recording `{name}` has no sound label")
             return None
@@ -230,7 +234,7 @@ class Labels:
     def _leave_out(self, message: str) -> None:
         self._report.left_out("label", "record-invalid", message)
 
-    def _without_duplicates(self, label: Label, place: str) -> Label:
+    def _with_sound_objects(self, label: Label, place: str) -> Label:
         ids = {"ego"}
         sound: list[LabelObject] = []
         for member in label.objects:
@@ -238,12 +242,36 @@ class Labels:
                 why = "is kept for the ego" if member.id == "ego" else "is used twice"
                 message = f"{place}: object id `{member.id}` of label `{label.frame}` {why}"
                 self._report.left_out("object", "record-invalid", message)
+            elif not _is_place(member):
+                message = f"{place}: object `{member.id}` of label `{label.frame}` is at no place on a map"
+                self._report.left_out("object", "record-invalid", message)
             else:
                 ids.add(member.id)
                 sound.append(member)
         if len(sound) == len(label.objects):
             return label
         return replace(label, objects=tuple(sound))
+
+
+def _is_place(member: LabelObject) -> bool:
+    return abs(member.x) <= FARTHEST_M and abs(member.y) <= FARTHEST_M
+
+
+def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict[str, tuple[MapFeature, ...]]:
+    """The elements of maps that are at a place where maps can be.
+
+    Args:
+        maps: Of a source.
+        report: Takes what is left out.
+    """
+    kept: dict[str, tuple[MapFeature, ...]] = {}
+    for name, features in maps.items():
+        far = {feature.id for feature in features if not max(map(abs, feature.shape.bounds), default=0.0) <= FARTHEST_M}
+        for each in sorted(far):
+            message = f"map `{name}`: element `{each}` is at no place on a map"
+            report.left_out("map element", "map-invalid", message)
+        kept[name] = tuple(feature for feature in features if feature.id not in far)
+    return kept
 
 
 def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapFeature, ...]]:

@@ -2,7 +2,7 @@
 
 # pyarrow has no type stubs.
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
+# pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.fields import LONGEST_TEXT
 
 __all__ = ["read_feather", "read_parquet"]
 
@@ -102,7 +104,11 @@ def _columns(path: Path, table: Any, wanted: Mapping[str, str], optional: Mappin
             if _kind(column.type) not in ({"integer"} if kind == "integer" else {kind, "integer"}):
                 message = f"{path}: column `{name}` is of type {column.type}, not {kind}"
                 raise DataError(Diagnostic("file-invalid", message))
-            found[name] = column.cast(_TYPES[kind]).to_pylist()
+            column = column.cast(_TYPES[kind])
+            if kind == "text" and (pc.max(pc.utf8_length(column)).as_py() or 0) > LONGEST_TEXT:
+                message = f"{path}: column `{name}` has a text of more than {LONGEST_TEXT} characters"
+                raise DataError(Diagnostic("file-invalid", message))
+            found[name] = column.to_pylist()
     return found
 
 

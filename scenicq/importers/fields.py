@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 __all__ = [
+    "LONGEST_TEXT",
     "InvalidError",
     "check_characters",
     "integer",
@@ -26,6 +27,8 @@ __all__ = [
 ]
 
 Record = Mapping[str, Any]
+LONGEST_TEXT = 1 << 12
+"""Characters of a name."""
 _LARGEST = 2**63 - 1
 
 
@@ -94,6 +97,8 @@ def text(fields: Record, key: str) -> str:
         raise InvalidError(f"`{key}` is not a text but {_kind(value)}")
     if not value:
         raise InvalidError(f"`{key}` is empty")
+    if len(value) > LONGEST_TEXT:
+        raise InvalidError(f"`{key}` is longer than {LONGEST_TEXT} characters")
     return value
 
 

@@ -37,6 +37,14 @@ Runs = tuple[int, ...]
 _KEY = re.compile(rb'"recording"\s*:\s*"([^"\\]*)"')
 
 
+_LONGEST_LINE = 1 << 26
+"""Bytes of a line; a label of a hundred thousand objects has a third of that."""
+_MOST_EMPTY = 1_000_000
+"""Empty lines of a file."""
+_LEAST_UNPACKED, _MOST_TIMES = 1 << 28, 200
+"""Bytes that a packed file may always unpack to, and how many times its size beyond; labels pack to a tenth."""
+
+
 @dataclass(frozen=True, slots=True)
 class GroupedLines:
     """Where the lines of some recordings lie; can be pickled.
@@ -115,8 +123,16 @@ def group_lines(
 
 def _note(number: int, file: IO[bytes], name: str, found: dict[str, _Found], report: Report) -> int:
     total = offset = 0
-    for line, content in enumerate(file, start=1):
-        if content.strip():
+    empty = 0
+    for line, (content, length) in enumerate(_lines(file), start=1):
+        if content is None:
+            message = f"{name}:{line}: a line of {length:,} bytes is no label"
+            report.left_out("label", "file-invalid", message)
+        elif not content.strip():
+            empty += 1
+            if empty > _MOST_EMPTY:
+                raise DataError(Diagnostic("file-invalid", f"{name} has more than {_MOST_EMPTY:,} empty lines"))
+        else:
             total += 1
             recording = _recording(content, f"{name}:{line}", report)
             if recording is not None:
@@ -130,8 +146,22 @@ def _note(number: int, file: IO[bytes], name: str, found: dict[str, _Found], rep
                     runs.extend((number, line, offset, offset + len(content)))
                 entry.digest.update(content)
                 entry.size += len(content)
-        offset += len(content)
+        offset += length
     return total
+
+
+def _lines(file: IO[bytes]) -> Iterator[tuple[bytes | None, int]]:
+    """The lines of a file with their lengths; None in place of one that is too long, which is not kept in memory."""
+    while content := file.readline(_LONGEST_LINE):
+        length = len(content)
+        if length < _LONGEST_LINE or content.endswith(b"\n"):
+            yield content, length
+            continue
+        while more := file.readline(_LONGEST_LINE):
+            length += len(more)
+            if more.endswith(b"\n"):
+                break
+        yield None, length
 
 
 def _recording(content: bytes, place: str, report: Report) -> str | None:
@@ -170,9 +200,16 @@ def _seekable(file: Path, scratch: Path | None, number: int, report: Report) -> 
 
 
 def _gzip_lines(file: Path) -> Iterator[bytes]:
+    most = max(_LEAST_UNPACKED, _MOST_TIMES * file.stat().st_size)
+    unpacked = 0
     with gzip.open(file) as lines:
         try:
-            yield from lines
+            while piece := lines.read(1 << 20):
+                unpacked += len(piece)
+                if unpacked > most:
+                    message = f"{file} unpacks to more than {most:,} bytes, {_MOST_TIMES} times its size"
+                    raise DataError(Diagnostic("file-invalid", message))
+                yield piece
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise DataError(Diagnostic("file-invalid", f"{file} is not a whole gzip file: {error}")) from error
 

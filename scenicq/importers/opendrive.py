@@ -16,7 +16,7 @@ from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.report import Report
-from scenicq.store.atomic_files import whole_file
+from scenicq.store.atomic_files import whole_file, write_whole
 
 __all__ = ["SUFFIX", "convert_maps", "convert_xodr"]
 
@@ -72,7 +72,8 @@ def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeo
     worker = hashlib.sha256(_WORKER.read_bytes()).digest()
     key = hashlib.sha256(worker + content).hexdigest()
     kept = cache / f"{key}.geojson"
-    if kept.is_file():
+    digest = cache / f"{key}.sha256"
+    if _is_whole(kept, digest):
         return kept
     try:
         cache.mkdir(parents=True, exist_ok=True)
@@ -84,10 +85,24 @@ def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeo
                 raise DataError(Diagnostic("file-invalid", f"map {path}: Scenic's parser gave nothing"))
             with made.open("rb") as result, whole_file(kept) as file:
                 shutil.copyfileobj(result, file)
+            write_whole(digest, _digest(kept))
     except OSError as error:
         message = f"the map cache {cache} cannot be written: {error.strerror or error}"
         raise DataError(Diagnostic("target-unwritable", message)) from error
     return kept
+
+
+def _is_whole(kept: Path, digest: Path) -> bool:
+    """Whether a file of the cache is as it was written; one that is not is made anew."""
+    try:
+        return digest.read_text(encoding="utf-8") == _digest(kept)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def _digest(file: Path) -> str:
+    with file.open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()
 
 
 def _run(path: Path, command: list[str], folder: Path, timeout_s: float) -> None:

@@ -13,6 +13,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.store.wkb import FARTHEST_M
+
 __all__ = ["UNUSUAL", "UnusualError", "are", "column", "demand", "reals", "vectors"]
 
 _GET = cast("Callable[[dict[str, Any], str], Any]", dict[str, Any].get)
@@ -71,4 +73,6 @@ def vectors(values: Sequence[Any], size: int) -> NDArray[np.float64]:
         OverflowError: A number is too large.
     """
     demand(are(values, list) and set(map(len, values)) <= {size})
-    return reals(list(chain.from_iterable(values))).reshape(-1, size)
+    found = reals(list(chain.from_iterable(values))).reshape(-1, size)
+    demand(bool((np.abs(found) <= FARTHEST_M).all()))
+    return found

@@ -34,7 +34,7 @@ from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.walk import postorder, transform
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.network import Network
-from scenicq.geometry.regions import Nowhere, PolygonSet
+from scenicq.geometry.regions import Nowhere, PolygonSet, PolylineSet
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import fold, is_class
 from scenicq.syntax import ast
@@ -185,14 +185,14 @@ def _too_large(scenario: Scenario, requirement: Requirement) -> Iterator[Diagnos
             continue
         outers = node.outer.options if isinstance(node.outer, Select) else (node.outer,)
         regions = [outer.value for outer in outers if isinstance(outer, Constant)]
-        if len(regions) < len(outers) or not all(isinstance(region, PolygonSet) for region in regions):
+        if len(regions) < len(outers) or not all(isinstance(each, PolygonSet | PolylineSet) for each in regions):
             continue
         width, length = (scalar_bounds(expand(side, sized))[0] for side in (node.inner.width, node.inner.length))
         if not (math.isfinite(width) and math.isfinite(length)):
             continue
         short, long = sorted((width, length))
-        if not any(_fits(cast(PolygonSet, region), short, long) for region in regions):
-            name = cast(PolygonSet, regions[0]).name if len(regions) == 1 else "any of these"
+        if not any(_fits(region, short, long) for region in regions if isinstance(region, PolygonSet)):
+            name = cast("PolygonSet | PolylineSet", regions[0]).name if len(regions) == 1 else "any of these"
             yield _warning(
                 "box-cannot-fit", f"a box of {width:.3g} m by {length:.3g} m fits nowhere into `{name}`",
                 requirement.span, "the whole box must lie inside",

@@ -11,9 +11,10 @@ no: a group that nothing decides leaves the label undecided unless another corre
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import cast
 
+from scenicq.budget import TimeIsUp, limited
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Leaf
 from scenicq.forest.scenario import Scenario
@@ -37,6 +38,9 @@ from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 
 __all__ = ["Finding", "Matcher"]
+
+
+_SEARCH = "correspondence search"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +81,9 @@ class Matcher:
     _plain: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Rewrite the scenario, and find out what matters of a label."""
+        """Rewrite the scenario, tie the tolerance to its objects, and find out what matters of a label."""
         self.scenario = ready(self.scenario)
+        self.options = replace(self.options, tolerance=self.options.tolerance.for_scenario(self.scenario))
         self._relevant = relevant_properties(self.scenario, self.options)
         options = self.options
         self._plain = options.method == "auto" and not options.exact and options.ego == "label"
@@ -101,11 +106,15 @@ class Matcher:
             among: What is known of who may play whom.
             places: What is known of places of the map; see `look_up`.
         """
-        if reporter is None and not given:
-            found = self._direct(label, among, places or MapLookups())
-            if found is not None:
-                return found
-        return next(self._findings(label, reporter, given or {}, among, places)).verdict
+        with limited(self.options.timeout_s):
+            if reporter is None and not given:
+                try:
+                    found = self._direct(label, among, places or MapLookups())
+                except TimeIsUp:
+                    found = None
+                if found is not None:
+                    return found
+            return next(self._findings(label, reporter, given or {}, among, places)).verdict
 
     def match_all(self, labels: Sequence[tuple[Label, Candidates | None]], places: MapLookups) -> Iterator[Verdict]:
         """Decide labels, each as `match` does; those that match in the first way that is tried are found together.
@@ -168,7 +177,8 @@ class Matcher:
 
     def examine(self, label: Label) -> Finding:
         """Decide one label and keep what the verdict rests on."""
-        return next(self._findings(label, None, {}))
+        with limited(self.options.timeout_s):
+            return next(self._findings(label, None, {}))
 
     def findings(
         self, label: Label, *, among: Candidates | None = None, places: MapLookups | None = None
@@ -186,7 +196,15 @@ class Matcher:
         return self._findings(label, None, {}, among, places, rest_too=True)
 
     def relaxed(self, options: MatchOptions) -> Matcher:
-        """The same matcher with options that differ in tolerance and patience only; the analysis is shared."""
+        """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
+
+        Raises:
+            DataError: option-invalid: the tolerance names what the scenario does not have.
+        """
+        bound = options.tolerance.for_scenario(self.scenario)
+        if not bound.same_scopes(self.options.tolerance):
+            # what may be swapped or decided once for many is what one scope compares
+            return Matcher(self.scenario, options, self.solver)
         return Matcher(self.scenario, options, self.solver, self._plans, self._kinds)
 
     def look_up(self, labels: Iterable[tuple[Label, Candidates | None]]) -> MapLookups:
@@ -230,7 +248,7 @@ class Matcher:
     ) -> Iterator[Match]:
         """Every correspondence by which a label matches; of interchangeable objects, one order only.
 
-        Stops early where the budget of the options is used up.
+        Stops early where the budget of the options is used up, or one takes too long to be found.
 
         Args:
             label: The label.
@@ -238,8 +256,14 @@ class Matcher:
             among: As of `match`.
             places: As of `match`.
         """
-        found = (finding.verdict for finding in self._findings(label, None, given or {}, among, places))
-        return (verdict for verdict in found if isinstance(verdict, Match))
+        found = self._findings(label, None, given or {}, among, places)
+        while True:
+            with limited(self.options.timeout_s):
+                finding = next(found, None)
+            if finding is None:
+                return
+            if isinstance(finding.verdict, Match):
+                yield finding.verdict
 
     def plan(self, signature: Signature) -> MatchPlan:
         """The groups for a signature, analysed once."""
@@ -270,7 +294,7 @@ class Matcher:
                 rest.append((0, Finding(NoMatch(cast_, self._names(label, ego, {})))))
                 continue
             attempt = LabelSearch(self.scenario, self.options, cast_, self.ask, reporter, places or MapLookups())
-            exhausted = False
+            exhausted: Unknown | None = None
             try:
                 for signature, candidates in cast_.signatures(self._relevant):
                     plan = self.plan(signature)
@@ -278,8 +302,10 @@ class Matcher:
                         matched = True
                         yield Finding(self._match(label, ego, solution), attempt, plan, solution.assignment)
             except Exhausted:
-                exhausted = True
-            weight, verdict = self._rest(label, attempt, exhausted=exhausted)
+                exhausted = Unknown("budget", Cause(_SEARCH, f"more than {self.options.budget:,} steps"))
+            except TimeIsUp:
+                exhausted = Unknown("timeout", Cause(_SEARCH, f"more than {self.options.timeout_s:g} s"))
+            weight, verdict = self._rest(label, attempt, exhausted)
             rest.append((weight, Finding(verdict, attempt)))
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest
@@ -292,16 +318,15 @@ class Matcher:
         detail = "the source has no ego" if self.options.ego == "label" else f"no {thing.category}"
         return Cause(f"{thing.name}.class", detail, thing.span, (thing.index,))
 
-    def _rest(self, label: Label, attempt: LabelSearch, *, exhausted: bool) -> tuple[int, Verdict]:
+    def _rest(self, label: Label, attempt: LabelSearch, exhausted: Unknown | None) -> tuple[int, Verdict]:
         """The verdict of an attempt without a match, and its weight."""
         ego, failure = attempt.cast.ego, attempt.failure
         if attempt.undecided is not None:
             found = attempt.undecided
             reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
             return 2_000_000, Unknown(reason, self._cause(found), self._names(label, ego, found.assignment))
-        if exhausted:
-            cause = Cause("correspondence search", f"more than {self.options.budget:,} steps")
-            return 1_000_000, Unknown("budget", cause)
+        if exhausted is not None:
+            return 1_000_000, exhausted
         if failure is None:
             cause = Cause("correspondence", "no distinct label objects for all objects")
             return 0, NoMatch(cause, self._names(label, ego, {}))
@@ -339,7 +364,7 @@ class Matcher:
         for leaf in variables:
             place = self._places.get(leaf)
             if place is None:
-                place = self._places[leaf] = leaf.span.place if leaf.span else type(leaf).__name__
+                place = self._places[leaf] = leaf.span.mark if leaf.span else type(leaf).__name__
             counts[place] = counts.get(place, 0) + 1
             keys.append(place if counts[place] == 1 else f"{place}#{counts[place]}")
         return keys

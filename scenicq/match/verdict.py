@@ -31,8 +31,8 @@ class Cause:
 
     @property
     def place(self) -> str:
-        """`file:line:column`, or nothing."""
-        return self.span.place if self.span else ""
+        """`file:line:column` without the file's folder, or nothing."""
+        return self.span.mark if self.span else ""
 
 
 @dataclass(frozen=True, slots=True)

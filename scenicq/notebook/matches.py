@@ -13,8 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenicq.errors import render
+from scenicq.evaluate.detection import Missing
+from scenicq.evaluate.evaluation import evaluate
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
+from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import Picture, Text
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.result_tables import result_schema, result_table
@@ -226,6 +229,35 @@ class Matches(Sequence[FrameResult]):
         """
         results = [each.result for each in self._all()]
         return write_report(self.query, results, Path(folder), sensors=None if sensors is None else Path(sensors))
+
+    def evaluate(
+        self,
+        predictions: str | Path,
+        *,
+        distance_m: float = 2.0,
+        least_score: float = 0.0,
+        missing: Missing = "error",
+        simulated: str | Path | None = None,
+        seed: int = 0,
+    ) -> Judgement:
+        """Say whether a model fails on the frames that match.
+
+        Args:
+            predictions: A file of what the model has detected.
+            distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4.
+            least_score: Score from which a prediction counts.
+            missing: What a frame without predictions is; see `scenicq.evaluate.evaluation.evaluate`.
+            simulated: A CSV file of simulated runs.
+            seed: The same figures come from the same seed.
+
+        Raises:
+            DataError: A file cannot be read or does not fit the dataset; option-invalid for another distance.
+        """
+        name = Path(self.query.source.name.strip("<>")).stem
+        results = {name: [each.result for each in self._all()]}
+        judged = evaluate(results, self.query.dataset, predictions, distance_m=distance_m, least_score=least_score,
+                          missing=missing, simulated=simulated, seed=seed)  # fmt: skip
+        return Judgement(judged, self.query.dataset)
 
     def __repr__(self) -> str:
         """What was asked and, once known, how many results there are."""

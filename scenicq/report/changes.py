@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, cast
 
+from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.result_files import Record
 from scenicq.report.frames import table
 from scenicq.report.page import page
 from scenicq.report.svg import element, escape
 
-__all__ = ["Change", "changes", "changes_page", "changes_text"]
+__all__ = ["Change", "changes", "changes_page", "changes_text", "check_datasets"]
 
 Kind = Literal["came", "went", "recast", "stayed"]
 _TOLD: dict[Kind, str] = {
@@ -82,6 +83,32 @@ def changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> list[C
         time = record.get("timestamp_us")
         found.append(((record["recording"], time if isinstance(time, int) else 0, frame), change))
     return [change for _, change in sorted(found, key=lambda each: each[0])]
+
+
+def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) -> Diagnostic | None:
+    """Refuse results of different datasets, as far as they show it.
+
+    Args:
+        before: Records of the first file by frame.
+        after: Records of the second.
+
+    Returns:
+        A warning where the files have no recording in common; None where all is well.
+
+    Raises:
+        DataError: option-invalid, where a frame of both has another recording or time.
+    """
+    for frame in sorted(before.keys() & after.keys()):
+        old, new = ((each["recording"], each.get("timestamp_us")) for each in (before[frame], after[frame]))
+        if old != new:
+            message = f"the files are of different datasets: frame `{frame}` is of {old[0]} at {old[1]} in A, of "
+            message += f"{new[0]} at {new[1]} in B"
+            raise DataError(Diagnostic("option-invalid", message))
+    recordings = [{each["recording"] for each in records.values()} for records in (before, after)]
+    if before and after and recordings[0].isdisjoint(recordings[1]):
+        message = "the files have no recording in common: they may be of different datasets"
+        return Diagnostic("option-invalid", message, severity="warning")
+    return None
 
 
 def _cast(roles: Mapping[str, str]) -> str:

@@ -20,15 +20,16 @@ from scenicq.report.svg import element, escape
 
 __all__ = ["badge", "frame_facts", "frame_page", "table", "variable_texts", "when"]
 
+_FIRST_US, _LAST_US = 946_684_800_000_000, 4_102_444_800_000_000
+"""Start of the years 2000 and 2100: what lies outside is no date."""
 _PLACE = re.compile(r":(\d+):(\d+)(#\d+)?$")
 
 
 def when(timestamp_us: int) -> str:
-    """A timestamp as date and time (UTC), or as the number where it is no date."""
-    try:
-        return f"{datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=timestamp_us):%Y-%m-%d %H:%M:%S.%f}"[:-4]
-    except OverflowError:
-        return str(timestamp_us)
+    """A timestamp as date and time (UTC), or as seconds where it is that of a clock without a date."""
+    if not _FIRST_US <= timestamp_us < _LAST_US:
+        return f"{timestamp_us / 1e6:.2f} s"
+    return f"{datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=timestamp_us):%Y-%m-%d %H:%M:%S.%f}"[:-4]
 
 
 def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -81,14 +82,14 @@ def variable_texts(scenario: Scenario) -> dict[str, str]:
     roots = [requirement.condition for requirement in scenario.requirements]
     roots += [given.value for given in scenario.params.values()]
     roots += [given.value for thing in scenario.objects for given in thing.properties.values()]
-    return {leaf.span.place: " ".join(leaf.span.text.split()) for leaf in leaves(*roots) if leaf.span is not None}
+    return {leaf.span.mark: " ".join(leaf.span.text.split()) for leaf in leaves(*roots) if leaf.span is not None}
 
 
 def _witness(verdict: Match, source: Source, texts: Mapping[str, str]) -> str:
     rows: list[tuple[str, ...]] = []
     for place, value in verdict.witness.items():
         found = _PLACE.search(place)
-        if found is None or place[: found.start()] != source.name or int(found[1]) > len(source.line_starts):
+        if found is None or place[: found.start()] != source.file_name or int(found[1]) > len(source.line_starts):
             rows.append((escape(place), "", _value(value)))
             continue
         line, column = int(found[1]), int(found[2])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
@@ -11,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, cast
 
 from scenicq import __version__
+from scenicq.match.tolerance import Tolerance
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
 from scenicq.report.frames import table
@@ -24,7 +24,7 @@ _PACKAGES = ("duckdb", "numpy", "pyarrow", "shapely", "highspy", "dreal")
 
 _NAMES = {"version": "scenic", "every": "all", "timeout_s": "timeout"}
 """Options that the command line calls otherwise."""
-_UNITS = {"tolerance.x": "m", "tolerance.y": "m", "tolerance.position": "m", "radius": "m", "timeout_s": "s"}
+_UNITS = {"radius": "m", "timeout_s": "s"}
 
 
 def _bar(share: float, told: str) -> str:
@@ -130,7 +130,7 @@ def versions() -> dict[str, str]:
 
 
 def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
-    if is_dataclass(value):
+    if is_dataclass(value) and not isinstance(value, Tolerance):
         return [
             row
             for each in fields(value)
@@ -147,8 +147,6 @@ def _shown(name: str, value: Any) -> str:
             return "not given"
         case bool():
             return "yes" if value else "no"
-        case float() if name == "tolerance.heading":
-            return f"{math.degrees(value):z.6g}\N{DEGREE SIGN}"
         case float() if name in _UNITS:
             return f"{value:g} {_UNITS[name]}"
         case frozenset():

@@ -37,6 +37,8 @@ MOST = 2000
 """Frames that are shown at most."""
 THUMBNAILS = 1500
 """Small camera images that are made at most, but one a frame; they take 5 ms each."""
+_WORK = ".report-"
+"""How the folder begins in which a report is made before it is shown."""
 _OWN = ("pictures", "thumbnails", "index.html")
 
 
@@ -52,6 +54,8 @@ def check_target(folder: Path) -> None:
         index = folder / "index.html"
         if index.is_file() and f'content="{GENERATOR} ' in index.read_text(encoding="utf-8", errors="replace")[:4000]:
             return
+        if any(_leftovers(folder)) and all(each.name in _OWN or _is_work(each) for each in folder.iterdir()):
+            return  # of a run that was killed
     except OSError as error:
         raise _unwritable(folder, error) from None
     hint = "choose a new folder, or one that holds an earlier report"
@@ -92,7 +96,9 @@ def write_report(
     check_target(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=".report-", dir=folder))
+        for each in _leftovers(folder):
+            shutil.rmtree(each, ignore_errors=True)
+        work = Path(tempfile.mkdtemp(prefix=_WORK, dir=folder))
         try:
             text = _Report(query, folder, work, sensors).text(results, near, command, elapsed_s)
             (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
@@ -102,6 +108,15 @@ def write_report(
     except OSError as error:
         raise _unwritable(folder, error) from None
     return folder / "index.html"
+
+
+def _is_work(path: Path) -> bool:
+    return path.name.startswith(_WORK) and path.is_dir() and not path.is_symlink()
+
+
+def _leftovers(folder: Path) -> list[Path]:
+    """Where killed runs have worked; whoever writes a report is its only writer."""
+    return [path for path in folder.iterdir() if _is_work(path)]
 
 
 def _replace(work: Path, folder: Path) -> None:

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
+from scenicq.budget import look
 from scenicq.smt.operators import Operator, operate
 
 __all__ = [
@@ -242,6 +243,7 @@ def disjunction(formulas: Iterable[Formula]) -> Formula:
 def _merge(formulas: Iterable[Formula], kind: type[And | Or]) -> tuple[Formula, ...]:
     merged: dict[int, Formula] = {}
     for formula in formulas:
+        look()
         members = formula.args if isinstance(formula, (And, Or)) and isinstance(formula, kind) else (formula,)
         merged.update((id(member), member) for member in members)
     return tuple(merged.values())

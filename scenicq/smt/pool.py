@@ -22,6 +22,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
+from scenicq.budget import uncounted
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.smt.answer import Answer, Sat, Unknown
 from scenicq.smt.evaluation import holds
@@ -156,7 +157,8 @@ class _Worker:
             self.stop()
         greeting: dict[str, str] = {}
         for _ in range(_STARTS):
-            greeting = self._spawn()
+            with uncounted():
+                greeting = self._spawn()
             if "ready" in greeting:
                 self._version, self._loads = greeting["ready"], True
                 return self._version

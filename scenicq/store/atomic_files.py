@@ -8,7 +8,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["WholeFile", "sync_folder", "whole_file", "write_whole"]
+try:
+    import fcntl
+except ImportError:
+    fcntl = None
+
+from scenicq.errors import DataError, Diagnostic
+
+__all__ = ["WholeFile", "sole_writer", "sync_folder", "whole_file", "write_whole"]
 
 
 class WholeFile:
@@ -28,6 +35,7 @@ class WholeFile:
         self._path = path
         self._temporary = (folder or path.parent) / f".{path.name}.{os.getpid()}.tmp"
         self._file: BinaryIO | None = None
+        self._begun = False
 
     def open(self) -> BinaryIO:
         """The file, to be written.
@@ -35,6 +43,8 @@ class WholeFile:
         Raises:
             OSError: The folder cannot be written.
         """
+        # an interrupt may come when the file is there and has not been handed on
+        self._begun = True
         self._file = self._temporary.open("wb")
         return self._file
 
@@ -53,10 +63,11 @@ class WholeFile:
 
     def abandon(self) -> None:
         """Remove what is not finished; nothing where all is."""
-        if self._file is None:
+        if not self._begun:
             return
-        with suppress(OSError):  # what is left in the buffer may not fit on the disk
-            self._file.close()
+        if self._file is not None:
+            with suppress(OSError):  # what is left in the buffer may not fit on the disk
+                self._file.close()
         with suppress(OSError):
             self._temporary.unlink()
 
@@ -84,6 +95,47 @@ def write_whole(path: Path, text: str) -> None:
     """
     with whole_file(path) as file:
         file.write(text.encode())
+
+
+def _locked(handle: int) -> bool:
+    """Lock a folder; also true where its file system has no locks."""
+    try:
+        if fcntl is not None:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        pass
+    return True
+
+
+@contextmanager
+def sole_writer(folder: Path) -> Generator[None]:
+    """Hold a folder for writing, made if need be, so that a second run is told before it works.
+
+    The lock goes with the process, however that ends. A folder that was made and that nothing is in is removed again.
+
+    Raises:
+        DataError: target-busy: another process holds it; target-unwritable.
+    """
+    made = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = None if fcntl is None else os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        message = f"{folder} cannot be written: {error.strerror or error}"
+        raise DataError(Diagnostic("target-unwritable", message)) from None
+    try:
+        if handle is not None and not _locked(handle):
+            hint = "wait until it is done, or choose another target"
+            raise DataError(Diagnostic("target-busy", f"another run writes to {folder}", hints=(hint,)))
+        yield
+    finally:
+        if handle is not None:
+            os.close(handle)
+        if made:
+            with suppress(OSError):
+                folder.rmdir()
 
 
 def sync_folder(folder: Path) -> None:

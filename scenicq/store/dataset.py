@@ -6,8 +6,8 @@ nothing: every connection is an in-memory database with views over the manifest'
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,11 +18,13 @@ from scenicq.errors import DataError, Diagnostic, ScenicqError
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.store.frame_index import find_rows
+from scenicq.store.frame_names import find_frame, shortened
 from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
+from scenicq.store.soundness import check_dataset
 from scenicq.store.sql import sql_text
 
 __all__ = ["Dataset", "open_dataset"]
@@ -144,7 +146,7 @@ class Dataset:
         """
         try:
             yield
-        except ScenicqError:
+        except (ScenicqError, MemoryError):
             raise
         except Exception as error:
             if self.folder is not None:
@@ -156,15 +158,21 @@ class Dataset:
             raise
 
     def label(self, frame: str) -> Label:
-        """The label of a frame.
+        """The label of a frame, which may be named by as much of its name as no other frame has.
 
         Raises:
-            DataError: option-invalid: there is no such frame.
+            DataError: option-invalid: there is no such frame, or there are several.
         """
         for label in self.labels([frame]):
             return label
-        hint = "`scenicq match SCENARIO DATASET --all` lists the frames"
-        raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{frame}`", hints=(hint,)))
+        with closing(self.connect()) as connection, self.blamed():
+            name = find_frame(connection, frame)
+        return next(self.labels([name]))
+
+    def short_frames(self) -> Callable[[str], str]:
+        """Cuts names of frames short, as far as `label` still finds them."""
+        with closing(self.connect()) as connection, self.blamed():
+            return shortened(connection)
 
     def labels_at(self, part: int, first: int, end: int, *, motion: bool = True) -> Iterator[Label]:
         """Labels of one part, in order.
@@ -195,15 +203,18 @@ class Dataset:
             raise DataError(problems)
 
 
-def open_dataset(address: str | Path, *, older: bool = False) -> Dataset:
+def open_dataset(address: str | Path, *, older: bool = False, check: bool = True) -> Dataset:
     """Open a dataset.
 
     Args:
         address: A folder, or what fsspec understands, such as `s3://bucket/dataset`.
         older: Whether one of an older version will do, which can only be brought up to date (`rebuild`).
+        check: Whether to read all of it and refuse one that is not sound. Only who knows that it is may do without:
+            what readers do with an unsound one is not defined.
 
     Raises:
         DataError: `store-missing`, `store-version`, or `store-damaged` where a file is missing or has another size;
+            `dataset-invalid` where the tables hold what no dataset may;
             `option-invalid` where a package for the address is not installed.
     """
     place = find_place(address)
@@ -211,7 +222,15 @@ def open_dataset(address: str | Path, *, older: bool = False) -> Dataset:
     problems = place.problems(part for parts in manifest.tables.values() for part in parts)
     if problems:
         raise DataError(problems)
-    return Dataset(place, manifest)
+    dataset = Dataset(place, manifest)
+    if check:
+        try:
+            with dataset.blamed():
+                check_dataset(dataset)
+        except DataError:
+            dataset.verify()  # a file that was damaged since is another matter
+            raise
+    return dataset
 
 
 def _sql_list(texts: Iterable[str]) -> str:

@@ -21,6 +21,8 @@ MANIFEST = "dataset.json"
 """Name of the manifest's file."""
 
 _FORMAT = "scenicq"
+_LARGEST = 1 << 63
+"""What a column of whole numbers holds less than."""
 _PLAIN = re.compile(r"[a-z_]+/[A-Za-z0-9][A-Za-z0-9._-]*\.parquet", re.ASCII)
 """Paths of files: no way out of the dataset, no address, no pattern."""
 
@@ -144,7 +146,7 @@ def read_manifest(name: str, data: bytes, *, older: bool = False) -> Manifest:
         raise DataError(Diagnostic("store-version", message, hints=(hint,)))
     try:
         return _manifest(fields)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise _damaged(path, f"lacks or has an unsound {error}") from error
 
 
@@ -153,23 +155,82 @@ def _damaged(path: str, what: str) -> DataError:
 
 
 def _manifest(content: dict[str, Any]) -> Manifest:
-    tables = {name: tuple(Part(**part) for part in content["tables"][name]) for name in SCHEMAS}
-    for part in (part for parts in tables.values() for part in parts):
-        if not _PLAIN.fullmatch(part.path):
-            raise ValueError(f"path {part.path}")
+    tables = {name: tuple(_part(part) for part in content["tables"][name]) for name in SCHEMAS}
     span = content["span_us"]
     return Manifest(
-        name=content["name"],
-        importer=content["importer"],
+        name=_text(content["name"]),
+        importer=_text(content["importer"]),
         tables=tables,
-        maps=content["maps"],
-        total=Counts(**content["total"]),
-        tracks=content["tracks"],
-        span_us=None if span is None else (span[0], span[1]),
-        by_class=content["by_class"],
-        by_source_class=content["by_source_class"],
-        by_map={name: Counts(**counts) for name, counts in content["by_map"].items()},
-        by_recording={name: Counts(**counts) for name, counts in content["by_recording"].items()},
-        left_out=tuple(LeftOut(**entry) for entry in content["left_out"]),
-        provenance=content["provenance"],
+        maps=_numbers(content["maps"]),
+        total=_counts(content["total"]),
+        tracks=_whole(content["tracks"]),
+        span_us=None if span is None else (_time(span[0]), _time(span[1])),
+        by_class=_numbers(content["by_class"]),
+        by_source_class=_numbers(content["by_source_class"]),
+        by_map={name: _counts(counts) for name, counts in content["by_map"].items()},
+        by_recording={name: _counts(counts) for name, counts in content["by_recording"].items()},
+        left_out=tuple(_left_out(entry) for entry in content["left_out"]),
+        provenance=_provenance(content["provenance"]),
     )
+
+
+def _part(fields: dict[str, Any]) -> Part:
+    part = Part(**fields)
+    if not _PLAIN.fullmatch(part.path):
+        raise ValueError(f"path {part.path}")
+    _whole(part.bytes)
+    _whole(part.rows)
+    _text(part.sha256)
+    return part
+
+
+def _counts(fields: dict[str, Any]) -> Counts:
+    counts = Counts(**fields)
+    _whole(counts.frames)
+    _whole(counts.objects)
+    return counts
+
+
+def _left_out(fields: dict[str, Any]) -> LeftOut:
+    entry = LeftOut(**fields)
+    for text in (entry.what, entry.code, entry.name):
+        _text(text)
+    _whole(entry.count)
+    if not isinstance(entry.kept, bool):  # pyright: ignore[reportUnnecessaryIsInstance] - a stranger's
+        raise ValueError(f"kept: {entry.kept}")
+    return entry
+
+
+def _provenance(value: Any) -> Mapping[str, Any]:
+    """Anything, but that what messages are made of has the form that they need."""
+    given = cast("dict[str, Any]", value)
+    for key in ("source", "time"):
+        _text(given.get(key, ""))
+    for key in ("versions", "facts"):
+        for name, each in (given.get(key) or {}).items():
+            _text(name)
+            if key == "versions":
+                _text(each)
+    return given
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"text: {str(value)[:40]}")
+    return value
+
+
+def _whole(value: Any) -> int:
+    if type(value) is not int or not 0 <= value < _LARGEST:
+        raise ValueError(f"number: {str(value)[:40]}")
+    return value
+
+
+def _time(value: Any) -> int:
+    if type(value) is not int or not -_LARGEST <= value < _LARGEST:
+        raise ValueError(f"time: {str(value)[:40]}")
+    return value
+
+
+def _numbers(value: dict[str, Any]) -> dict[str, int]:
+    return {name: _whole(number) for name, number in value.items()}

@@ -19,14 +19,14 @@ from urllib.parse import unquote, urlsplit
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.manifest import MANIFEST, Part
+from scenicq.store.manifest import MANIFEST, Manifest, Part
 from scenicq.store.read_lock import Reading
 from scenicq.store.remote import RemoteFile, RemoteFolder
 
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which is slow to load
     import duckdb
 
-__all__ = ["LocalFolder", "Place", "StoreFile", "find_place", "open_parquet"]
+__all__ = ["LocalFolder", "Place", "StoreFile", "find_place", "open_parquet", "stamp_of"]
 
 StoreFile = Path | RemoteFile
 """A file of a table."""
@@ -63,6 +63,10 @@ class Place(Protocol):
 
     def checksum(self, part: Part) -> str:
         """SHA-256 of a file, in hexadecimal."""
+        ...
+
+    def stamp(self, parts: Iterable[Part]) -> str:
+        """What changes with any file, as far as the place itself can tell without reading them."""
         ...
 
     def admit(self, connection: duckdb.DuckDBPyConnection, parts: Iterable[Part]) -> None:
@@ -122,6 +126,11 @@ class LocalFolder:
         with (self._root / part.path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
 
+    def stamp(self, parts: Iterable[Part]) -> str:
+        """Identity, size and times of change of every file."""
+        found = [(self._root / part.path).stat() for part in parts]
+        return str([(each.st_ino, each.st_size, each.st_mtime_ns, each.st_ctime_ns) for each in found])
+
     def admit(self, connection: duckdb.DuckDBPyConnection, parts: Iterable[Part]) -> None:
         """Nothing to do: DuckDB knows files."""
 
@@ -152,6 +161,17 @@ def find_place(address: str | Path) -> Place:
     if text.startswith("file://"):
         return LocalFolder.at(Path(unquote(urlsplit(text).path)))
     return RemoteFolder.at(text)
+
+
+def stamp_of(place: Place, manifest: Manifest) -> str:
+    """A text that changes whenever a file of a dataset may have changed.
+
+    Args:
+        place: Of the dataset.
+        manifest: Of the dataset.
+    """
+    every = (part for parts in manifest.tables.values() for part in parts)
+    return hashlib.sha256(place.manifest() + place.stamp(every).encode()).hexdigest()
 
 
 def open_parquet(file: StoreFile, **options: Any) -> Any:

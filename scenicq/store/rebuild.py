@@ -11,22 +11,35 @@ counts come from them. The result is byte for byte that of an ingest.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.columns import MemberColumns, RecordingColumns
 from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Manifest
+from scenicq.store.map_validation import check_regions
+from scenicq.store.row_owners import check_counts
 from scenicq.store.schema import ArrowTable
 from scenicq.store.segment import MapIndexes, SegmentWriter, read_segments
+from scenicq.store.validation import read_sound
 from scenicq.store.writer import DatasetWriter
 
-__all__ = ["rebuild"]
+__all__ = ["rebuild", "recordings_of"]
+
+_PROPERTIES = ("class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy", "track")
+_SOURCES = {
+    "labels": [
+        *("frame", "recording", "timestamp_us", "map", "params"),
+        *("object_count", "first_object", "sensor_count", "first_sensor"),
+        *(f"ego_{name}" for name in (*_PROPERTIES, "attributes")),
+    ],
+    "objects": ["id", *_PROPERTIES, "attributes"],
+    "sensors": ["channel", "path"],
+}
+"""The columns that are not computed."""
 
 
 def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> Manifest:
@@ -37,7 +50,8 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
         progress: Called with the number of frames done since the last call.
 
     Raises:
-        DataError: `store-damaged`, or `target-unwritable`.
+        DataError: `store-damaged`, `dataset-invalid` where labels, objects, sensors or maps are not sound, or
+            `target-unwritable`.
     """
     before = dataset.manifest
     segments = read_segments(dataset.path)
@@ -45,19 +59,18 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
     if labels != before.tables["labels"]:
         message = f"{dataset.path} lacks descriptions of its parts"
         raise DataError(Diagnostic("store-damaged", message, hints=("ingest the source again",)))
+    for each, file in zip(before.tables["regions"], dataset.files("regions"), strict=True):
+        check_regions(read_sound("regions", file, each.path), each.path, before.maps)
     maps = {name: dataset.features(name) for name in before.maps}
     indexes = MapIndexes(maps)
     with DatasetWriter(dataset.path, maps, update=True) as writer:
         try:
             for number, old in segments.items():
-                files = (
-                    dataset.path.resolve() / before.tables[table][number].path
-                    for table in ("labels", "objects", "sensors")
-                )
+                rows = _sources(dataset, number)
                 part = SegmentWriter(writer.folder, number)
                 try:
                     part.open()
-                    for columns in _recordings(*files):
+                    for columns in recordings_of(rows["labels"], rows["objects"], rows["sensors"]):
                         part.add(columns, indexes.of(columns.map))
                         if progress is not None:
                             progress(len(columns.frames))
@@ -72,10 +85,16 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
         )
 
 
-def _recordings(labels: Path, objects: Path, sensors: Path) -> Iterator[RecordingColumns]:
-    """The recordings of a part."""
-    with pq.ParquetFile(labels) as frames, pq.ParquetFile(objects) as members, pq.ParquetFile(sensors) as files:
-        label_rows, object_rows, sensor_rows = frames.read(), members.read(), files.read()
+def recordings_of(
+    label_rows: ArrowTable, object_rows: ArrowTable, sensor_rows: ArrowTable
+) -> Iterator[RecordingColumns]:
+    """The recordings of a part, without what is computed.
+
+    Args:
+        label_rows: Of the table `labels`.
+        object_rows: Of the table `objects`.
+        sensor_rows: Of the table `sensors`.
+    """
     names = label_rows["recording"].to_pylist()
     starts = [row for row, name in enumerate(names) if row == 0 or names[row - 1] != name]
     first_object = first_sensor = 0
@@ -99,6 +118,16 @@ def _recordings(labels: Path, objects: Path, sensors: Path) -> Iterator[Recordin
             channels=channels["channel"].to_pylist(),
             paths=channels["path"].to_pylist(),
         )
+
+
+def _sources(dataset: Dataset, number: int) -> dict[str, ArrowTable]:
+    """The tables of a part that others are computed from, without what is computed in them."""
+    parts = {table: dataset.manifest.tables[table][number] for table in _SOURCES}
+    rows = {
+        table: read_sound(table, dataset.place.file(part), part.path, _SOURCES[table]) for table, part in parts.items()
+    }
+    check_counts(rows, {table: part.path for table, part in parts.items()})
+    return rows
 
 
 def _members(rows: ArrowTable, prefix: str, ids: list[str]) -> MemberColumns:

@@ -188,7 +188,7 @@ class OperatorParser(PrefixParser):
                 return self.prefix_at(level)
             if text in _TEMPORAL and self.is_temporal():
                 return self.temporal_operator()
-            if text == "new" and self.peek().kind == "name" and self.starts_operand(self.index + 1):
+            if text == "new" and self.peek().kind == "name" and self.names_class(self.index + 1):
                 return self.new()
             if text == "initial" and self.peek().text == "scenario":
                 self.advance()
@@ -227,6 +227,8 @@ class OperatorParser(PrefixParser):
         following = self.peek()
         if following.text in CLOSERS:
             return self.temporal and following.text == "("
+        if following.text == "relative" and self.peek(2).text == "to":
+            return False
         return self.starts_operand(self.index + 1) and following.text not in ("-", "+", "*", "~")
 
     def temporal_operator(self) -> ast.Expression:

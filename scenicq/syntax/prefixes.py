@@ -9,11 +9,13 @@ from scenicq.errors import ScenarioError, Source
 from scenicq.syntax import ast
 from scenicq.syntax.precedence import OR, PREFIX
 from scenicq.syntax.specifiers import InstanceParser
-from scenicq.syntax.tokens import CLOSERS, Token
+from scenicq.syntax.tokens import CLOSERS, INFIX_NAMES, Token
 
 __all__ = ["PrefixParser"]
 
 _PARTS = frozenset(("front", "back", "left", "right", "top", "bottom"))
+_AFTER_VISIBLE = INFIX_NAMES | {"(", "[", "{", "+", "-", "~"}
+"""With these an operand starts after `visible`, which is then no name."""
 _MAX_RETRIES = 200_000
 
 
@@ -65,13 +67,17 @@ class PrefixParser(InstanceParser):
                 if following.text == "(":
                     after = min(self.closing(self.index + 1) + 1, len(self.tokens) - 1)
                     return self.tokens[after].text in ("from", "for", ".", "[", "(")
+                if following.text == "relative" and self.peek(2).text == "to":
+                    return False
                 return following.kind == "name" and self.starts_operand(self.index + 1)
             case "visible":
                 if following.text == "not":
                     return self.peek(2).text == "visible" and self.peek(3).text != "from"
                 if following.text == "relative" and self.peek(2).text == "to":
                     return False
-                return following.text == "(" or (following.kind == "name" and self.starts_operand(self.index + 1))
+                if following.text in _AFTER_VISIBLE:
+                    return True
+                return following.kind == "name" and self.starts_operand(self.index + 1)
             case word if word in _PARTS:
                 ahead = 1
                 while ahead < 3 and self.peek(ahead).text in _PARTS:

@@ -49,7 +49,7 @@ class ProgramParser(StatementParser):
         match self.text:
             case "model" if self.takes_name():
                 return self.model()
-            case "param" if self.takes_name() or self.peek().kind == "string":
+            case "param" if self.takes_name() or self.peek().kind == "string" or self.peek(2).text == "=":
                 return self.param()
             case "require" if self.takes_expression():
                 return self.require()

@@ -10,7 +10,7 @@ from scenicq.syntax import ast
 from scenicq.syntax.atoms import AtomParser
 from scenicq.syntax.cursor import similar
 from scenicq.syntax.precedence import POWER
-from scenicq.syntax.tokens import Token
+from scenicq.syntax.tokens import INFIX_NAMES, Token
 
 __all__ = ["InstanceParser"]
 
@@ -95,13 +95,19 @@ class InstanceParser(AtomParser):
         if text == "with":
             return following.kind == "name"
         if text in _ONE_WORD:
-            return self.starts_operand(index + 1)
+            return self.starts_operand(index + 1) or following.text in INFIX_NAMES
         if text in _TWO_WORDS:
             return following.text in _TWO_WORDS[text]
         if text == "not" and following.text == "visible":
             following = self.tokens[index + 2]
             return following.text in _ENDS or not following.text
         return text == "visible" and (following.text in _ENDS or not following.text)
+
+    def names_class(self, index: int) -> bool:
+        """Whether the name after `new` is that of a class, and not an operator after a variable called `new`."""
+        if self.tokens[index].text in INFIX_NAMES:
+            return self.starts_specifier(index + 1)
+        return self.starts_operand(index)
 
     def new(self) -> ast.Expression:
         """Read `new Class specifiers`."""

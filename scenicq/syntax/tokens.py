@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple, TypeAlias
 
-__all__ = ["CLOSERS", "INFIX_WORDS", "KEYWORDS", "Kind", "Token"]
+__all__ = ["CLOSERS", "INFIX_NAMES", "INFIX_WORDS", "KEYWORDS", "Kind", "Token"]
 
 Kind: TypeAlias = Literal["name", "keyword", "number", "string", "operator", "newline", "indent", "dedent", "end"]
 
@@ -54,6 +54,7 @@ KEYWORDS: frozenset[str] = frozenset(
         "lambda",
         "nonlocal",
         "not",
+        "of",
         "or",
         "pass",
         "raise",
@@ -64,7 +65,7 @@ KEYWORDS: frozenset[str] = frozenset(
         "yield",
     ]
 )
-"""Words that can never be names, in Python and in every version of Scenic."""
+"""Words that can never be names: Python's in every version of Scenic, and `of`."""
 
 INFIX_WORDS: frozenset[str] = frozenset(
     [
@@ -90,6 +91,9 @@ INFIX_WORDS: frozenset[str] = frozenset(
     ]
 )
 """Words that continue or end an expression, so that none starts there."""
+
+INFIX_NAMES: frozenset[str] = frozenset(["can", "deg", "implies", "intersects", "offset"])
+"""Those of them that a program may use as names, also where a word before them asks for an operand."""
 
 CLOSERS: dict[str, str] = {"(": ")", "[": "]", "{": "}"}
 """Opening brackets with their closing ones."""

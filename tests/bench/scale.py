@@ -26,7 +26,8 @@ import duckdb
 from clock import Used, run
 from fleet import NEEDLE, Fleet, write_store
 
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.query.prefilter.executor import run_prefilter
 from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS

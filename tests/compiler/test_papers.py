@@ -114,8 +114,8 @@ def test_every_model_has_cars_on_the_road(model: str) -> None:
 
 
 def test_a_library_class_that_no_taxonomy_knows_counts_as_its_base() -> None:
-    text = "model scenic.simulators.carla.model\nego = new Car\nnew ATM\nnew Trash\nnew Bicycle\n"
-    assert [thing.category for thing in compiled(text).objects] == ["Car", "Prop", "Trash", "Bicycle"]
+    text = "model scenic.simulators.carla.model\nego = new NPCCar\nnew PropDebris\nnew ATM\nnew Bicycle\n"
+    assert [thing.category for thing in compiled(text).objects] == ["Car", "Debris", "ATM", "Bicycle"]
     assert compiled("class Rock:\n    pass\nego = new Rock\n").objects[0].category == "Object"
 
 

@@ -17,7 +17,8 @@ from scenicq.errors import ScenarioError, Source
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.smt.solver import Solver
 from scenicq.store.classes import is_class

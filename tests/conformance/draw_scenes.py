@@ -5,8 +5,9 @@ Usage: python draw_scenes.py MAP.xodr OUT
 
 Writes OUT/map.geojson (Scenic's own network of the map, as interchange features), then answers requests, one JSON
 object a line on standard input and standard output: {"text": program, "count": scenes, "seed": number, "seconds":
-limit} with {"scenes": [...]}, each with its objects (the ego first, headings in Scenic's convention) and parameters,
-or with {"error": text} where Scenic refuses the program. No scenes at all means that none was found in time.
+limit}, or "file" with a path in place of the text, with {"scenes": [...]}, each with its objects (the ego first,
+headings in Scenic's convention) and parameters, or with {"error": text} where Scenic refuses the program. No scenes at
+all means that none was found in time.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ from scenic.core.errors import InvalidScenarioError
 from scenic.domains.driving.roads import Network
 
 MOST_ATTEMPTS = 20_000
-MODE = {} if importlib.metadata.version("scenic").startswith("2.") else {"mode2D": True}
+CARLA = "0.9.16"
+"""Its version for the blueprints of objects, where it is not installed: the last that has bicycles."""
+INSTALLED = importlib.metadata.version
+MODE = {} if INSTALLED("scenic").startswith("2.") else {"mode2D": True}
 
 
 def thing(thing: Any) -> dict[str, Any]:
@@ -52,15 +56,23 @@ def plain(scene: Any) -> dict[str, Any]:
     }
 
 
-def draw(text: str, chart: Path, count: int, seed: int, seconds: float) -> dict[str, Any]:
+def compiled(request: dict[str, Any], chart: Path) -> Any:
+    """The program of a request, on the map whatever map it names."""
+    params = {"map": str(chart)}
+    if "file" in request:
+        return scenic.scenarioFromFile(request["file"], params={**params, "carla_map": chart.stem}, **MODE)
+    return scenic.scenarioFromString(request["text"], params=params, **MODE)
+
+
+def draw(request: dict[str, Any], chart: Path) -> dict[str, Any]:
     """Scenes of a program, or why there are none."""
-    random.seed(seed)
-    np.random.seed(seed)
+    random.seed(request["seed"])
+    np.random.seed(request["seed"])
     scenes: list[dict[str, Any]] = []
     try:
-        with patience(seconds):
-            scenario = scenic.scenarioFromString(text, params={"map": str(chart)}, **MODE)
-            while len(scenes) < count:
+        with patience(request["seconds"]):
+            scenario = compiled(request, chart)
+            while len(scenes) < request["count"]:
                 scenes.append(plain(scenario.generate(maxIterations=MOST_ATTEMPTS)[0]))
     except (OutOfPatienceError, RejectionException, InvalidScenarioError) as end:
         return {"scenes": scenes, "ended": f"{type(end).__name__}: {end}"}
@@ -72,14 +84,13 @@ def draw(text: str, chart: Path, count: int, seed: int, seconds: float) -> dict[
 def main(arguments: list[str]) -> None:
     """Write the map, then answer requests."""
     chart, out = Path(arguments[0]), Path(arguments[1])
+    importlib.metadata.version = lambda name: CARLA if name == "carla" else INSTALLED(name)
     Network.fromFile = functools.cache(Network.fromFile)  # one map for all programs
     collection = {"type": "FeatureCollection", "features": features_of(Network.fromFile(str(chart)))}
     (out / "map.geojson").write_text(json.dumps(collection), encoding="utf-8")
     answers, sys.stdout = sys.stdout, sys.stderr  # programs may print
     for line in sys.stdin:
-        request = json.loads(line)
-        answer = draw(request["text"], chart, request["count"], request["seed"], request["seconds"])
-        print(json.dumps(answer), file=answers, flush=True)
+        print(json.dumps(draw(json.loads(line), chart)), file=answers, flush=True)
 
 
 if __name__ == "__main__":

@@ -66,9 +66,19 @@ class Original:
         Raises:
             SystemExit: The process has ended.
         """
+        return self._ask({"text": text, "count": count, "seed": seed, "seconds": seconds})
+
+    def draw_file(self, file: Path, count: int, seed: int, seconds: float) -> dict[str, Any]:
+        """Scenes of a program in a file, which may import others beside it.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        return self._ask({"file": str(file.resolve()), "count": count, "seed": seed, "seconds": seconds})
+
+    def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        request = {"text": text, "count": count, "seed": seed, "seconds": seconds}
         try:
             self._process.stdin.write(json.dumps(request) + "\n")
             self._process.stdin.flush()

@@ -11,7 +11,8 @@ from typing import Any
 from comparing import compiled, label_of
 
 from scenicq.geometry.network import Network
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import Tolerance
 from scenicq.query.prefilter.executor import blocks, candidates, extents, run_prefilter
 from scenicq.query.prefilter.plan import make_plan
 from scenicq.store.dataset import Dataset, open_dataset

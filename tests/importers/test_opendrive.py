@@ -59,7 +59,7 @@ def test_what_the_parser_gives_is_kept_by_content(xodr: Path, tmp_path: Path) ->
     xodr.write_text("<OpenDRIVE/>")
     assert convert_xodr(xodr, tmp_path / "cache", python=python) != made
     assert sorted(path.name for path in xodr.parent.iterdir()) == ["Town.xodr"]
-    assert all(path.suffix == ".geojson" for path in (tmp_path / "cache").iterdir())
+    assert {path.suffix for path in (tmp_path / "cache").iterdir()} == {".geojson", ".sha256"}
 
 
 def test_faults_of_the_child(xodr: Path, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from scenicq.forest import build
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Range
-from scenicq.match.options import Tolerance
+from scenicq.match.tolerance import Tolerance
 
 
 def c(value):

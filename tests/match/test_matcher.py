@@ -15,12 +15,13 @@ from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.decide import linear_program
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import find_candidates
 from scenicq.match.problem.outcome import Undecided
 from scenicq.match.search import group_cache, group_plan
 from scenicq.match.search.arc_consistency import thinned
 from scenicq.match.search.group_plan import relevant_properties
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.answer import Sat, Unsat
 from scenicq.smt.answer import Unknown as NoAnswer

@@ -12,7 +12,8 @@ from scenes import compiled, drawn, label_of
 
 from scenicq.errors import SolverError
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.solver import open_solver
 from scenicq.store.classes import class_matches
@@ -58,6 +59,15 @@ def varied(scenario, seed, rng):
     return replace(label, objects=tuple(things))
 
 
+def scopes(scenario, rng):
+    """Sizes for random objects and classes."""
+    names = ["ego", "Object", *(each.name for each in scenario.objects), *(each.category for each in scenario.objects)]
+    sizes = {"position": (0.001, 0.02, 0.5), "heading": (0.001, 0.1)}
+    rules = {(rng.choice(names), rng.choice(list(sizes))) for _ in range(3)}
+    drawn_sizes = [(scope, name, rng.choice(sizes[name])) for scope, name in sorted(rules)]
+    return replace(EXACT, rules=tuple(drawn_sizes))
+
+
 SMALL = [name for name in PROGRAMS if name not in ("crowd", "row")]
 
 
@@ -66,7 +76,8 @@ def check_against_brute_force(name, seeds, solver):
     for seed in seeds:
         rng = random.Random(f"{name}-{seed}")
         label = varied(scenario, seed, rng)
-        tolerance = rng.choice([Tolerance(), Tolerance(x=0.25, y=0.25, heading=0.087), Tolerance(position=0.5)])
+        scoped = scopes(scenario, rng)
+        tolerance = rng.choice([EXACT, Tolerance(x=0.25, y=0.25, heading=0.087), Tolerance(position=0.5), scoped])
         options = MatchOptions(tolerance=tolerance, timeout_s=5.0)
         expected, allowed = brute_force(scenario, label, solver, options)
         for method in METHODS:

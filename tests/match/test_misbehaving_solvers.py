@@ -60,7 +60,7 @@ def test_frames_that_a_broken_solver_decides_are_as_ever_and_the_others_are_name
     monkeypatch.syspath_prepend(str(HERE))
     monkeypatch.setattr(solver, "PORTABLE", "mixed_checks:check")
     monkeypatch.setattr(pool, "GRACE_S", 0.05)
-    found = verdicts("--solver", "portable", "--timeout", "0.2")
+    found = verdicts("--solver", "portable", "--timeout", "0.5")
     assert found.keys() == honest.keys()
     unknown = {frame: reason_of(row) for frame, row in found.items() if row["verdict"] == "unknown"}
     assert all(found[frame]["verdict"] == honest[frame]["verdict"] for frame in found.keys() - unknown.keys())

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from scenicq.importers.ingest import ingest
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.store.dataset import Dataset, open_dataset

@@ -14,7 +14,8 @@ import pytest
 
 from scenicq.errors import ScenicqError, Source
 from scenicq.importers.ingest import ingest
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import Tolerance
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset

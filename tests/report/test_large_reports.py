@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from scenicq.importers.ingest import ingest
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.report.write import write_report

@@ -4,7 +4,8 @@ import time
 
 import pytest
 
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.report import write
 from scenicq.report.write import write_report

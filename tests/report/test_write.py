@@ -12,7 +12,8 @@ import pytest
 
 from scenicq.errors import DataError, ScenicqError
 from scenicq.importers.ingest import ingest
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query, QueryOptions, read_program

@@ -26,7 +26,8 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="locks and limits of 
 READER = """
 import json, sys, time
 from pathlib import Path
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.store.dataset import open_dataset
 

@@ -34,7 +34,7 @@ def test_computed_columns_are_computed_from_the_rest(tmp_path: Path) -> None:
     shutil.copytree(tmp_path / "good", tmp_path / "d")
     memberships = next((tmp_path / "d" / "memberships").iterdir())
     memberships.write_bytes(b"x" * memberships.stat().st_size)
-    rebuild(open_dataset(tmp_path / "d"))
+    rebuild(open_dataset(tmp_path / "d", check=False))
     assert contents(tmp_path / "d") == contents(tmp_path / "good")
 
 

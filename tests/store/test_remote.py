@@ -13,7 +13,8 @@ import duckdb
 import pytest
 
 from scenicq.errors import DataError
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.store import remote

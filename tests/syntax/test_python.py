@@ -152,7 +152,7 @@ def test_a_block_that_ends_with_the_text() -> None:
 
 
 def test_soft_words_are_names_where_they_start_nothing() -> None:
-    words = "at by visible position road model param require mutate new following facing on offset of to take do wait"
+    words = "at by visible position road model param require mutate new following facing on offset to take do wait"
     words += " record terminate setup compose distance angle front left follow deg can until behavior monitor abort"
     for word in words.split():
         assert shape(statement(f"{word} = 1")) == f"Assign([{word}], 1)"

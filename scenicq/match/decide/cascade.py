@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import cast
 
+from scenicq.budget import look
 from scenicq.forest import build
 from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.condition import condition
@@ -35,12 +36,12 @@ from scenicq.forest.walk import deciding_first, leaves, postorder
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.match.linear.affine_forms import AffineVector, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
-from scenicq.match.linear.linear_program import LINEAR_SLACK, Row
+from scenicq.match.linear.linear_program import Row
 from scenicq.match.linear.linear_relaxation import NotLinear, inside, position_boxes, solve_affine
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned, fact
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["decide"]
 
@@ -84,6 +85,7 @@ class _Cascade:
             given: Values chosen so far.
             rows: Facts that came with cells chosen so far.
         """
+        look()
         open_items: list[Item] = []
         for item in items:
             if not isinstance(item[1], Constant):
@@ -152,18 +154,18 @@ class _Cascade:
     def _invert(self, item: Item) -> Reach:
         constraint, node, observed = item
         assert isinstance(constraint, Comparison)
+        margin = self.tolerance.of(constraint.object, constraint.property)
         variables = {leaf.identity: leaf for leaf in leaves(node)}
         if isinstance(observed, tuple):
             form = affine_vector(node)
             if form is None or constraint.property != "position":
                 return Reach(None, {})
-            return reach_position(form, variables, observed, self.tolerance)
+            return reach_position(form, variables, observed, margin)
         scalar = affine_scalar(node)
         if scalar is None or not isinstance(observed, float):
             return Reach(None, {})
-        if constraint.property == "heading":
-            return reach_heading(scalar, variables, observed, self.tolerance.heading)
-        return reach_number(scalar, variables, observed, self.tolerance.other)
+        reach = reach_heading if margin.kind == "arc" else reach_number
+        return reach(scalar, variables, observed, margin.size)
 
     def _try_cells(
         self, items: list[Item], field: DirectionAt, given: dict[Identity, Value], rows: list[Row]
@@ -224,7 +226,7 @@ class _Cascade:
 
     def _confirmed(self, items: list[Item], outcome: Outcome) -> bool:
         """Whether a witness found in a cell that covers too much holds where the field is asked itself."""
-        return isinstance(outcome, Satisfied) and replay(items, outcome.values, self.tolerance, LINEAR_SLACK)
+        return isinstance(outcome, Satisfied) and replay(items, outcome.values, self.tolerance, SLACK)
 
     def _refine(
         self,
@@ -267,7 +269,7 @@ class _Cascade:
         if found is None:
             return Refuted(constraint)
         values = given | found
-        holding = replay(items, values, self.tolerance, LINEAR_SLACK)
+        holding = replay(items, values, self.tolerance, SLACK)
         return Satisfied(values) if holding else Undecided(constraint, "nonlinear")
 
 

@@ -25,14 +25,13 @@ from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.proximity import meets
 from scenicq.geometry.regions import Region
 from scenicq.match.linear.linear_relaxation import position_boxes
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned, fact
+from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["Picked", "picked"]
 
 _MOST = 16
 """Regions that are tried one by one."""
-_MARGIN = 1e-6
 """Metres by which boxes are grown, so that rounding loses nothing."""
 
 
@@ -91,10 +90,10 @@ def _near(regions: tuple[Value, ...], box: Box) -> list[int]:
     """The numbers of the regions that meet a box."""
     (x0, x1), (y0, y1) = box
     west, south, east, north = _extents(regions).T
-    touching = (west <= x1 + _MARGIN) & (east >= x0 - _MARGIN) & (south <= y1 + _MARGIN) & (north >= y0 - _MARGIN)
+    touching = (west <= x1 + SLACK) & (east >= x0 - SLACK) & (south <= y1 + SLACK) & (north >= y0 - SLACK)
     if x0 > x1 or y0 > y1:
         return []
-    around = shapes.box(x0 - _MARGIN, y0 - _MARGIN, x1 + _MARGIN, y1 + _MARGIN)
+    around = shapes.box(x0 - SLACK, y0 - SLACK, x1 + SLACK, y1 + SLACK)
     numbers: list[int] = np.nonzero(touching)[0].tolist()
     return [number for number in numbers if meets(cast(Region, regions[number]), around) is not False]
 

@@ -46,15 +46,13 @@ from scenicq.match.decide.compiled_expressions import (
     truth,
     turned,
 )
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.evaluation import unlike
 from scenicq.match.problem.map_lookups import XY, Disc, MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied
+from scenicq.match.tolerance import SLACK, Margin, Tolerance
 
 __all__ = ["Certified", "ClosedForm", "closed_form_of"]
 
-_MARGIN = 1e-7
-"""Metres or radians from a boundary within which nothing is decided here."""
 _MOST_CHOICES = 8
 
 Certified: TypeAlias = "tuple[Sequence[bool], Mapping[Identity, Column | Sequence[Value]]]"
@@ -137,22 +135,21 @@ def _place(item: Comparison) -> ClosedForm | None:
     @_decided
     def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: MapLookups) -> Outcome | None:
         (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, "position"))
-        off = math.hypot(x - px, y - py)
-        if off > tolerance.reach + _MARGIN and math.isfinite(off):
+        off, margin = math.hypot(x - px, y - py), tolerance.of(index, "position")
+        if off > margin.reach + SLACK and math.isfinite(off):
             return Refuted(item, unlike("position", (x, y), (px, py)))
-        return yes if off <= _surely(tolerance) else None
+        return yes if off <= _surely(margin) else None
 
     def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: MapLookups) -> Certified:
         (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, "position"))
-        return _close(x - px, y - py, tolerance), {}
+        return _close(x - px, y - py, tolerance.of(index, "position")), {}
 
     return ClosedForm(decide, satisfied=satisfied)
 
 
-def _surely(tolerance: Tolerance) -> float:
-    """How far off a position is within tolerance whatever the direction."""
-    sure = tolerance.position if tolerance.x is None or tolerance.y is None else min(tolerance.x, tolerance.y)
-    return max(0.0, sure - _MARGIN)
+def _surely(margin: Margin) -> float:
+    """How far off a value is within tolerance whatever the direction."""
+    return max(0.0, margin.sure - SLACK)
 
 
 def _point(item: Comparison, node: PointIn) -> ClosedForm | None:
@@ -161,7 +158,7 @@ def _point(item: Comparison, node: PointIn) -> ClosedForm | None:
     region, index = cast(Region, node.region.value), item.object
 
     def is_in(place: XY, disc: Disc | None, places: MapLookups) -> bool:
-        if disc is not None and math.dist(place, disc[0]) > disc[1] - _MARGIN:
+        if disc is not None and math.dist(place, disc[0]) > disc[1] - SLACK:
             return False
         return places.within(region, place)
 
@@ -182,27 +179,27 @@ def _pairs(get: Columns, index: int) -> list[XY]:
     return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def _misses(tolerance: Tolerance, sides: tuple[float, float, float, float], turn: float) -> bool:
+def _misses(margin: Margin, sides: tuple[float, float, float, float], turn: float) -> bool:
     """Whether a box along the map's axes around an observed position surely misses a rectangle.
 
     Args:
-        tolerance: Its `x` and `y` are half the box; else nothing is said.
+        margin: A box; else nothing is said.
         sides: Of the rectangle, from the observed position, in a frame of its own: west, east, south, north.
         turn: The angle of that frame.
     """
-    if tolerance.x is None or tolerance.y is None or not all(map(math.isfinite, sides)):
+    if margin.kind != "box" or not all(map(math.isfinite, sides)):
         return False
     c, s = math.cos(turn), math.sin(turn)
     west, east, south, north = sides
     corners = [(u * c - v * s, u * s + v * c) for u in (west, east) for v in (south, north)]
-    across, along = abs(c) * tolerance.x + abs(s) * tolerance.y, abs(s) * tolerance.x + abs(c) * tolerance.y
+    across, along = abs(c) * margin.size + abs(s) * margin.y, abs(s) * margin.size + abs(c) * margin.y
     gaps = (
         max(west, -east) - across,
         max(south, -north) - along,
-        max(min(p for p, _ in corners), -max(p for p, _ in corners)) - tolerance.x,
-        max(min(q for _, q in corners), -max(q for _, q in corners)) - tolerance.y,
+        max(min(p for p, _ in corners), -max(p for p, _ in corners)) - margin.size,
+        max(min(q for _, q in corners), -max(q for _, q in corners)) - margin.y,
     )
-    return max(gaps) > _MARGIN
+    return max(gaps) > SLACK
 
 
 def _offset(item: Comparison) -> ClosedForm | None:
@@ -248,25 +245,25 @@ def _offset(item: Comparison) -> ClosedForm | None:
     @_decided
     def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: MapLookups) -> Outcome | None:
         (px, py), (a, b), (u, v), turn = seen(get)
-        off = math.hypot(u - px, v - py)
-        if off > tolerance.reach + _MARGIN and math.isfinite(off):
+        off, margin = math.hypot(u - px, v - py), tolerance.of(index, "position")
+        if off > margin.reach + SLACK and math.isfinite(off):
             return no
-        if not off <= _surely(tolerance):
+        if not off <= _surely(margin):
             sides = a + x.low - px, a + x.high - px, b + y.low - py, b + y.high - py
-            return narrow if _misses(tolerance, sides, turn) else None
+            return narrow if _misses(margin, sides, turn) else None
         return Satisfied({**spread(x, u - a), **spread(y, v - b)})
 
     def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: MapLookups) -> Certified:
         (px, py), (a, b), (u, v), _ = seen(get)
         values = {**spread(x, u - a), **spread(y, v - b)}
-        return _close(u - px, v - py, tolerance), cast("Mapping[Identity, Column]", values)
+        return _close(u - px, v - py, tolerance.of(index, "position")), cast("Mapping[Identity, Column]", values)
 
     return ClosedForm(decide, narrow=narrow, satisfied=satisfied)
 
 
-def _close(x: float, y: float, tolerance: Tolerance) -> list[bool]:
+def _close(x: float, y: float, margin: Margin) -> list[bool]:
     """Whether positions that are off by columns are surely within tolerance."""
-    sure = _surely(tolerance)
+    sure = _surely(margin)
     offs = zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True)
     return [math.hypot(*off) <= sure for off in offs]
 
@@ -303,7 +300,7 @@ def _heading(item: Comparison) -> ClosedForm | None:
             allowed = places.allowed(flow, cast(XY, get(where, "position")))
             if not allowed:
                 return None
-        clear = True
+        clear, margin = True, tolerance.of(index, "heading")
         for chosen, form in ways:
             if form.unbounded:
                 return Satisfied({**chosen, **spread(form, seen - form.known(get) - allowed[0])})
@@ -312,9 +309,9 @@ def _heading(item: Comparison) -> ClosedForm | None:
             for direction in allowed:
                 off = math.remainder(rest - direction, math.tau)
                 beyond = abs(off) - half
-                if beyond <= max(0.0, tolerance.heading - _MARGIN):
+                if beyond <= _surely(margin):
                     return Satisfied({**chosen, **spread(form, middle + min(max(off, -half), half))})
-                clear = clear and beyond > tolerance.heading + _MARGIN
+                clear = clear and beyond > margin.reach + SLACK
         if not clear:
             return None
         return Refuted(item, unlike("heading", ways[0][1].known(get) + allowed[0], seen)) if known_first else no
@@ -326,7 +323,7 @@ def _heading(item: Comparison) -> ClosedForm | None:
 
     def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: MapLookups) -> Certified:
         seen = cast(Column, get(index, "heading"))
-        sure = max(0.0, tolerance.heading - _MARGIN)
+        sure = _surely(tolerance.of(index, "heading"))
         plain = [(0.0,)] * get.size
         directions = plain if flow is None else [places.allowed(flow, place) for place in _pairs(get, where)]
         offs: list[float] = []

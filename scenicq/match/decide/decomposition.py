@@ -17,11 +17,10 @@ from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.case_split import Picked, picked
 from scenicq.match.fields.field_solver import decide_directions
 from scenicq.match.linear.affine_reach import ends
-from scenicq.match.linear.linear_program import LINEAR_SLACK
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["decide_decomposed"]
 
@@ -82,7 +81,7 @@ def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance) -
             values.update(outcome.values)
     if doubt is not None:
         return doubt
-    return Satisfied(values) if replay(items, values, tolerance, LINEAR_SLACK) else Undecided(items[0][0], "nonlinear")
+    return Satisfied(values) if replay(items, values, tolerance, SLACK) else Undecided(items[0][0], "nonlinear")
 
 
 def _any(cases: Sequence[Picked], items: list[Item], tolerance: Tolerance) -> Outcome:
@@ -93,7 +92,7 @@ def _any(cases: Sequence[Picked], items: list[Item], tolerance: Tolerance) -> Ou
         outcome = decide_decomposed(case.items, tolerance)
         if isinstance(outcome, Satisfied):
             values = {**case.given, **outcome.values}
-            if replay(items, values, tolerance, LINEAR_SLACK):
+            if replay(items, values, tolerance, SLACK):
                 return Satisfied(values)
         if not isinstance(outcome, Refuted):
             blamed = Undecided(first, "nonlinear")
@@ -179,7 +178,7 @@ class _Sharing:
             outcome = decide_decomposed(part, self.tolerance)
             if isinstance(outcome, Refuted):
                 return outcome
-            tight = decide_decomposed(part, _scaled(self.tolerance, _TIGHT))
+            tight = decide_decomposed(part, self.tolerance.scaled(_TIGHT))
             witness = tight if isinstance(tight, Satisfied) else outcome
             value = witness.values.get(self.identity) if isinstance(witness, Satisfied) else None
             if isinstance(value, float):
@@ -200,7 +199,7 @@ class _Sharing:
         if not isinstance(outcome, Satisfied):
             return None
         values = given | dict(outcome.values)
-        return Satisfied(values) if replay(self.items, values, self.tolerance, LINEAR_SLACK) else None
+        return Satisfied(values) if replay(self.items, values, self.tolerance, SLACK) else None
 
     def _halved(self) -> Outcome:
         """The range of the shared number halved again and again, without what some part excludes."""
@@ -231,17 +230,3 @@ def _candidates(wanted: Sequence[float]) -> Iterator[float]:
         yield sum(wanted) / len(wanted)
         yield (min(wanted) + max(wanted)) / 2
         yield from wanted
-
-
-def _scaled(tolerance: Tolerance, factor: float) -> Tolerance:
-    def times(value: float | None) -> float | None:
-        return None if value is None else value * factor
-
-    return replace(
-        tolerance,
-        x=times(tolerance.x),
-        y=times(tolerance.y),
-        position=tolerance.position * factor,
-        heading=tolerance.heading * factor,
-        other=tolerance.other * factor,
-    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from scenicq.budget import waiting
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.match.fields.field_solver import repaired
 from scenicq.match.options import MatchOptions
@@ -56,7 +57,8 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
         if attempt == 1:
             # what was left out to keep the question small may be what the witness breaks
             encoding = encoded(items, options)
-        answer = check_by_cases(solver, encoding.problem, precision=precision, timeout_s=options.timeout_s)
+        with waiting(options.timeout_s) as left_s:
+            answer = check_by_cases(solver, encoding.problem, precision=precision, timeout_s=left_s)
         match answer:
             case Unsat():
                 return Refuted(blame)
@@ -77,13 +79,11 @@ def target_of(constraint: Constraint, options: MatchOptions) -> Target:
     """How a constraint's expression is compared with the label."""
     if not isinstance(constraint, Comparison):
         return Target(None, 0.0, 0.0)
-    tolerance = options.tolerance
-    match constraint.property:
-        case "position" if tolerance.x is not None and tolerance.y is not None:
-            return Target("box", tolerance.x, tolerance.y)
-        case "position":
-            return Target("disc", tolerance.position, 0.0)
-        case "heading":
-            return Target("angle", tolerance.heading, 0.0)
-        case _:
-            return Target("disc", tolerance.other, 0.0)
+    margin = options.tolerance.of(constraint.object, constraint.property)
+    match margin.kind:
+        case "box":
+            return Target("box", margin.size, margin.y)
+        case "arc":
+            return Target("angle", margin.size, 0.0)
+        case "disc" | "interval":
+            return Target("disc", margin.size, 0.0)

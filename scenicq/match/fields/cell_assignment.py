@@ -22,12 +22,12 @@ from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.linear.affine_forms import Affine, AffineVector, affine_scalar, affine_vector
-from scenicq.match.linear.linear_program import LINEAR_SLACK, Row
+from scenicq.match.linear.linear_program import Row
 from scenicq.match.linear.linear_relaxation import Alternative, NotLinear, extent_affine, inside, solve_affine
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.problem.evaluation import holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["MARGIN", "SAME", "HeadingAssignment", "extent", "solved", "way_of"]
 
@@ -92,7 +92,7 @@ def solved(
             return Refuted(items[0][0]) if way.exact and not strict else open_ended
         values.update(found)
         values.update(known)
-        if replay(items, values, tolerance, LINEAR_SLACK, way.headings):
+        if replay(items, values, tolerance, SLACK, way.headings):
             return Satisfied(values)
     return open_ended
 

@@ -12,13 +12,10 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node
 from scenicq.forest.walk import is_leaf, postorder
 from scenicq.match.fields.interval_domain import Enclosure
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
+from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["SLACK", "Tape"]
-
-SLACK = 1e-6
-"""Metres or radians by which bounds are grown, so that rounding loses nothing."""
+__all__ = ["Tape"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +43,12 @@ class Tape:
     @cached_property
     def headings(self) -> dict[int, Enclosure]:
         """Where headings are that the label observes, up to whole turns; by the id of the node."""
-        allowed = self.tolerance.heading + SLACK
-        return {
-            id(node): np.array([[seen - allowed], [seen + allowed]])
-            for constraint, node, seen in self.items
-            if isinstance(constraint, Comparison) and constraint.property == "heading" and isinstance(seen, float)
-        }
+        found: dict[int, Enclosure] = {}
+        for constraint, node, seen in self.items:
+            if isinstance(constraint, Comparison) and constraint.property == "heading" and isinstance(seen, float):
+                allowed = self.tolerance.of(constraint.object, "heading").size + SLACK
+                found[id(node)] = np.array([[seen - allowed], [seen + allowed]])
+        return found
 
     @cached_property
     def choices(self) -> list[Index | DirectionAt]:

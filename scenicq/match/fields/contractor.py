@@ -41,7 +41,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import is_leaf
-from scenicq.match.fields.constraint_network import SLACK, Tape
+from scenicq.match.fields.constraint_network import Tape
 from scenicq.match.fields.interval_affine import Multiples, interval_affine_of, solved
 from scenicq.match.fields.interval_domain import (
     Enclosure,
@@ -59,6 +59,7 @@ from scenicq.match.fields.interval_domain import (
     turns_near,
 )
 from scenicq.match.problem.conditioned import Item
+from scenicq.match.tolerance import SLACK
 
 __all__ = ["BoxSet"]
 
@@ -288,16 +289,14 @@ class BoxSet:
         if not isinstance(constraint, Comparison):
             self._hold(node)
         elif isinstance(seen, tuple) and constraint.property == "position":
-            tolerance = self.tape.tolerance
-            a, b = tolerance.x, tolerance.y
-            if a is None or b is None:
-                a = b = tolerance.position
-            off = np.array([[[-a - SLACK], [a + SLACK]], [[-b - SLACK], [b + SLACK]]])
+            margin = self.tape.tolerance.of(constraint.object, "position")
+            a, b = margin.size + SLACK, margin.y + SLACK
+            off = np.array([[[-a], [a]], [[-b], [b]]])
             self._meet(node, np.array(seen, dtype=float)[:, None, None] + off)
         elif id(node) in self.tape.headings:
             self._meet(node, turns_near(self.tape.headings[id(node)], self._scalar(node)))
         elif isinstance(seen, float):
-            allowed = self.tape.tolerance.other + SLACK
+            allowed = self.tape.tolerance.of(constraint.object, constraint.property).size + SLACK
             self._meet(node, np.array([[seen - allowed], [seen + allowed]]))
 
     def _hold(self, node: Node) -> None:

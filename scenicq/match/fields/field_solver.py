@@ -24,10 +24,10 @@ from scenicq.match.fields.constraint_network import Tape
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.heading_propagation import LimitError, directed, halved, settled
 from scenicq.match.fields.shared_variable import find_shared_value, joined
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.problem.evaluation import holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import Tolerance
 
 __all__ = ["decide_directions", "repaired"]
 

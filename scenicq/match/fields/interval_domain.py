@@ -16,6 +16,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.match.tolerance import ROUNDING
+
 __all__ = [
     "Enclosure",
     "angle_of",
@@ -34,8 +36,6 @@ __all__ = [
 ]
 
 Enclosure: TypeAlias = NDArray[np.float64]
-_ROUNDING = 1e-9
-"""By how much two intervals may miss each other and still meet."""
 
 
 def everything(like: Enclosure) -> Enclosure:
@@ -70,7 +70,7 @@ def times(a: Enclosure, b: Enclosure) -> Enclosure:
 
 def divide(a: Enclosure, b: Enclosure) -> Enclosure:
     """The quotient; everything where the divisor may be close to zero."""
-    vague = (b[..., 0, :] <= _ROUNDING) & (b[..., 1, :] >= -_ROUNDING)
+    vague = (b[..., 0, :] <= ROUNDING) & (b[..., 1, :] >= -ROUNDING)
     safe = np.where(vague[..., None, :], 1.0, b)
     found = times(a, 1.0 / safe[..., ::-1, :])
     return np.where(vague[..., None, :], everything(found), found)
@@ -83,7 +83,7 @@ def common(a: Enclosure, b: Enclosure) -> Enclosure:
     found[..., 0, :], found[..., 1, :] = low, high
     crossed = low > high
     if crossed.any():
-        swap = crossed & (low <= high + _ROUNDING)
+        swap = crossed & (low <= high + ROUNDING)
         found[..., 0, :][swap], found[..., 1, :][swap] = high[swap], low[swap]
     return found
 
@@ -144,8 +144,8 @@ def turns_near(a: Enclosure, within: Enclosure) -> Enclosure:
     """The hull of angles plus whole turns, as far as they meet intervals; what cannot be told stays as it is."""
     vague = ~(np.isfinite(a).all(axis=0) & np.isfinite(within).all(axis=0))
     a, safe = np.where(vague, 0.0, a), np.where(vague, 0.0, within)
-    first = np.ceil((safe[0] - a[1]) / math.tau - _ROUNDING)
-    last = np.floor((safe[1] - a[0]) / math.tau + _ROUNDING)
+    first = np.ceil((safe[0] - a[1]) / math.tau - ROUNDING)
+    last = np.floor((safe[1] - a[0]) / math.tau + ROUNDING)
     found = np.where(last < first, [[np.inf], [-np.inf]], a + math.tau * np.stack([first, last]))
     return np.where(vague, within, found)
 

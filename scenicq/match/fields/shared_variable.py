@@ -13,16 +13,14 @@ from dataclasses import dataclass, replace
 from scenicq.forest.bounds import Interval
 from scenicq.forest.nodes import Identity, Value
 from scenicq.match.fields.cell_assignment import HeadingAssignment, extent, solved
-from scenicq.match.linear.linear_program import LINEAR_SLACK
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import ROUNDING, SLACK, Tolerance
 
 __all__ = ["find_shared_value", "joined"]
 
 _MOST_VALUES = 256
 """Values that are tried."""
-_ROUNDING = 1e-9
 _FINEST = 1e-7
 """Width of an interval that is not divided any more."""
 
@@ -37,7 +35,7 @@ class _Stretch:
     tight: bool = False
 
     def holds(self, value: float) -> bool:
-        return self.low - _ROUNDING <= value <= self.high + _ROUNDING
+        return self.low - ROUNDING <= value <= self.high + ROUNDING
 
 
 def find_shared_value(
@@ -105,7 +103,7 @@ def _common(parts: Sequence[Sequence[_Stretch]]) -> list[Interval]:
         own = joined([(stretch.low, stretch.high) for stretch in stretches])
         if common is not None:
             pairs = [(max(a, c), min(b, d)) for a, b in common for c, d in own]
-            own = [(min(low, high), max(low, high)) for low, high in pairs if low <= high + _ROUNDING]
+            own = [(min(low, high), max(low, high)) for low, high in pairs if low <= high + ROUNDING]
         common = own
     return common or []
 
@@ -155,5 +153,5 @@ def _all(
         headings |= way.headings
     values[shared] = value
     items = [item for _, way in found for item in way.case.tape.items]
-    good = replay(items, values, tolerance, LINEAR_SLACK, headings)
+    good = replay(items, values, tolerance, SLACK, headings)
     return Satisfied(values) if good else Undecided(items[0][0], "nonlinear")

@@ -22,10 +22,9 @@ from scenicq.forest.nodes import Constant, Identity, Leaf, Normal, PointIn, Rang
 from scenicq.geometry.proximity import meets, witness_point
 from scenicq.geometry.regions import Region
 from scenicq.match.linear.affine_forms import Affine, AffineVector, Variable
-from scenicq.match.options import Tolerance
-from scenicq.match.problem.evaluation import ROUNDING
+from scenicq.match.tolerance import ROUNDING, Margin
 
-__all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position", "tolerance_shape"]
+__all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position"]
 
 _MOST_CORNERS = 6
 """Random offsets of one position whose box is taken corner by corner."""
@@ -134,19 +133,8 @@ def reach_heading(form: Affine, leaves: Mapping[Identity, Leaf], observed: float
     return _NO
 
 
-def tolerance_shape(observed: tuple[float, float], tolerance: Tolerance) -> tuple[shapely.Geometry, float]:
-    """The label's position grown by its tolerance: a shape and a radius around it."""
-    x, y = observed
-    if tolerance.x is None or tolerance.y is None:
-        return shapely.Point(x, y), tolerance.position
-    if tolerance.x == 0 or tolerance.y == 0:
-        ends_ = (x - tolerance.x, y - tolerance.y), (x + tolerance.x, y + tolerance.y)
-        return (shapely.Point(x, y) if ends_[0] == ends_[1] else shapely.LineString(ends_)), 0.0
-    return shapely.box(x - tolerance.x, y - tolerance.y, x + tolerance.x, y + tolerance.y), 0.0
-
-
 def reach_position(
-    form: AffineVector, leaves: Mapping[Identity, Leaf], observed: tuple[float, float], tolerance: Tolerance
+    form: AffineVector, leaves: Mapping[Identity, Leaf], observed: tuple[float, float], margin: Margin
 ) -> Reach:
     """Whether a position within tolerance of the observed one is reached."""
     variables = dict.fromkeys((*form[0].terms, *form[1].terms))
@@ -154,16 +142,16 @@ def reach_position(
     scalars = [variable for variable in variables if variable[0] not in points]
     limits = [ends(leaves[identity]) for identity, _ in scalars]
     if not points:
-        limits = _cut(form, scalars, limits, observed, tolerance)
+        limits = _cut(form, scalars, limits, observed, margin)
     bounded = [pair for pair in limits if pair is not None and all(map(math.isfinite, pair)) and pair[0] <= pair[1]]
     if len(points) > 1 or len(bounded) != len(limits) or len(bounded) > _MOST_CORNERS:
         return _OPEN
     corners = list(itertools.product(*bounded))
     if points:
         (point,) = points
-        return _from_region(form, cast(PointIn, leaves[point]), scalars, corners, observed, tolerance)
+        return _from_region(form, cast(PointIn, leaves[point]), scalars, corners, observed, margin)
     places = np.array([_offset(form, scalars, corner) for corner in corners])
-    shape, radius = tolerance_shape(observed, tolerance)
+    shape, radius = margin.around(observed)
     hull = shapely.MultiPoint(places).convex_hull
     if shapely.distance(hull, shape) > radius + ROUNDING:
         return _NO
@@ -176,13 +164,13 @@ def _cut(
     scalars: list[Variable],
     limits: list[tuple[float, float] | None],
     observed: tuple[float, float],
-    tolerance: Tolerance,
+    margin: Margin,
 ) -> list[tuple[float, float] | None]:
     """The limits, a single infinite one cut to where it can lead to the observed position."""
     free = [number for number, pair in enumerate(limits) if pair is not None and not all(map(math.isfinite, pair))]
     if len(free) != 1 or None in limits:
         return limits
-    reach = math.hypot(form[0].constant - observed[0], form[1].constant - observed[1]) + tolerance.reach + 1.0
+    reach = math.hypot(form[0].constant - observed[0], form[1].constant - observed[1]) + margin.reach + 1.0
     steps = [math.hypot(*(part.terms.get(variable, 0.0) for part in form)) for variable in scalars]
     for number, pair in enumerate(limits):
         if number not in free and pair is not None:
@@ -204,7 +192,7 @@ def _from_region(
     scalars: list[Variable],
     corners: list[tuple[float, ...]],
     observed: tuple[float, float],
-    tolerance: Tolerance,
+    margin: Margin,
 ) -> Reach:
     """A point of a region, moved by a similarity and random offsets: bring the label back into the region's frame."""
     if not isinstance(leaf.region, Constant):
@@ -214,7 +202,7 @@ def _from_region(
     size = math.sqrt(abs(float(np.linalg.det(matrix))))
     if size == 0 or not np.allclose(matrix @ matrix.T, size * size * np.eye(2), rtol=1e-12, atol=1e-12):
         return _OPEN
-    shape, radius = tolerance_shape(observed, tolerance)
+    shape, radius = margin.around(observed)
     around = np.array(shapely.get_coordinates(shape))
     back = np.linalg.inv(matrix)
     offsets = np.array([_offset(form, scalars, corner) for corner in corners])

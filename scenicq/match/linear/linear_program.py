@@ -10,10 +10,7 @@ from typing import Any
 
 from scenicq.match.linear.affine_forms import Affine, Variable
 
-__all__ = ["LINEAR_SLACK", "LinearSystem", "NotSolved", "Row"]
-
-LINEAR_SLACK = 1e-6
-"""Metres or radians that the witness of a linear program may be off."""
+__all__ = ["LinearSystem", "NotSolved", "Row"]
 
 
 class NotSolved(Exception):

@@ -40,8 +40,8 @@ from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet,
 from scenicq.match.linear.affine_forms import Affine, AffineVector, Variable, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.linear.linear_program import LinearSystem, NotSolved, Row
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
+from scenicq.match.tolerance import ROUNDING, SLACK, Tolerance
 
 __all__ = ["Alternative", "NotLinear", "extent_affine", "inside", "position_boxes", "solve_affine"]
 
@@ -50,8 +50,6 @@ _SIDES = 32
 _MOST_CELLS = 2000
 _MOST_EXTENTS = 16
 """Combinations of alternatives of which the ends of a number are looked for."""
-_CULLING = 1e-6
-"""Metres by which boxes are grown so that rounding loses nothing."""
 
 Alternative = list[list[Row]]
 """Sets of linear facts, one of which holds."""
@@ -71,11 +69,11 @@ def position_boxes(items: Sequence[Item], tolerance: Tolerance, rows: Sequence[R
         tolerance: Per feature.
         rows: Linear facts that hold besides: those about one coordinate alone count.
     """
-    reach = tolerance.reach + _CULLING
     targets: list[tuple[Node, Box]] = []
     for constraint, node, observed in items:
         if isinstance(constraint, Comparison) and constraint.property == "position":
             x, y = cast("tuple[float, float]", observed)
+            reach = tolerance.of(constraint.object, "position").reach + SLACK
             targets.append((node, ((x - reach, x + reach), (y - reach, y + reach))))
         elif not isinstance(constraint, Comparison):
             targets += close_boxes(node)
@@ -94,7 +92,7 @@ def _narrow(boxes: dict[Identity, Box], row: Row) -> None:
     ends = sorted(((limit - row.form.constant) / factor) for limit in (row.low, row.high))
     limits = list(boxes.get(identity, ((-math.inf, math.inf), (-math.inf, math.inf))))
     low, high = limits[axis]
-    limits[axis] = (max(low, ends[0] - _CULLING), min(high, ends[1] + _CULLING))
+    limits[axis] = (max(low, ends[0] - SLACK), min(high, ends[1] + SLACK))
     boxes[identity] = (limits[0], limits[1])
 
 
@@ -199,26 +197,27 @@ class _Problem:
         if form is None:
             raise NotLinear
         x, y = (part.plus(Affine(value, {}), -1.0) for part, value in zip(form, observed, strict=True))
-        tolerance = self.tolerance
-        if constraint.property == "position" and tolerance.x is not None and tolerance.y is not None:
-            self.system.rows += [Row(x, -tolerance.x, tolerance.x), Row(y, -tolerance.y, tolerance.y)]
+        margin = self.tolerance.of(constraint.object, constraint.property)
+        if margin.kind == "box":
+            self.system.rows += [Row(x, -margin.size, margin.size), Row(y, -margin.y, margin.y)]
         else:
-            self.discs.append((x, y, tolerance.position if constraint.property == "position" else tolerance.other))
+            self.discs.append((x, y, margin.size))
 
     def _add_number(self, constraint: Comparison, node: Node, observed: Value) -> None:
         form = affine_scalar(node)
         if form is None or not isinstance(observed, float):
             raise NotLinear
         off = form.plus(Affine(observed, {}), -1.0)
-        if constraint.property != "heading":
-            self.system.rows.append(Row(off, -self.tolerance.other, self.tolerance.other))
+        margin = self.tolerance.of(constraint.object, constraint.property)
+        allowed = margin.size
+        if margin.kind != "arc":
+            self.system.rows.append(Row(off, -allowed, allowed))
             return
         low, high = scalar_bounds(node)
-        allowed = self.tolerance.heading
         if not (math.isfinite(low) and math.isfinite(high)):
             raise NotLinear
-        first = math.ceil((low - observed - allowed) / math.tau - 1e-9)
-        last = math.floor((high - observed + allowed) / math.tau + 1e-9)
+        first = math.ceil((low - observed - allowed) / math.tau - ROUNDING)
+        last = math.floor((high - observed + allowed) / math.tau + ROUNDING)
         turns = range(first, last + 1)
         self.alternatives.append([[Row(off, math.tau * k - allowed, math.tau * k + allowed)] for k in turns])
 

@@ -12,47 +12,16 @@ from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, Undefined, Value
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.geometry.angles import distance
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.tolerance import ROUNDING, Tolerance
 
-__all__ = ["ROUNDING", "agrees", "ground_cause", "holds", "replay", "show_value", "unlike"]
-
-ROUNDING = 1e-9
-"""Metres or radians that floating point may be off."""
-
-
-def agrees(property_: str, value: Value, observed: Value, tolerance: Tolerance, slack: float = ROUNDING) -> bool:
-    """Whether a value of a feature equals what the label observes, within the feature's tolerance.
-
-    Args:
-        property_: The feature's property.
-        value: What the scenario gives.
-        observed: The label's value.
-        tolerance: How far they may be apart.
-        slack: What is allowed beyond that.
-    """
-    if isinstance(value, Undefined):
-        return False
-    if isinstance(value, tuple) and isinstance(observed, tuple):
-        dx, dy = value[0] - observed[0], value[1] - observed[1]
-        if property_ != "position":
-            return math.hypot(dx, dy) <= tolerance.other + slack
-        if tolerance.x is not None and tolerance.y is not None:
-            return abs(dx) <= tolerance.x + slack and abs(dy) <= tolerance.y + slack
-        return math.hypot(dx, dy) <= tolerance.position + slack
-    if isinstance(value, bool) or isinstance(observed, bool):
-        return value == observed
-    if isinstance(value, float) and isinstance(observed, float):
-        if property_ == "heading":
-            return distance(value, observed) <= tolerance.heading + slack
-        return abs(value - observed) <= tolerance.other + slack
-    return value == observed
+__all__ = ["ground_cause", "holds", "replay", "show_value", "unlike"]
 
 
 def holds(constraint: Constraint, value: Value, observed: Value, tolerance: Tolerance, slack: float = ROUNDING) -> bool:
     """Whether a constraint is satisfied by the value of its expression; `observed` is a comparison's label value."""
     if isinstance(constraint, Comparison):
-        return agrees(constraint.property, value, observed, tolerance, slack)
+        return tolerance.of(constraint.object, constraint.property).allows(value, observed, slack)
     return not isinstance(value, Undefined) and bool(value)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from scenicq.compiler.free_places import choose_elements
+from scenicq.compiler.step_counts import choose_steps
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import simplify
 
@@ -19,4 +20,4 @@ def ready(scenario: Scenario) -> Scenario:
     """
     if scenario.as_written is not None:
         return scenario
-    return replace(simplify(choose_elements(scenario)), as_written=scenario)
+    return replace(simplify(choose_elements(choose_steps(scenario))), as_written=scenario)

@@ -13,6 +13,7 @@ from scenicq.forest.groups import PARAMS, Comparison, Group
 from scenicq.forest.nodes import Arithmetic, Compare, Constant, Coordinate, Feature, Identity, Index, Logic, Node
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.match.tolerance import Tolerance
 
 __all__ = ["Shape", "interchangeable", "shape_of"]
 
@@ -32,8 +33,8 @@ class Shape:
     symmetric: bool = False
 
 
-def shape_of(group: Group, ego: int) -> Shape:
-    """The shape of a group; the ego plays itself in every group."""
+def shape_of(group: Group, ego: int, tolerance: Tolerance) -> Shape:
+    """The shape of a group; the ego plays itself in every group, and what is compared more or less strictly differs."""
     roles: dict[int, int] = {}
     leaves: dict[Identity, int] = {}
     numbers: dict[int, int] = {}
@@ -67,7 +68,11 @@ def shape_of(group: Group, ego: int) -> Shape:
         rows.append(row(node))
     heads: list[Hashable] = []
     for item in group.constraints:
-        about = (role(item.object), item.property) if isinstance(item, Comparison) else None
+        about = (
+            (role(item.object), item.property, tolerance.scope(item.object, item.property))
+            if isinstance(item, Comparison)
+            else None
+        )
         heads.append((about, numbers[id(item.expression)]))
     symmetric = all(
         not isinstance(item, Comparison) and item.requirement.built_in is BuiltIn.COLLISION

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Value
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.candidates import Cast
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.match.search.interval_relaxation import possible
+from scenicq.match.tolerance import Tolerance
 
 __all__ = ["thinned"]
 

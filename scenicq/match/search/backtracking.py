@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
+from scenicq.budget import look
 from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import BipartiteMatching, Slot
 
@@ -127,6 +128,7 @@ def find_assignments(
             if twin is not None and twin in assignment and candidate <= assignment[twin]:
                 frame.blamed.add(twin)
                 continue
+            look()
             budget -= 1
             if budget < 0:
                 raise Exhausted

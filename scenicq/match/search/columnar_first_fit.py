@@ -19,13 +19,13 @@ from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.match.decide.closed_form import Certified
 from scenicq.match.decide.compiled_expressions import Column, Columns, Get, UnclearError
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.map_lookups import Disc, MapLookups
 from scenicq.match.problem.observation import observe
 from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.search.first_fit import FirstFit
 from scenicq.match.search.group_plan import GroupPlan
+from scenicq.match.tolerance import Tolerance
 from scenicq.store.labels import Label, LabelObject
 
 __all__ = ["Assignment", "ColumnarFirstFit", "firsts", "together"]

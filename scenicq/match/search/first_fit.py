@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from scenicq.budget import look
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.compiled_expressions import UnclearError
@@ -147,6 +148,7 @@ class Casting:
         while tries:
             index, groups = due[len(tries) - 1]
             for number in tries[-1]:
+                look()
                 self.assignment.pop(index, None)
                 if number in self.assignment.values():
                     continue

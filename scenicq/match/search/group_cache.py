@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from scenicq.budget import TimeIsUp, look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Value
@@ -85,6 +86,7 @@ class GroupCache:
 
     def _by_ladder(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
         try:
+            look()
             items = self.items(group, assignment)
             if self.options.method == "smt":
                 return self.ask([items])
@@ -92,6 +94,8 @@ class GroupCache:
             return self.ask([items]) if isinstance(outcome, Undecided) else outcome
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")
+        except TimeIsUp:
+            return Undecided(group.constraints[0], "timeout")
 
 
 def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:

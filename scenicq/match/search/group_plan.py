@@ -91,18 +91,18 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
     Args:
         scenario: The scenario.
         signature: What is observed.
-        options: Which built-in requirements are in force, which parameters are ignored.
+        options: Which built-in requirements are in force, which parameters are ignored, the scopes of the tolerance.
         kinds: Numbers of shapes, extended as new ones are met.
     """
     shapes: list[Shape] = []
     groups: list[GroupPlan] = []
     links: dict[int, set[int]] = {}
     for group in build_groups(scenario, signature, options):
-        shape = shape_of(group, scenario.ego)
+        shape = shape_of(group, scenario.ego, options.tolerance)
         shapes.append(shape)
         parts: list[GroupPlan] = []
         for part in parts_of(group, scenario.ego):
-            small = shape_of(part, scenario.ego)
+            small = shape_of(part, scenario.ego, options.tolerance)
             number = kinds.setdefault(small.key, len(kinds))
             parts.append(GroupPlan(part, number, small.roles, closed_form_of(part)))
         number = kinds.setdefault(shape.key, len(kinds))

@@ -17,9 +17,10 @@ import numpy as np
 
 from scenicq.forest.bounds import EVERYTHING
 from scenicq.forest.nodes import ArithmeticOp
+from scenicq.match.tolerance import SLACK
 
 __all__ = [
-    "SLACK", "Array", "Span", "add", "arithmetic", "is_exact", "is_point", "largest", "least", "most", "multiply",
+    "Array", "Span", "add", "arithmetic", "is_exact", "is_point", "largest", "least", "most", "multiply",
     "nearest", "rotated",
 ]  # fmt: skip
 
@@ -27,9 +28,6 @@ Array: TypeAlias = Any
 """A float, or an array of floats that broadcasts with the others."""
 Span: TypeAlias = tuple[Array, Array]
 """Lower and upper bounds."""
-
-SLACK = 1e-6
-"""Metres or radians by which rounding may put a value outside of its interval."""
 
 
 def is_exact(span: Any) -> bool:

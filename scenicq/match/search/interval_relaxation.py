@@ -52,7 +52,6 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children, postorder
-from scenicq.match.options import Tolerance
 from scenicq.match.search.interval_arrays import (
     SLACK,
     Array,
@@ -67,6 +66,7 @@ from scenicq.match.search.interval_arrays import (
     nearest,
     rotated,
 )
+from scenicq.match.tolerance import Tolerance
 
 __all__ = ["Observed", "Steps", "possible", "steps_of"]
 
@@ -124,16 +124,17 @@ def _reachable(evaluation: _Evaluation, item: Comparison, tolerance: Tolerance) 
     value = evaluation.known[id(item.expression)]
     if value is None or isinstance(value, _Bool):
         return True
+    margin = tolerance.of(item.object, item.property)
     if isinstance(seen, tuple):
         if item.property != "position" or not _is_pair(value):
             return True
-        return evaluation.meets(item.expression, cast("tuple[Array, Array]", seen), tolerance.reach + SLACK)
+        return evaluation.meets(item.expression, cast("tuple[Array, Array]", seen), margin.reach + SLACK)
     if _is_pair(value):
         return True
     low, high = value
-    if item.property != "heading":
-        return (low - tolerance.other - SLACK <= seen) & (seen <= high + tolerance.other + SLACK)
-    allowed = tolerance.heading + SLACK
+    allowed = margin.size + SLACK
+    if margin.kind != "arc":
+        return (low - allowed <= seen) & (seen <= high + allowed)
     width = high - low + 2 * allowed
     return ~np.isfinite(width) | (np.mod(seen - low + allowed, math.tau) <= width)
 

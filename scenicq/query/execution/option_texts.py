@@ -7,7 +7,8 @@ from typing import Any, Literal, TypedDict, Unpack
 from scenicq.compiler.temporal import Behaviors
 from scenicq.errors import DataError, Diagnostic
 from scenicq.forest.scenario import BuiltIn
-from scenicq.match.options import MatchOptions, Method, parse_tolerance
+from scenicq.match.options import MatchOptions, Method
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import QueryOptions
 from scenicq.store.classes import Granularity
 from scenicq.temporal.intervals import DEFAULT_GAP_S, IntervalOptions

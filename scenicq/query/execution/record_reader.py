@@ -10,7 +10,8 @@ from typing import Any, cast
 
 from scenicq.errors import DataError, Diagnostic, Source, Span
 from scenicq.forest.scenario import BuiltIn
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.partitions import fingerprint
 from scenicq.query.execution.results import IntervalSpan, Result
@@ -52,7 +53,7 @@ def _verdict(record: Mapping[str, Any], source: Source) -> Verdict:
 
 def _span(place: str, source: Source) -> Span | None:
     name, *numbers = place.rsplit(":", 2)
-    if name != source.name or len(numbers) != 2:
+    if name != source.file_name or len(numbers) != 2:
         return None
     line, column = map(int, numbers)
     start = source.line_starts[line - 1] + column - 1
@@ -117,8 +118,9 @@ def _file(folder: Path, question: str) -> Path:
 def _options(fields: dict[str, Any]) -> QueryOptions:
     match: dict[str, Any] = fields.pop("match")
     tolerance, enforce, ignored = (match.pop(name) for name in ("tolerance", "enforce", "ignore_params"))
+    rules = tuple([(scope, name, size) for scope, name, size in tolerance["rules"]])
     options = MatchOptions(
-        tolerance=Tolerance(**tolerance),
+        tolerance=Tolerance(**tolerance | {"rules": rules, "scopes": ()}),
         enforce=frozenset(map(BuiltIn, enforce)),
         ignore_params=frozenset(ignored),
         **match,

@@ -456,7 +456,7 @@ def _start_worker(
     dataset: str, source: Source, options: QueryOptions, file: Path | None
 ) -> Callable[[Block, Callable[[object], None]], Decided]:
     """What a worker process keeps between blocks."""
-    decider = Query(open_dataset(dataset), source, options, file=file).decider(threads=1)
+    decider = Query(open_dataset(dataset, check=False), source, options, file=file).decider(threads=1)
 
     def work(block: Block, _tell: Callable[[object], None]) -> Decided:
         decided = decider.decide(block)

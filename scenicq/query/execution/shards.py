@@ -72,7 +72,7 @@ class Question:
         Raises:
             DataError: store-missing, or store-damaged where the dataset is not the one that was asked about.
         """
-        dataset = open_dataset(self.dataset)
+        dataset = open_dataset(self.dataset, check=False)
         if fingerprint(dataset, self.source.text, self.options) != self.fingerprint:
             message = f"{self.dataset} has changed since the query began, or is another one where it is read"
             raise DataError(Diagnostic("store-damaged", message, hints=("run the query again",)))

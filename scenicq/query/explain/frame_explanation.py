@@ -20,13 +20,16 @@ from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
 from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
-from scenicq.query.explain.nearest_miss import Closest, closest, show_tolerance
+from scenicq.query.explain.margins import Margin, margins
+from scenicq.query.explain.nearest_miss import Closest, closest, separated, show_tolerance
 from scenicq.query.explain.violations import Violation, violations
 from scenicq.smt.encode import UnsupportedError
 from scenicq.smt.smtlib import to_smtlib
 from scenicq.store.labels import Label
 
 __all__ = ["Explanation", "Formula", "Proof", "explain", "show_explanation"]
+
+_WIDEST = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +62,7 @@ class Explanation:
         verdict: The verdict.
         correspondence: The one that matches, else the one that comes closest, else a partial one.
         proofs: The values that prove a match, in the order of the program.
+        margins: What a match shows of each feature and requirement, in the order of the program.
         violations: What the closest correspondence breaks, the first to be blamed first.
         closest: The smallest tolerance under which the frame would match; None if it matches, or if none would do.
         formulas: The groups under that correspondence.
@@ -68,6 +72,7 @@ class Explanation:
     verdict: Verdict
     correspondence: Mapping[str, str]
     proofs: tuple[Proof, ...] = ()
+    margins: tuple[Margin, ...] = ()
     violations: tuple[Violation, ...] = ()
     closest: Closest | None = None
     formulas: tuple[Formula, ...] = ()
@@ -83,16 +88,21 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
     """
     finding = matcher.examine(label)
     if isinstance(finding.verdict, Match):
+        assert finding.attempt is not None
+        assert finding.plan is not None
         return Explanation(
             label.frame,
             finding.verdict,
             finding.verdict.correspondence,
             _proofs(finding),
+            margins(matcher, finding.attempt, finding.plan, finding.assignment),
             formulas=_formulas(matcher, finding) if formulas else (),
         )
     nearest = closest(matcher, label)
     if nearest is None or not isinstance(nearest.finding.verdict, Match):
         return _without_match(matcher, label, finding, formulas=formulas)
+    nearest = separated(matcher, label, nearest)
+    assert isinstance(nearest.finding.verdict, Match)
     found = replace(nearest.finding, attempt=_again(matcher, nearest.finding))
     return Explanation(
         label.frame,
@@ -199,25 +209,51 @@ def show_explanation(explanation: Explanation) -> str:
     lines += [f"{kind}: {', '.join(f'{name} = {thing}' for name, thing in explanation.correspondence.items())}"]
     if explanation.proofs:
         lines += ["", "it matches with these values:", *_show_proofs(explanation.proofs)]
+    if explanation.margins:
+        lines += ["", "what the label shows:", *_show_margins(explanation.margins)]
     for violation in explanation.violations:
         lines += ["", _show_violation(violation)]
     if explanation.closest is not None:
-        lines += ["", f"it would match with --tolerance {show_tolerance(explanation.closest.tolerance)}"]
+        lines += ["", *_show_advice(explanation.closest)]
     elif not isinstance(verdict, Match):
         lines += ["", "no tolerance would make it match"]
     return "\n".join(lines)
 
 
+def _show_advice(nearest: Closest) -> list[str]:
+    alone = [f"--tolerance {show_tolerance(each)}" for each in nearest.alone]
+    if len(alone) == 1:
+        return [f"it would match with {alone[0]}"]
+    if alone:
+        return ["it would match with any one of these:", *(f"  {each}" for each in alone)]
+    told = f"it would match with --tolerance {show_tolerance(nearest.tolerance)}"
+    return [told, "  (no part of it is enough alone; of all that are, it has the least widest part, 20 deg being 1 m)"]
+
+
 def _show_proofs(proofs: Sequence[Proof]) -> list[str]:
-    rows: list[tuple[str, str, str]] = []
+    rows: list[tuple[str, ...]] = []
     for proof in proofs:
         value = proof.value
         shown = f"({value[0]:z.2f}, {value[1]:z.2f})" if isinstance(value, tuple) else f"{value:z.4g}"
         place = proof.span.place if proof.span else ""
         text = " ".join(proof.span.text.split()) if proof.span else ""
-        rows.append((place, text if len(text) <= 60 else f"{text[:57]}...", shown))
-    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
-    return [f"  {place:{widths[0]}}  {text:{widths[1]}}  {shown}" for place, text, shown in rows]
+        rows.append((place, _short(text), shown))
+    return _aligned(rows)
+
+
+def _show_margins(told: Sequence[Margin]) -> list[str]:
+    return _aligned([(_short(each.what), each.value, each.allowed, each.spare) for each in told])
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _WIDEST else f"{text[: _WIDEST - 3]}..."
+
+
+def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return [
+        "  " + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
 
 
 def _show_violation(violation: Violation) -> str:

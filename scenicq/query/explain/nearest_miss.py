@@ -1,36 +1,40 @@
-"""How far a frame is from matching: the smallest tolerance under which it would, and the frames that come closest.
+"""How far a frame is from matching: the least tolerance under which it would, and the frames that come closest.
 
-A tolerance is *widened by s metres* if its position part grows by s, its heading part by s times 20 degrees (the ratio
-of the query paper's experiments, 0.25 m and 5 degrees), and the part for other numbers by s of their own unit. All
-parts grow together, so what matches at one s matches at every larger one, and bisection finds the smallest.
+A part of a tolerance (of positions, headings, speeds ...) is *widened by s metres* if it grows by s, a heading by s
+times 20 degrees (the ratio of the query paper's experiments, 0.25 m and 5 degrees), any other number by s of its own
+unit. A frame's distance from matching is the least s by which all parts must be widened together: what matches at one s
+matches at every larger one, and bisection finds it. It is the least *widest* part of any tolerance under which the
+frame matches. Of what is advised, each part is then made as small as it can be; and each part that is enough alone is
+named with what it needs.
 """
 
 from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
-from itertools import islice
+from functools import partial
 
-from scenicq.errors import ScenarioError
+from scenicq.forest.groups import Comparison
 from scenicq.match.matcher import Finding, Matcher
-from scenicq.match.options import Tolerance
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch
+from scenicq.query.execution.block_matcher import CompiledMap
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.prefilter.executor import names, run_prefilter
-from scenicq.query.prefilter.plan import Plan, make_plan
+from scenicq.query.prefilter.plan import make_plan
 from scenicq.store.labels import Label
 
-__all__ = ["Closest", "closest", "nearest_misses", "show_tolerance", "widened"]
+__all__ = ["Closest", "closest", "nearest_misses", "separated", "show_tolerance", "widened"]
 
 MOST_M = 100.0
 """Metres beyond which a tolerance is not widened."""
 FINEST_M = 1e-3
-"""Metres to which the smallest tolerance is found."""
+"""Metres to which the least tolerance is found."""
 MOST_FRAMES = 5000
 """Frames that a ranking looks at."""
 
@@ -42,41 +46,60 @@ _BATCH = 256
 
 @dataclass(frozen=True, slots=True)
 class Closest:
-    """The smallest widening under which a label matches.
+    """The least widening under which a label matches.
 
     Attributes:
         widening_m: Metres, found to within `FINEST_M` or a hundredth of it; 0 if the label matches as it is.
         tolerance: The widened tolerance.
         finding: The match under it.
+        alone: Tolerances of which only one part is widened, and that is enough; the one that is widened least first.
     """
 
     widening_m: float
     tolerance: Tolerance
     finding: Finding
+    alone: tuple[Tolerance, ...] = ()
 
 
 def widened(tolerance: Tolerance, widening_m: float) -> Tolerance:
     """A tolerance widened by so many metres, in the sense of this module."""
+    return tolerance.widened(widening_m, widening_m * _HEADING_PER_M)
+
+
+def _with_parts(tolerance: Tolerance, parts: Mapping[str, float]) -> Tolerance:
+    """A tolerance of which some parts are widened, each by so many metres.
+
+    Args:
+        tolerance: The tolerance.
+        parts: "position", "heading" or another property, with its widening.
+    """
+
+    def size(name: str, old: float) -> float:
+        part = "position" if name in ("x", "y") else name
+        by_m = parts.get(part, 0.0)
+        return min(math.pi, old + by_m * _HEADING_PER_M) if part == "heading" else old + by_m
+
+    ruled = {name for scope, name, _ in tolerance.rules if not scope}
+    others = [name for name, by_m in parts.items() if by_m and name not in ("position", "heading", *ruled)]
     return replace(
         tolerance,
-        x=None if tolerance.x is None else tolerance.x + widening_m,
-        y=None if tolerance.y is None else tolerance.y + widening_m,
-        position=tolerance.position + widening_m,
-        heading=min(math.pi, tolerance.heading + widening_m * _HEADING_PER_M),
-        other=tolerance.other + widening_m,
+        x=None if tolerance.x is None else size("x", tolerance.x),
+        y=None if tolerance.y is None else size("y", tolerance.y),
+        position=size("position", tolerance.position),
+        heading=size("heading", tolerance.heading),
+        rules=(
+            *((scope, name, size(name, old)) for scope, name, old in tolerance.rules),
+            *(("", name, size(name, tolerance.other)) for name in others),
+        ),
     )
 
 
 def show_tolerance(tolerance: Tolerance) -> str:
-    """A tolerance as the option takes it, rounded up so that it is not too small."""
-
-    def up(value: float, digits: int) -> str:
-        return f"{math.ceil(value * 10**digits - 1e-9) / 10**digits:g}"
-
-    heading = f"heading={up(min(180.0, math.degrees(tolerance.heading)), 2)}deg"
-    if tolerance.x is not None and tolerance.y is not None:
-        return f"x={up(tolerance.x, 3)},y={up(tolerance.y, 3)},{heading}"
-    return f"position={up(tolerance.position, 3)},{heading}"
+    """A tolerance as the option takes it, without what has its default."""
+    items = str(tolerance).split(",")
+    usual = str(Tolerance()).split(",")
+    told = [item for item in items if item not in usual]
+    return ",".join(told if told and "=" in items[0] else items)
 
 
 def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest | None:
@@ -121,35 +144,106 @@ def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest |
     return best
 
 
-def _candidates(query: Query, most_frames: int) -> Iterator[tuple[Matcher, Label]]:
-    """The labels that can match under the widest tolerance, with the matcher of their map."""
-    left = most_frames
-    options = query.options
-    wide = replace(options.match, tolerance=widened(options.match.tolerance, MOST_M))
-    with LazySolver(options.solver) as solver:
-        for name in query.dataset.maps:
-            try:
-                scenario, network = query.compile(name)
-            except ScenarioError as error:
-                if error.diagnostics[0].code == "map-lacks":
-                    continue
-                raise
-            matcher = Matcher(scenario, options.match, solver)
-            frames = list(islice(_frames(query, make_plan(scenario, network, wide)), left))
-            left -= len(frames)
-            for start in range(0, len(frames), _BATCH):
-                for label in query.dataset.labels(frames[start : start + _BATCH]):
-                    yield matcher, label
+def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
+    """What is advised for a label: no part wider than it must be, and the parts that are enough alone.
+
+    Args:
+        matcher: The matcher.
+        label: The label.
+        found: As `closest` gives it for them.
+    """
+    if found.widening_m == 0 or found.finding.plan is None:
+        return found
+    base = replace(matcher.options, timeout_s=min(matcher.options.timeout_s, _TIMEOUT_S))
+    constraints = (each for group in found.finding.plan.groups for each in group.group.constraints)
+    compared = dict.fromkeys(each.property for each in constraints if isinstance(each, Comparison))
+
+    def at(parts: Mapping[str, float]) -> Finding | None:
+        options = replace(base, tolerance=_with_parts(base.tolerance, parts))
+        finding = matcher.relaxed(options).examine(label)
+        return finding if isinstance(finding.verdict, Match) else None
+
+    alone: list[tuple[float, Tolerance]] = []
+    for part in compared:
+        # widened alone, a part must be at least as wide as all together
+        sizes = [found.widening_m, *(size for size in _LADDER_M if size > found.widening_m)]
+        reached = next((place for place, size in enumerate(sizes) if at({part: size})), None)
+        if reached is not None:
+            low = sizes[reached - 1] if reached else max(0.0, 0.98 * found.widening_m - FINEST_M)
+            least = _least(partial(_enough, at, part, {}), low, sizes[reached])
+            alone.append((least, _with_parts(base.tolerance, {part: least})))
+    if alone:
+        alone.sort(key=lambda each: each[0])
+        return replace(found, alone=tuple(tolerance for _, tolerance in alone))
+    parts = dict.fromkeys(compared, found.widening_m)
+    for part in compared:
+        rest = {name: size for name, size in parts.items() if name != part}
+        if at(rest):
+            parts = rest
+        else:
+            needed = partial(_enough, at, part, rest)
+            parts[part] = _least(needed, 0.0, parts[part])
+    finding = at(parts)
+    if finding is None:
+        return found
+    return replace(found, tolerance=_with_parts(base.tolerance, parts), finding=finding)
 
 
-def _frames(query: Query, plan: Plan) -> Iterator[str]:
-    """The frames that a prefilter leaves."""
+def _enough(
+    at: Callable[[Mapping[str, float]], Finding | None], part: str, rest: Mapping[str, float], size: float
+) -> bool:
+    """Whether a size of one part is enough beside the rest."""
+    return at({**rest, part: size}) is not None
+
+
+def _least(enough: Callable[[float], bool], low: float, high: float) -> float:
+    """The least number that is enough, known to lie between two, up to a millimetre."""
+    while high - low > FINEST_M:
+        middle = (low + high) / 2
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return high
+
+
+def _frames(query: Query, world: CompiledMap, widening_m: float) -> Iterator[tuple[int, str]]:
+    """The frames that the prefilter of a widened tolerance leaves, each with its number on the map."""
+    options = replace(query.options.match, tolerance=widened(query.options.match.tolerance, widening_m))
+    plan = make_plan(world.scenario, world.network, options)
+    number = 0
     with closing(query.dataset.connect()) as connection:
         for block in query.blocks(plan.map):
             missed = run_prefilter(query.dataset, connection, plan, block).tolist()
             if min(missed, default=0) < 0:
                 rows = zip(names(query.dataset, connection, block), missed, strict=True)
-                yield from (frame for (frame, _, _), number in rows if number < 0)
+                for place, ((frame, _, _), step) in enumerate(rows, number):
+                    if step < 0:
+                        yield place, frame
+            number += len(missed)
+
+
+@dataclass(slots=True)
+class _Ranking:
+    """The frames that come closest so far.
+
+    Attributes:
+        count: How many there shall be.
+        heap: The farthest first: its negative distance and place in the store, and what is needed to tell of it.
+    """
+
+    count: int
+    heap: list[tuple[float, tuple[int, int], Matcher, Label, Closest]]
+
+    @property
+    def bound(self) -> float:
+        """Metres beyond which a frame does not matter."""
+        return MOST_M if len(self.heap) < self.count else -self.heap[0][0]
+
+    def add(self, found: Closest, place: tuple[int, int], matcher: Matcher, label: Label) -> None:
+        """Take a frame in, in place of the farthest one."""
+        entry = (-found.widening_m, (-place[0], -place[1]), matcher, label, found)
+        if len(self.heap) < self.count:
+            heapq.heappush(self.heap, entry)
+        elif found.widening_m < self.bound:
+            heapq.heapreplace(self.heap, entry)
 
 
 def nearest_misses(
@@ -161,32 +255,46 @@ def nearest_misses(
 ) -> list[Result]:
     """The frames that do not match but come closest, the closest first; ties in the order of the store.
 
-    A frame that is no closer than the worst of the list costs two decisions, the others a bisection. The cause of each
-    result is the tolerance under which it would match, its correspondence the one by which it then does.
+    The prefilter says under ever wider tolerances which frames may match at all: those that it leaves first are looked
+    at first, and the others only where they can still be among the closest. A frame that is no closer than the worst of
+    the list costs two decisions, the others a bisection. The cause of each result is the tolerance under which it would
+    match, its correspondence the one by which it then does.
 
     Args:
         query: The query.
         count: How many.
-        most_frames: Frames to look at: those of the right classes, in the order of the store.
+        most_frames: Frames to look at.
         progress: Called with 1 for each frame looked at.
     """
-    heap: list[tuple[float, int, Result]] = []
-    for number, (matcher, label) in enumerate(_candidates(query, most_frames)):
-        if progress is not None:
-            progress(1)
-        bound = MOST_M if len(heap) < count else -heap[0][0]
-        found = closest(matcher, label, bound)
-        if found is None or found.widening_m == 0 or not isinstance(found.finding.verdict, Match):
-            continue
-        cause = Cause("tolerance", f"would match with {show_tolerance(found.tolerance)}")
-        verdict = NoMatch(cause, found.finding.verdict.correspondence)
-        entry = (
-            -found.widening_m,
-            -number,
-            Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors),
-        )
-        if len(heap) < count:
-            heapq.heappush(heap, entry)
-        elif found.widening_m < bound:
-            heapq.heapreplace(heap, entry)
-    return [result for _, _, result in sorted(heap, key=lambda each: (-each[0], -each[1]))]
+    ranking = _Ranking(count, [])
+    left = most_frames
+    seen: set[str] = set()
+    with LazySolver(query.options.solver) as solver:
+        worlds = [(world, Matcher(world.scenario, query.options.match, solver)) for world in query.fitting()]
+        nearer = 0.0
+        for widening_m in _LADDER_M:
+            if len(ranking.heap) >= count and ranking.bound <= nearer:
+                break
+            for map_number, (world, matcher) in enumerate(worlds):
+                fresh = [each for each in _frames(query, world, widening_m) if each[1] not in seen][:left]
+                left -= len(fresh)
+                for start in range(0, len(fresh), _BATCH):
+                    places = {frame: place for place, frame in fresh[start : start + _BATCH]}
+                    seen.update(places)
+                    for label in query.dataset.labels(places):
+                        found = closest(matcher, label, ranking.bound)
+                        if found is not None and found.widening_m > 0:
+                            ranking.add(found, (map_number, places[label.frame]), matcher, label)
+                        if progress is not None:
+                            progress(1)
+            nearer = widening_m
+        nearest = sorted(ranking.heap, key=lambda each: (-each[0], (-each[1][0], -each[1][1])))
+        return [_result(matcher, label, found) for _, _, matcher, label, found in nearest]
+
+
+def _result(matcher: Matcher, label: Label, found: Closest) -> Result:
+    advice = separated(matcher, label, found)
+    assert isinstance(advice.finding.verdict, Match)
+    told = " or ".join(map(show_tolerance, advice.alone or (advice.tolerance,)))
+    verdict = NoMatch(Cause("tolerance", f"would match with {told}"), advice.finding.verdict.correspondence)
+    return Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors)

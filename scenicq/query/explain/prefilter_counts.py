@@ -13,7 +13,7 @@ from scenicq.query.execution.run import Query
 from scenicq.query.prefilter.executor import Block, run_prefilter
 from scenicq.query.prefilter.plan import Plan
 
-__all__ = ["PrefilterCounts", "prefilter_counts"]
+__all__ = ["PrefilterCounts", "prefilter_counts", "spots"]
 
 _SPOTS, _SPOT_FRAMES = 8, 256
 """The sample: so many runs of so many frames, evenly over the dataset."""
@@ -46,13 +46,13 @@ def prefilter_counts(query: Query) -> Iterator[PrefilterCounts]:
     with closing(query.dataset.connect()) as connection:
         for plan in query.plans():
             blocks = query.blocks(plan.map)
-            sampled = _missed(query, connection, plan, _spots(blocks))
+            sampled = _missed(query, connection, plan, spots(blocks))
             counted = _missed(query, connection, plan, blocks)
             share = sum(counted) / max(1, sum(sampled))
             yield PrefilterCounts(plan, tuple(round(share * n) for n in _left(sampled)), tuple(_left(counted)))
 
 
-def _spots(blocks: list[Block]) -> Iterator[Block]:
+def spots(blocks: list[Block]) -> Iterator[Block]:
     """Short runs of frames, evenly over the blocks."""
     count = min(_SPOTS, len(blocks)) if len(blocks) > 1 else 1
     each = max(1, _SPOTS // count)

@@ -11,23 +11,25 @@ from scenicq.errors import Span
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.condition import condition
-from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
-from scenicq.forest.nodes import Compare, Constant, Index, Node, PointIn, Undefined, Value
-from scenicq.forest.walk import features, leaves
+from scenicq.forest.groups import Comparison, Condition, Group
+from scenicq.forest.nodes import Constant, Encloses, Index, Node, PointIn, Undefined, Value
+from scenicq.forest.walk import leaves
 from scenicq.geometry.angles import normalize
 from scenicq.match.decide.cascade import decide
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.constraints import describe_constraint
 from scenicq.match.problem.evaluation import show_value
 from scenicq.match.problem.outcome import Refuted, Satisfied
 from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.tolerance import Tolerance
+from scenicq.query.explain.sides import sides
 
-__all__ = ["Violation", "choices", "violations"]
+__all__ = ["Violation", "allowed_values", "choices", "distance_off", "violations"]
 
 _FAR_M = 1000.0
 _STEPS = 40
+_FINEST = 1e-4
 _MOST_CHOICES = 16
 _MOST_INTERVALS = 4
 
@@ -80,38 +82,46 @@ def _violation(matcher: Matcher, attempt: LabelSearch, item: Item, assignment: M
 
 
 def _sides(attempt: LabelSearch, item: Item, assignment: Mapping[int, int]) -> str:
-    """The two sides of a comparison that does not hold, where the label determines them."""
+    """What keeps a requirement from holding, where the label determines it."""
     constraint, node, _ = item
     assert isinstance(constraint, Condition)
     if isinstance(node, Constant) and isinstance(node.value, Undefined):
         return node.value.reason
-    expression = constraint.expression
-    if not isinstance(expression, Compare):
-        return ""
-    sides: list[str] = []
-    for side in (expression.left, expression.right):
-        objects = tuple(sorted({index for index, _ in features(side)} - {PARAMS}))
-        alone = Group((Condition(constraint.requirement, side),), leaves(side), objects)
-        part = attempt.items(alone, assignment)[0][1]
-        if not isinstance(part, Constant) or not isinstance(part.value, float):
-            return ""
-        sides.append(f"{part.value:.4g}")
-    return f"{sides[0]} {expression.op.value} {sides[1]} is false"
+    failing = (each for each in sides(attempt, constraint, assignment, {}) if not each.true)
+    told = [f"{each.values} is {'true' if each.negated else 'false'}" for each in failing]
+    if isinstance(constraint.expression, Encloses):
+        told.append("the whole box must lie inside; `.position in` asks of the centre alone")
+    return "; ".join(told)
 
 
 def _allowed(constraint: Comparison, node: Node, observed: Value) -> str:
+    """What was allowed, and how far off the value is."""
+    if isinstance(node, Constant) and isinstance(node.value, Undefined):
+        return node.value.reason
+    shown = allowed_values(constraint, node, observed)
+    off = distance_off(constraint, node, observed)
+    if off is None:
+        return shown
+    unit = " m" if isinstance(observed, tuple) else ""
+    told = f"{math.degrees(off):.1f} deg off" if constraint.property == "heading" else f"{off:.2f}{unit} off"
+    return f"{shown}{'; ' if shown else ''}{told}"
+
+
+def allowed_values(constraint: Comparison, node: Node, observed: Value) -> str:
+    """The values that the program allows for a feature, where they can be said in a few words.
+
+    Args:
+        constraint: The feature.
+        node: What conditioning left of its expression.
+        observed: The label's value.
+    """
     if isinstance(node, Constant):
-        if isinstance(node.value, Undefined):
-            return node.value.reason
-        shown = f"allowed: {show_value(constraint.property, node.value)}"
-    elif isinstance(observed, tuple):
-        shown = _place(node)
-    elif isinstance(observed, float):
-        shown = _interval(constraint.property, node)
-    else:
-        shown = "another value is needed"
-    off = _off(constraint, node, observed)
-    return f"{shown}{'; ' if shown and off else ''}{off}"
+        return f"allowed: {show_value(constraint.property, node.value)}"
+    if isinstance(observed, tuple):
+        return _place(node)
+    if isinstance(observed, float):
+        return _interval(constraint.property, node)
+    return "another value is needed"
 
 
 def _place(node: Node) -> str:
@@ -151,24 +161,33 @@ def _interval(property_: str, node: Node) -> str:
     return f"allowed: {' or '.join(shown)}"
 
 
-def _off(constraint: Comparison, node: Node, observed: Value) -> str:
-    """How far the value is from what is allowed, found by widening the one tolerance that matters."""
+def distance_off(constraint: Comparison, node: Node, observed: Value) -> float | None:
+    """How far a value is from what is allowed, found by widening the one tolerance that matters.
+
+    Args:
+        constraint: The feature.
+        node: What conditioning left of its expression.
+        observed: The label's value.
+
+    Returns:
+        Metres, radians or the property's own unit; 0 where the value is allowed, None where no widening helps.
+    """
     if not isinstance(observed, float | tuple):
-        return ""
-    heading = constraint.property == "heading"
-    high = math.pi if heading else _FAR_M
+        return None
+    high = math.pi if constraint.property == "heading" else _FAR_M
 
     def reached(size: float) -> bool:
-        wide = Tolerance(None, None, size, size, size)
+        wide = Tolerance(position=size, heading=size, other=size)
         return isinstance(decide([(constraint, node, observed)], wide), Satisfied)
 
+    if reached(0.0):
+        return 0.0
     if not reached(high):
-        return ""
+        return None
     low = 0.0
     for _ in range(_STEPS):
         middle = (low + high) / 2
         low, high = (low, middle) if reached(middle) else (middle, high)
-        if high - low < 1e-4:
+        if high - low < _FINEST:
             break
-    unit = " m" if isinstance(observed, tuple) else ""
-    return f"{math.degrees(high):.1f} deg off" if heading else f"{high:.2f}{unit} off"
+    return high

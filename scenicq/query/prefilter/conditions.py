@@ -35,10 +35,10 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import IntersectionOf, Region
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.regions import RegionNames, near_region
 from scenicq.query.prefilter.sql_bounds import Bounds
 from scenicq.query.prefilter.sql_interval import (
-    SLACK,
     Expr,
     Interval,
     add,
@@ -102,7 +102,7 @@ class _Reader:
     """Reads conditions off one scenario."""
 
     scenario: Scenario
-    options: MatchOptions
+    tolerance: Tolerance
     names: RegionNames
     road: RoadDirection
     bounds: dict[tuple[int, ...], Bounds] = field(default_factory=dict["tuple[int, ...]", "Bounds"])
@@ -140,19 +140,20 @@ class _Reader:
         elif name == "heading":
             yield objects, self._heading(index, node, bounds), ""
         elif isinstance(own, str):
-            allowed = [between(own, limits, self.options.tolerance.other) for limits in bounds.intervals(node)]
+            size = self.tolerance.of(index, name).size
+            allowed = [between(own, limits, size) for limits in bounds.intervals(node)]
             yield objects, _sql(any_of(allowed)), ""
 
     def _position(
         self, index: int, node: Node, objects: tuple[int, ...], bounds: Bounds
     ) -> Iterator[tuple[tuple[int, ...], str, str]]:
-        reach = self.options.tolerance.reach
+        reach = self.tolerance.of(index, "position").reach
         own = bounds.columns[index, "position"]
         if isinstance(node, PointIn):
             # Memberships are recorded up to a distance: a wider tolerance cannot be prefiltered by them.
             names = self.names if reach <= MEMBERSHIP_RADIUS_M - SLACK else None
             place = (own[0], own[1])
-            for near, sql in self._inside(node.region, place, bounds, names):
+            for near, sql in self._inside(node.region, place, bounds, names, reach):
                 yield (() if index == self.scenario.ego else (index,)) if near else objects, sql, near
             return
         x, y = (own[0], own[1])
@@ -201,10 +202,9 @@ class _Reader:
         return isinstance(node, Feature) and (node.object, node.property) == (self.scenario.ego, name)
 
     def _inside(
-        self, region: Node, place: tuple[str, str], bounds: Bounds, names: RegionNames | None
+        self, region: Node, place: tuple[str, str], bounds: Bounds, names: RegionNames | None, reach: float
     ) -> Iterator[tuple[str, str]]:
-        """Conditions on memberships, or SQL, that a place in a region meets."""
-        reach = self.options.tolerance.reach
+        """Conditions on memberships, or SQL, that a place in a region meets to within metres."""
         match region:
             case Constant() if isinstance(region.value, Region):
                 parts = region.value.parts if isinstance(region.value, IntersectionOf) else (region.value,)
@@ -214,17 +214,16 @@ class _Reader:
                         yield near, ""
             case RegionIntersection():
                 for part in region.parts:
-                    yield from self._inside(part, place, bounds, names)
+                    yield from self._inside(part, place, bounds, names, reach)
             case DiscAt() | SectorAt():
-                yield "", _sql(self._in_view(region, place, bounds))
+                yield "", _sql(self._in_view(region, place, bounds, reach))
             case _:
                 return
 
-    def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: Bounds) -> str | bool:
+    def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: Bounds, reach: float) -> str | bool:
         center = bounds.exact_vector(region.center)
         if center is None:
             return True
-        reach = self.options.tolerance.reach
         from_ego = self._is_ego(region.center, "position") and place == ("a.x", "a.y")
         dx, dy = (difference((p, p), (q, q))[0] for p, q in zip(place, center, strict=True))
         away = "a.ego_distance" if from_ego else f"sqrt({number(dx)} * {number(dx)} + {number(dy)} * {number(dy)})"
@@ -250,7 +249,7 @@ class _Reader:
         relative = next((term for term in rest if self._is_ego(term, "heading")), None)
         if relative is not None and index != self.scenario.ego:
             base, rest = f"{alias}relative_heading", [term for term in rest if term is not relative]
-        width = self.options.tolerance.heading + SLACK
+        width = self.tolerance.of(index, "heading").size + SLACK
         alternatives = [((0.0, 0.0))]
         for term in rest:
             alternatives = [add(total, more) for total in alternatives for more in bounds.intervals(term)]
@@ -338,7 +337,7 @@ def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> I
     """
     if any(thing.mutated for thing in scenario.objects):
         return  # noise of any size hides where things are
-    reader = _Reader(scenario, options, RegionNames.of(network), network.roadDirection)
+    reader = _Reader(scenario, options.tolerance.for_scenario(scenario), RegionNames.of(network), network.roadDirection)
     for thing in scenario.objects:
         named: Mapping[str, Node] = {name: given.value for name, given in thing.properties.items()}
         compared = [name for name in ("position", "heading") if name in named]

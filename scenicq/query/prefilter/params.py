@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Constant, Node, Select
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
@@ -32,7 +33,10 @@ def param_conditions(scenario: Scenario, options: MatchOptions) -> list[Conditio
         else:
             value = f"TRY_CAST({seen} AS DOUBLE)"
             sql = any_of(
-                [between(value, limits, options.tolerance.other) for limits in Bounds({}).intervals(given.value)]
+                [
+                    between(value, limits, options.tolerance.of(PARAMS, name).size)
+                    for limits in Bounds({}).intervals(given.value)
+                ]
             )
         if isinstance(sql, str):
             found.append(Condition(f"param {name}", (), sql, given.span))

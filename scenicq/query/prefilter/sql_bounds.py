@@ -40,10 +40,10 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children, postorder
+from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_interval import (
     EVERYTHING,
     OPEN,
-    SLACK,
     Box,
     Expr,
     Interval,

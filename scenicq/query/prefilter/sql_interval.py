@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from scenicq.forest.nodes import CompareOp
+from scenicq.match.tolerance import SLACK
 
 __all__ = [
-    "EVERYTHING", "OPEN", "SLACK", "Box", "Expr", "Interval", "Truth", "add", "all_of", "angle", "any_of", "between",
+    "EVERYTHING", "OPEN", "Box", "Expr", "Interval", "Truth", "add", "all_of", "angle", "any_of", "between",
     "compare", "difference", "hull", "is_exact", "largest", "less", "magnitude", "maximum", "minimum", "modulo_turn",
     "multiply", "negate", "norm", "number", "rotate",
 ]  # fmt: skip
@@ -26,8 +27,6 @@ Condition: TypeAlias = str | bool
 Truth: TypeAlias = tuple[Condition, Condition]
 """Where a condition can hold, and where it can fail."""
 
-SLACK = 1e-6
-"""Metres or radians by which every condition is widened."""
 EVERYTHING: Interval = (-math.inf, math.inf)
 OPEN: Truth = (True, True)
 

@@ -26,9 +26,10 @@ from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.regions import Disc, PointSet, PolygonSet, PolylineSet, Rectangle, intersection, union
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.solver_step import ask
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import Tolerance
 from scenicq.smt.solver import open_solver
 
 small = st.floats(-20, 20).map(lambda x: round(x, 2))

@@ -13,13 +13,14 @@ from scenes import STREET, compiled, drawn, label_of
 from scenicq.forest.walk import leaves
 from scenicq.match.decide.cascade import decide
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import find_candidates
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Refuted, Satisfied
 from scenicq.match.search import label_search
 from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, NoMatch
 
 OPTIONS = (

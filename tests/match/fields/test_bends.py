@@ -9,35 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hidden_roads import AREA, BEND, BENDS, ON_BEND
 from scenes import compiled, drawn, label_of
-from shapely import LineString, Point
+from shapely import Point
 
-from scenicq.geometry.features import MapFeature
-from scenicq.geometry.network import Network
 from scenicq.match.fields import heading_propagation
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch
 
-TURN = np.linspace(0.0, 1.5 * math.pi, 60)
-LINE = [(20.0 * math.cos(angle), 20.0 * math.sin(angle)) for angle in TURN.tolist()]
-AREA = LineString(LINE).buffer(2.0, cap_style="flat")
-BEND = Network(
-    "bend",
-    [
-        MapFeature("road", "road", AREA, {"forward": "group"}),
-        MapFeature("group", "lane_group", AREA, {"road": "road"}),
-        MapFeature("lane", "lane", AREA, {"road": "road", "group": "group", "centerline": [LINE]}),
-    ],
-)
-HEADER = "model scenic.domains.driving.model\nego = new Car\nspot = new OrientedPoint on road\n"
-PROGRAMS = {
-    "a known way": "new Car following roadDirection from spot for 12",
-    "a random way": "new Car following roadDirection from spot for Range(5, 15)",
-    "facing as there": "new Car following roadDirection from spot for 12, "
-    "facing Range(-5, 5) deg relative to spot.heading",
-    "two ways": "next = new OrientedPoint following roadDirection from spot for 4\n"
-    "new Car following roadDirection from next for 6",
-}
 FEW = 5000
 """Cases for six labels: each has four steps or more over some ten directions, ten thousand combinations at least."""
 
@@ -56,9 +35,9 @@ def cases(monkeypatch):
     return counts
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", BENDS)
 def test_a_bend_is_followed_without_a_solver_and_without_all_combinations(name, cases):
-    scenario = compiled(HEADER + PROGRAMS[name], BEND)
+    scenario = compiled(ON_BEND + BENDS[name], BEND)
     matcher = Matcher(scenario)
     for seed in range(2):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed))
@@ -73,7 +52,7 @@ def test_a_bend_is_followed_without_a_solver_and_without_all_combinations(name, 
 
 
 def test_a_place_matches_where_walking_back_leads_to_a_spot_on_the_road():
-    scenario = compiled(HEADER + PROGRAMS["a known way"], BEND)
+    scenario = compiled(ON_BEND + BENDS["a known way"], BEND)
     matcher, field = Matcher(scenario), BEND.roadDirection
     base = label_of(scenario, drawn(scenario, 0), random.Random(0))
     rng, seen = np.random.default_rng(4), Counter()

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conditioned_groups import groups
+from hidden_roads import CHAIN
 from scenes import STREET, compiled, drawn, label_of
 
 from scenicq.forest.nodes import PointIn
@@ -22,15 +23,6 @@ from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.verdict import Match, NoMatch
 
-CHAIN = """
-ego = new Car on intersection
-shift = Range(-0.5, 0.5)
-last = ego
-for i in range({cars}):
-    center = follow roadDirection from (front of last) for Range(2, 8)
-    spot = new OrientedPoint right of center by shift, facing Range(-5, 5) deg relative to roadDirection
-    last = new Car ahead of spot
-"""
 CASES = 400
 
 

@@ -14,7 +14,8 @@ from scenicq.errors import SolverError
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject

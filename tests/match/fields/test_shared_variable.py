@@ -19,9 +19,9 @@ from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.fields import field_solver
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.linear.linear_relaxation import extent_affine
-from scenicq.match.options import Tolerance
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied
+from scenicq.match.tolerance import Tolerance
 
 CROSSING = """
 ego = new Car on intersection

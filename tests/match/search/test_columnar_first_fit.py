@@ -15,9 +15,10 @@ from scenes import STREET, compiled, drawn, label_of
 
 from scenicq.match.decide.compiled_expressions import clipped, turned
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import candidates_of
 from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match
 from scenicq.smt.solver import open_solver
 

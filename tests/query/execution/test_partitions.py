@@ -9,7 +9,8 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions, read_program

@@ -19,7 +19,8 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Unknown
 from scenicq.query.execution import dask_engine as dask
 from scenicq.query.execution.partitions import partitions

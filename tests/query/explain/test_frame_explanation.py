@@ -10,11 +10,12 @@ from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import show_value
+from scenicq.match.tolerance import EXACT, Tolerance, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.explain.frame_explanation import explain, show_explanation
-from scenicq.query.explain.nearest_miss import closest, show_tolerance, widened
+from scenicq.query.explain.nearest_miss import closest, separated, show_tolerance, widened
 from scenicq.store.labels import Label, LabelObject
 
 STREET = street()
@@ -26,7 +27,9 @@ other = new Car ahead of ego by Range(4, 10),
 
 
 def matcher(text=TEXT, **options):
-    return Matcher(compile_scenario(Source("test.scenic", text), STREET), MatchOptions(**options))
+    return Matcher(
+        compile_scenario(Source("test.scenic", text), STREET), MatchOptions(**{"tolerance": EXACT, **options})
+    )
 
 
 def car(name, x, y, heading=0.0):
@@ -79,7 +82,7 @@ def test_a_requirement_shows_both_sides_and_no_tolerance_helps():
     found = explain(matcher(text), frame(car("a", 1.75, 80.0)))
     assert found.closest is None
     (violation,) = found.violations
-    assert violation.allowed == "30 < 20 is false"
+    assert violation.allowed == "30 m < 20 m is false"
     assert "no tolerance would make it match" in show_explanation(found)
 
 
@@ -119,7 +122,7 @@ def test_the_smallest_tolerance_is_smallest_and_is_enough(x, heading):
     wanted = max(abs(x - 1.75), turned) - 1e-3
     assert found.widening_m == pytest.approx(wanted, rel=0.02, abs=4e-3)
     assert isinstance(matcher(tolerance=found.tolerance).match(label), Match)
-    too_small = widened(Tolerance(), 0.95 * wanted - 2e-3)
+    too_small = widened(EXACT, 0.95 * wanted - 2e-3)
     assert isinstance(matcher(tolerance=too_small).match(label), NoMatch)
 
 
@@ -137,3 +140,71 @@ def test_no_number_is_shown_as_minus_zero():
 
 def test_what_matches_needs_no_wider_tolerance():
     assert closest(matcher(), frame(car("a", 1.75, 60.0))).widening_m == 0
+
+
+def advised(label, text=TEXT, **options):
+    mine = matcher(text, **options)
+    return separated(mine, label, closest(mine, label))
+
+
+def test_a_part_that_is_enough_alone_is_advised_alone():
+    found = advised(frame(car("a", 4.0, 60.0)), tolerance=Tolerance())
+    assert len(found.alone) == 1
+    assert found.alone[0].position == pytest.approx(2.25, abs=2e-3)
+    assert show_tolerance(found.alone[0]).startswith("position=2.25")
+    found = advised(frame(car("a", 1.75, 60.0, math.radians(50))), tolerance=Tolerance())
+    assert len(found.alone) == 1
+    assert math.degrees(found.alone[0].heading) == pytest.approx(40, abs=0.05)
+
+
+def test_a_size_is_advised_by_its_name():
+    text = "model scenic.domains.driving.model\nego = new Car\nother = new Car with width Range(1, 1.5)\n"
+    found = advised(frame(car("a", 1.75, 60.0)), text, tolerance=Tolerance())
+    assert len(found.alone) == 1
+    assert found.alone[0].of(1, "width").size == pytest.approx(0.5, abs=2e-3)
+    assert show_tolerance(found.alone[0]).startswith("width=0.50")
+
+
+def test_where_several_parts_are_needed_none_is_wider_than_it_must_be():
+    label = frame(car("a", 4.0, 60.0, math.radians(30)))
+    found = advised(label, tolerance=Tolerance())
+    assert found.alone == ()
+    assert found.tolerance.position == pytest.approx(2.25, abs=0.03)
+    assert math.degrees(found.tolerance.heading) == pytest.approx(20, abs=0.5)
+    assert isinstance(matcher(tolerance=found.tolerance).match(label), Match)
+    for fewer in (
+        Tolerance(position=2.2, heading=found.tolerance.heading),
+        Tolerance(position=found.tolerance.position, heading=math.radians(19.5)),
+    ):
+        assert isinstance(matcher(tolerance=fewer).match(label), NoMatch)
+
+
+@pytest.mark.parametrize("scope", ["", "ego.heading=15deg,", "Car.position=0.5,", "x=0.2,y=0.3,"])
+def test_what_is_advised_is_enough_as_the_option_takes_it(scope):
+    for x, heading in ((4.0, 0.0), (1.75, 1.0), (3.0, 0.6), (9.0, 2.0)):
+        label = frame(car("a", x, 60.0, heading))
+        found = advised(label, tolerance=parse_tolerance(f"{scope}heading=4deg"))
+        for each in found.alone or (found.tolerance,):
+            assert isinstance(matcher(tolerance=parse_tolerance(show_tolerance(each))).match(label), Match)
+
+
+def test_an_explained_match_shows_values_what_is_allowed_and_what_is_to_spare():
+    text = TEXT + "require (distance to other) < 20 and abs(relative heading of other) < 30 deg\n"
+    found = explain(matcher(text), frame(car("a", 1.75, 60.0, math.radians(4))))
+    told = {each.what: (each.value, each.allowed, each.spare) for each in found.margins}
+    assert told["other.heading"] == ("4.0 deg", "allowed: -10.0 deg to 10.0 deg", "6.0 deg to spare")
+    assert told["(distance to other) < 20"] == ("10 m < 20 m", "", "10 m to spare")
+    assert told["abs(relative heading of other) < 30 deg"] == ("4.0 deg < 30.0 deg", "", "26.0 deg to spare")
+    assert "what the label shows:" in show_explanation(found)
+
+
+def test_an_explained_match_says_where_the_tolerance_is_needed():
+    found = explain(matcher(tolerance=Tolerance()), frame(car("a", 1.75, 60.0, math.radians(12))))
+    (heading,) = (each for each in found.margins if each.what == "other.heading")
+    assert heading.spare == "2.0 deg off, within tolerance"
+
+
+def test_a_requirement_of_a_whole_box_says_so():
+    text = "model scenic.domains.driving.model\nego = new Car\nother = new Car\nrequire other in intersection\n"
+    found = explain(matcher(text), frame(car("a", 1.75, 80.0)))
+    assert "`.position in` asks of the centre alone" in show_explanation(found)

@@ -10,7 +10,8 @@ from dataclasses import replace
 import pytest
 
 from scenicq.match.matcher import Matcher
-from scenicq.match.options import MatchOptions, parse_tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.query.explain.nearest_miss import closest, nearest_misses
@@ -38,6 +39,13 @@ def test_the_ranking_is_that_of_looking_at_every_frame(query):
         tolerance = parse_tolerance(re.search(r"with (\S+)", result.verdict.cause.detail).group(1))
         (label,) = query.dataset.labels([result.frame])
         assert isinstance(Matcher(matcher.scenario, MatchOptions(tolerance=tolerance)).match(label), Match)
+
+
+def test_the_ranking_leaves_out_what_cannot_be_among_the_closest(query):
+    seen = []
+    ranked = nearest_misses(query, 1, progress=seen.append)
+    assert len(ranked) == 1
+    assert len(seen) < query.dataset.manifest.total.frames / 2
 
 
 def test_the_ranking_looks_at_so_many_frames_only(query):

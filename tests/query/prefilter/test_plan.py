@@ -19,7 +19,8 @@ from scenicq.errors import Source
 from scenicq.forest.improvise import draw_scene
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
-from scenicq.match.options import MatchOptions, Tolerance
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions

@@ -1,0 +1,62 @@
+"""What helps where nothing, or hardly anything, matches: a few lines on standard error."""
+
+from __future__ import annotations
+
+import math
+
+import click
+
+from scenicq.query.execution.run import Query
+from scenicq.query.explain.advice import Outlook, advice
+
+from .report import columns, count, plain
+
+__all__ = ["advise", "is_nearly_empty"]
+
+_BUDGET_S = 1.0
+_SCARCE = 1000
+"""Frames of which at least one is expected to match."""
+_LINES = 5
+
+
+def is_nearly_empty(query: Query) -> bool:
+    """Whether nothing matched, or less than one frame in a thousand."""
+    return query.funnel.matches * _SCARCE < query.funnel.frames
+
+
+def _number(outlook: Outlook) -> str:
+    about = "about " if outlook.sampled else ""
+    if outlook.certain:
+        return f"{about}{outlook.most:,}"
+    return f"{about}{outlook.least:,} to {outlook.most:,}" if outlook.least else f"{about}at most {outlook.most:,}"
+
+
+def advise(query: Query, *, asked: bool) -> None:
+    """Print what excludes most frames, and how many there would be with one change.
+
+    Args:
+        query: After its results were taken.
+        asked: Whether the user asked for it, so that it may take its time.
+    """
+    found = advice(query, budget_s=math.inf if asked else _BUDGET_S)
+    funnel = query.funnel
+    lines = [f"{count(funnel.matches, 'match')} in {count(funnel.frames, 'frame')}"]
+    if found.first:
+        what, frames = found.first[0]
+        lines[0] += f"; {frames:,} fail first at `{plain(what)}`"
+    if found.outlooks:
+        lines.append("with one change there would be:")
+        shown = found.outlooks if asked else found.outlooks[:_LINES]
+        rows = [(_number(each), each.change.told, f"line {line}" if (line := _line(each)) else "") for each in shown]
+        lines += columns(rows, right=frozenset({0}))
+    else:
+        lines.append("no single change leaves a frame" if found.complete else "no change that was tried leaves a frame")
+    if not asked:
+        lines.append("  = hint: `--near 3` shows the frames that come closest"
+                     + ("" if found.complete else ", `--advise` tries all changes"))  # fmt: skip
+    click.echo("\n".join(lines), err=True)
+
+
+def _line(outlook: Outlook) -> int:
+    span = outlook.change.span
+    return 0 if span is None or span.source.name.startswith("<") else span.source.position(span.start)[0]

@@ -1,0 +1,71 @@
+"""Where the process begins: whatever goes wrong while the program loads ends it with 2, never with Python's own 1.
+
+1 means that nothing matched, and whoever runs a query in a script must be able to believe it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+__all__ = ["main"]
+
+_ERROR, _INTERRUPTED = 2, 130
+_LEAST_GB = 2
+"""With less, libraries end the process by themselves while they load, and choose exit code 1."""
+
+
+def main() -> None:
+    """Run the command line of this process, and choose the exit code."""
+    _fill_streams()
+    if _too_little_memory():
+        _end(f"error[resources-exhausted]: {_LEAST_GB} GB of address space are needed (see `ulimit -v`)", _ERROR)
+    try:
+        from .main import main as run  # noqa: PLC0415 - loading may fail, too
+
+        run()
+    except SystemExit:
+        raise
+    except KeyboardInterrupt:
+        _end("interrupted", _INTERRUPTED)
+    except BaseException as error:  # noqa: BLE001 - Python would exit with 1
+        _end(_line(error), _ERROR)
+
+
+def _fill_streams() -> None:
+    """Open what the caller has closed: else the next file takes its number, and messages go into it."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    if sys.stderr is None:  # pyright: ignore[reportUnnecessaryComparison] - the caller closed it
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
+
+
+def _too_little_memory() -> bool:
+    """Whether the caller limits the memory of this process below what loading alone takes."""
+    try:
+        import resource  # noqa: PLC0415 - not everywhere
+    except ImportError:
+        return False
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return limit != resource.RLIM_INFINITY and limit < _LEAST_GB * 10**9
+
+
+def _line(error: BaseException) -> str:
+    try:
+        from .failures import refused_by_system  # noqa: PLC0415 - loading may fail, too
+
+        refused = refused_by_system(error)
+    except BaseException:  # noqa: BLE001 - as above
+        refused = None
+    return f"error[resources-exhausted]: {refused}" if refused else f"internal error: {type(error).__name__}: {error}"
+
+
+def _end(text: str, code: int) -> None:
+    """Say a line and end at once: what Python does when it ends may fail again, and choose another code."""
+    try:
+        os.write(2, f"{text}\n".encode(errors="backslashreplace"))
+    finally:
+        os._exit(code)

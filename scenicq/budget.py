@@ -1,0 +1,79 @@
+"""The time that one label may take: our own work and the solver's on one clock.
+
+Whoever decides labels says how long one may take (`limited`). Loops that can be long, in whatever folder, look at the
+clock (`look`), and what waits for a solver gives it what is left (`waiting`). Without a limit nothing is ever too long.
+
+Our own work is counted in processor seconds of the thread, so that a busy machine changes no verdict; waiting for a
+solver is counted by the wall, as solvers are themselves.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+__all__ = ["TimeIsUp", "limited", "look", "uncounted", "waiting"]
+
+
+class TimeIsUp(Exception):
+    """The label has taken all the time that it may; what is not decided stays unknown."""
+
+
+_UNTIL: ContextVar[float] = ContextVar("_UNTIL", default=math.inf)
+"""When the time is up, on the clock of this thread; what solvers took is taken off beforehand."""
+
+
+@contextmanager
+def limited(seconds: float) -> Generator[None]:
+    """Let what happens in the block take so long at most, or less where a block around it says so.
+
+    Args:
+        seconds: The time.
+    """
+    before = _UNTIL.get()
+    token = _UNTIL.set(min(before, time.thread_time() + seconds))
+    try:
+        yield
+    finally:
+        _UNTIL.reset(token)
+
+
+def look() -> None:
+    """Look at the clock.
+
+    Raises:
+        TimeIsUp: The time is used up.
+    """
+    if time.thread_time() > _UNTIL.get():
+        raise TimeIsUp
+
+
+@contextmanager
+def waiting(seconds: float) -> Generator[float]:
+    """The seconds that something outside of this process may take; what it takes counts.
+
+    Args:
+        seconds: At most.
+
+    Raises:
+        TimeIsUp: Nothing is left.
+    """
+    look()
+    began = time.perf_counter()
+    try:
+        yield min(seconds, _UNTIL.get() - time.thread_time())
+    finally:
+        _UNTIL.set(_UNTIL.get() - (time.perf_counter() - began))
+
+
+@contextmanager
+def uncounted() -> Generator[None]:
+    """Within `waiting`, what is no fault of the label, such as starting a process: it takes no time."""
+    began = time.perf_counter()
+    try:
+        yield
+    finally:
+        _UNTIL.set(_UNTIL.get() + (time.perf_counter() - began))

@@ -1,0 +1,69 @@
+"""What a notebook shows of an evaluation: the sentences first, then the tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+from scenicq.evaluate.evaluation import Evaluation
+from scenicq.evaluate.pages import write_pages
+from scenicq.evaluate.rows import tables
+from scenicq.store.dataset import Dataset
+
+__all__ = ["Judgement"]
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """A model judged on the frames of a query.
+
+    Attributes:
+        evaluation: All figures.
+        dataset: What it was judged on.
+    """
+
+    evaluation: Evaluation
+    dataset: Dataset
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What to tell: one sentence a role, and one about the simulated runs where there are any."""
+        found: list[str] = []
+        for each in self.evaluation.scenarios:
+            found += [role.sentence for role in each.headline]
+            if each.simulated is not None:
+                found.append(each.simulated.sentence)
+        return tuple(found)
+
+    def report(self, folder: str | Path, *, sensors: str | Path | None = None) -> Path:
+        """Write pages with the worst frames first, as `scenicq evaluate --report`.
+
+        Args:
+            folder: New, empty, or with an older report.
+            sensors: The folder that the paths of sensor files start from.
+
+        Returns:
+            The page to begin with.
+
+        Raises:
+            DataError: target-exists, or target-unwritable.
+        """
+        return write_pages(self.evaluation, self.dataset, Path(folder), None if sensors is None else Path(sensors))
+
+    def __repr__(self) -> str:
+        """The sentences."""
+        return "\n".join(self.sentences)
+
+    def _repr_html_(self) -> str:
+        parts = [f"<p>{escape(sentence)}</p>" for sentence in self.sentences]
+        for each in self.evaluation.scenarios:
+            for title, head, rows in tables(each, self.evaluation.distance_m):
+                lines = "".join(_line("td", row) for row in rows)
+                parts.append(f"<table><caption>{escape(title)}</caption>{_line('th', head)}{lines}</table>")
+        return "".join(parts)
+
+
+def _line(tag: str, cells: Sequence[str]) -> str:
+    return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"

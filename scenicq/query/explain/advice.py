@@ -1,0 +1,238 @@
+"""What keeps nearly all frames from matching, and how many there would be with one change.
+
+A change drops one requirement or the comparison of one feature, widens one part of the tolerance, or takes a wider
+class. The prefilter of the changed program counts what it leaves, over a sample where the dataset is large; the matcher
+then decides these, as long as there is time, so that the number is one of matches and not only a bound.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from scenicq.errors import Span
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.scenario import Scenario
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import Tolerance
+from scenicq.match.verdict import Match
+from scenicq.query.execution.block_matcher import CompiledMap, Decider
+from scenicq.query.execution.run import Query
+from scenicq.query.explain.nearest_miss import show_tolerance
+from scenicq.query.explain.prefilter_counts import spots
+from scenicq.store.classes import ancestors, is_class
+
+__all__ = ["Advice", "Change", "Outlook", "advice"]
+
+_MOST_FRAMES = 5_000
+"""Frames of a dataset beyond which a sample is looked at."""
+_MOST_CHANGES = 24
+_MOST_DECIDED = 300
+"""Frames that the matcher decides for one change."""
+_ANYWHERE = {"position": 1e5, "heading": math.pi}
+"""Sizes of a tolerance by which a feature is as good as not compared."""
+_WIDER = (("position", 1.0), ("position", 4.0), ("heading", math.radians(20)), ("heading", math.radians(45)))
+"""Parts of the tolerance that are tried, in metres and radians."""
+_WIDER_NUMBER = 0.5
+"""Tolerance of speeds, sizes and other numbers that is tried."""
+_PATIENCE = 5
+"""Seconds that may pass for one of work: solvers work elsewhere, and others on the same machine."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change of the program or the options.
+
+    Attributes:
+        told: The change, in the words of the program and of the options.
+        about: What it changes, as the funnel names what excludes frames; empty for what concerns many features.
+        span: The place in the program.
+        requirement: Place of the requirement that is dropped among the scenario's; -1 where none is.
+        unset: Object and property that are not compared.
+        category: Object and the class that it is given.
+        tolerance: The tolerance, where it is another one.
+        ignored: A parameter that is not compared.
+    """
+
+    told: str
+    about: str = ""
+    span: Span | None = None
+    requirement: int = -1
+    unset: tuple[int, str] | None = None
+    category: tuple[int, str] | None = None
+    tolerance: Tolerance | None = None
+    ignored: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """How many frames there would be with a change.
+
+    Attributes:
+        change: The change.
+        least: How many match as far as they were decided.
+        most: How many may match: with those that the prefilter leaves and nobody decided.
+        sampled: Whether the numbers were projected from a sample.
+    """
+
+    change: Change
+    least: int
+    most: int
+    sampled: bool
+
+    @property
+    def certain(self) -> bool:
+        """Whether the number is known."""
+        return self.least == self.most
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What keeps frames from matching, and what would help.
+
+    Attributes:
+        first: What excludes most frames, with how many.
+        outlooks: The changes that may leave frames, those that are known to leave most first.
+        complete: Whether all changes were looked at within the time.
+    """
+
+    first: tuple[tuple[str, int], ...]
+    outlooks: tuple[Outlook, ...]
+    complete: bool
+
+
+class _Clock:
+    """Says when an amount of work is done."""
+
+    def __init__(self, budget_s: float) -> None:
+        self._work_end = time.process_time() + budget_s
+        self._end = time.monotonic() + _PATIENCE * budget_s
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time is up."""
+        return time.process_time() > self._work_end or time.monotonic() > self._end
+
+
+def advice(query: Query, *, budget_s: float = math.inf) -> Advice:
+    """What keeps the frames of a query from matching, and how many there would be with one change.
+
+    Args:
+        query: After its results were taken: the changes are tried in the order of what excluded most frames.
+        budget_s: Seconds of work that the changes may take; the first is tried in any case.
+    """
+    clock = _Clock(budget_s)
+    excluded = query.funnel.excluded.most_common()
+    worlds = list(query.fitting())
+    if not worlds:
+        return Advice(tuple(excluded[:3]), (), complete=True)
+    rank = {what: place for place, (what, _) in enumerate(excluded)}
+    changes = sorted(
+        _changes(worlds[0].scenario, query.options.match), key=lambda each: rank.get(each.about, len(rank))
+    )
+    found: list[Outlook] = []
+    complete = len(changes) <= _MOST_CHANGES
+    for number, change in enumerate(changes[:_MOST_CHANGES]):
+        if number and clock.is_over:
+            complete = False
+            break
+        outlook = _outlook(query, worlds, change, clock)
+        if outlook.most > query.funnel.matches:
+            found.append(outlook)
+    found.sort(key=lambda each: (-each.least, -each.most))
+    return Advice(tuple(excluded[:3]), tuple(found), complete)
+
+
+def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
+    """The changes that a program and its options can make, those of its features and requirements in its order."""
+    for number, requirement in enumerate(scenario.requirements):
+        if requirement.built_in is None or requirement.built_in in options.enforce:
+            text = " ".join(requirement.span.text.split()) if requirement.span is not None else "a requirement"
+            if requirement.built_in is not None:
+                names = " and ".join(scenario.objects[index].name for index in requirement.objects)
+                text = f"{requirement.built_in.value} of {names}"
+            yield Change(f"without `{text}`", text, requirement.span, requirement=number)
+    for name, given in scenario.params.items():
+        if given.explicit and name not in options.ignore_params:
+            yield Change(f"--ignore-params {name}", f"param {name}", given.span, ignored=name)
+    numbers: dict[str, None] = {}
+    for thing in scenario.objects:
+        for name, given in thing.properties.items():
+            what = f"{thing.name}.{name}"
+            if name in _ANYWHERE and name not in thing.mutated:
+                rules = (*options.tolerance.rules, (thing.name, name, _ANYWHERE[name]))
+                wide = replace(options.tolerance, rules=rules)
+                yield Change(f"`{what}` not compared", what, given.span, tolerance=wide)
+            elif given.explicit and name not in _ANYWHERE:
+                yield Change(f"`{what}` not compared", what, given.span, unset=(thing.index, name))
+                if kind_of(given.value) == "scalar":
+                    numbers[name] = None
+        wider = ancestors(thing.category)[1:2] if is_class(thing.category) else ()
+        for category in wider:
+            told = f"`{thing.name}` as `{category}`"
+            yield Change(told, f"{thing.name}.class", thing.span, category=(thing.index, category))
+    for name in numbers:
+        if options.tolerance.of(0, name).size < _WIDER_NUMBER:
+            wide = replace(options.tolerance, rules=(*options.tolerance.rules, ("", name, _WIDER_NUMBER)))
+            yield Change(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
+    for name, size in _WIDER:
+        disc = name != "position" or options.tolerance.x is None
+        if disc and getattr(options.tolerance, name) < size:
+            wide = (
+                replace(options.tolerance, position=size)
+                if name == "position"
+                else replace(options.tolerance, heading=size)
+            )
+            yield Change(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
+
+
+def _changed(scenario: Scenario, change: Change) -> Scenario:
+    requirements, objects = list(scenario.requirements), list(scenario.objects)
+    if change.requirement >= 0:
+        del requirements[change.requirement]
+    if change.unset is not None:
+        index, name = change.unset
+        given = objects[index].properties[name]
+        properties = {**objects[index].properties, name: replace(given, explicit=False)}
+        objects[index] = replace(objects[index], properties=properties)
+    if change.category is not None:
+        index, category = change.category
+        objects[index] = replace(objects[index], category=category)
+    return replace(scenario, requirements=tuple(requirements), objects=tuple(objects))
+
+
+def _outlook(query: Query, worlds: list[CompiledMap], change: Change, clock: _Clock) -> Outlook:
+    """Count the frames that a change leaves, and decide them while there is time."""
+    options = query.options.match
+    if change.tolerance is not None:
+        options = replace(options, tolerance=change.tolerance)
+    if change.ignored:
+        options = replace(options, ignore_params=options.ignore_params | {change.ignored})
+    total = query.dataset.manifest.total.frames
+    sampled = total > _MOST_FRAMES
+    changed = {
+        world.network.name: CompiledMap.of(_changed(world.scenario, change), world.network, options, prefilter=True)
+        for world in worlds
+    }
+    left = looked_at = matched = decided = 0
+    decider = Decider(query.dataset, options, query.options.solver, changed.__getitem__, None, all_matches=False,
+                      every=False)  # fmt: skip
+    with decider:
+        for name in changed:
+            blocks = query.blocks(name)
+            for block in spots(blocks) if sampled else blocks:
+                found = decider.decide(block)
+                looked_at += len(found.missed)
+                left += int(np.count_nonzero(found.missed < 0))
+                for results in islice(found.found, max(0, _MOST_DECIDED - decided)):
+                    decided += 1
+                    matched += isinstance(results[0].verdict, Match)
+                    if clock.is_over:
+                        break
+    scale = total / looked_at if sampled and looked_at else 1.0
+    return Outlook(change, round(scale * matched), round(scale * (matched + left - decided)), sampled)

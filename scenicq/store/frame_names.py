@@ -1,0 +1,75 @@
+"""Names of frames, cut short as far as they stay unique, and found again by what is left of them.
+
+A name may have parts with `/` between them, such as a recording and a time; each part may be cut short by itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import duckdb
+
+from scenicq.errors import DataError, Diagnostic
+
+__all__ = ["find_frame", "shortened"]
+
+_SHORTEST = 6
+_SHOWN = 5
+
+
+def find_frame(connection: duckdb.DuckDBPyConnection, text: str) -> str:
+    """The frame of a name, or of the beginning of one.
+
+    Args:
+        connection: To a dataset.
+        text: A name, or as much of it, or of each of its parts, as no other frame has.
+
+    Raises:
+        DataError: option-invalid: there is no such frame, or there are several.
+    """
+    pattern = "[^/]*/".join(re.escape(part) for part in text.split("/")) + ".*"
+    rows = connection.execute(
+        "SELECT frame FROM labels WHERE frame = ? OR regexp_full_match(frame, ?, 's') "
+        "ORDER BY frame <> ?, frame LIMIT ?",
+        [text, pattern, text, _SHOWN + 1],
+    ).fetchall()
+    found = [str(frame) for (frame,) in rows]
+    if found and (found[0] == text or len(found) == 1):
+        return found[0]
+    if not found:
+        hint = "`scenicq match SCENARIO DATASET --all` lists the frames"
+        raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{text}`", hints=(hint,)))
+    more = ", ..." if len(found) > _SHOWN else ""
+    hint = f"these begin so: {', '.join(found[:_SHOWN])}{more}"
+    raise DataError(Diagnostic("option-invalid", f"several frames begin with `{text}`", hints=(hint,)))
+
+
+def shortened(connection: duckdb.DuckDBPyConnection) -> Callable[[str], str]:
+    """Cuts names of frames short, so that `find_frame` still finds them; all to the same length.
+
+    Names that do not all have the same number of parts stay as they are.
+
+    Args:
+        connection: To a dataset.
+    """
+    rows = connection.execute("SELECT DISTINCT len(string_split(frame, '/')) FROM labels").fetchall()
+    if len(rows) != 1:
+        return str
+    parts = [f"string_split(frame, '/')[{number}]" for number in range(1, rows[0][0] + 1)]
+    lengths = [_shortest(connection, part) for part in parts]
+    return lambda frame: "/".join(part[:length] for part, length in zip(frame.split("/"), lengths, strict=True))
+
+
+def _shortest(connection: duckdb.DuckDBPyConnection, part: str) -> int:
+    """The length to which all values of a part can be cut without two becoming one."""
+    connection.execute(f"CREATE OR REPLACE TEMP TABLE part AS SELECT DISTINCT {part} AS name FROM labels")
+    row = connection.execute("SELECT count(*), max(len(name)) FROM part").fetchone()
+    assert row is not None
+    count, longest = row
+    low, high = min(_SHORTEST, longest), longest
+    while low < high:
+        middle = (low + high) // 2
+        cut = connection.execute(f"SELECT count(DISTINCT name[:{middle}]) FROM part").fetchone()
+        low, high = (low, middle) if cut == (count,) else (middle + 1, high)
+    return high

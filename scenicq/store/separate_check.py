@@ -1,0 +1,45 @@
+"""A dataset looked at in a process of its own, which may die where a library does on what it reads."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.processes import Lost, Workers
+from scenicq.store.dataset import open_dataset
+
+__all__ = ["check_apart"]
+
+_MEMORY = 6 << 30
+"""Bytes of address space that the process may take."""
+
+
+def check_apart(address: str) -> None:
+    """Refuse a dataset that is not sound, or that ends the process which reads it.
+
+    Args:
+        address: Of the dataset, as `open_dataset` takes it.
+
+    Raises:
+        DataError: As `open_dataset` does.
+    """
+    with Workers(1, _start) as workers:
+        for _, answer in workers.run([address], tries=1):
+            if isinstance(answer, Lost):
+                message = f"{address}: the process that reads it dies, or needs more than {_MEMORY >> 30} GiB"
+                raise DataError(Diagnostic("dataset-invalid", message))
+
+
+def _start() -> Callable[[str, Callable[[object], None]], None]:
+    if sys.platform == "linux":
+        import resource  # noqa: PLC0415 - not everywhere
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+        limits = [limit for limit in (_MEMORY, soft, hard) if limit != resource.RLIM_INFINITY]
+        resource.setrlimit(resource.RLIMIT_AS, (min(limits), hard))
+
+    def work(address: str, _tell: Callable[[object], None]) -> None:
+        open_dataset(address)
+
+    return work

@@ -1,0 +1,210 @@
+"""A dataset looked at as data: whether its tables hold what every reader of them takes for granted.
+
+Checksums say that files are as they were written, not that who wrote them meant well. Here each table is looked at by
+itself: columns, types, numbers, texts, JSON. `row_owners` compares tables with each other, `map_validation` looks at
+maps. What the writer guarantees needs no such look.
+"""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any, NoReturn, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.types as kinds
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.store.classes import is_class
+from scenicq.store.place import StoreFile, open_parquet
+from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
+from scenicq.store.wkb import FARTHEST_M
+
+__all__ = ["invalid", "json_object", "read_sound"]
+
+_MOST_BYTES = 1 << 32
+"""Of one file, decoded. A segment has a quarter of that at most, unless a recording is very long."""
+_LONGEST_NAME, _LONGEST_JSON = 1 << 12, 1 << 20
+"""Characters of a text."""
+_HALF_TURN = math.pi + 1e-6
+_PLACES = frozenset({"x", "y", "ego_x", "ego_y"})
+_TURNS = frozenset({"heading", "ego_heading", "relative_heading", "road_directions", "ego_road_directions"})
+_NOT_NEGATIVE = frozenset({"object_count", "first_object", "sensor_count", "first_sensor", "ordinal", "distance"})
+_SIZES = frozenset({"width", "length", "height", "ego_width", "ego_length", "ego_height", "ego_distance"})
+_TEXT_KEYS = frozenset({"frame", "recording", "map"})
+"""Names that must not be empty."""
+
+
+def invalid(file: object, what: str, row: int | None = None, column: str | None = None) -> NoReturn:
+    """Refuse a dataset.
+
+    Args:
+        file: The file that is not sound, as it is called in the dataset.
+        what: What is wrong with it there.
+        row: Counted from 0.
+        column: Its name.
+
+    Raises:
+        DataError: dataset-invalid.
+    """
+    places = [f"row {row + 1}"] if row is not None else []
+    places += [f"column `{column}`"] if column is not None else []
+    where = ", ".join([str(file), *places])
+    hint = "whoever made the dataset must make it again: `scenicq ingest` writes none like this"
+    raise DataError(Diagnostic("dataset-invalid", f"{where}: {what}", hints=(hint,)))
+
+
+def read_sound(table: str, file: StoreFile, name: str, columns: Sequence[str] | None = None) -> ArrowTable:
+    """All rows of a file, every column of which is sound by itself.
+
+    Args:
+        table: A key of `SCHEMAS`.
+        file: The file.
+        name: What it is called in the dataset.
+        columns: What is read, and must be there; all that the table has, and nothing else, by default.
+
+    Raises:
+        DataError: dataset-invalid.
+    """
+    fields = [field for field in SCHEMAS[table] if columns is None or field.name in columns]
+    try:
+        with open_parquet(file) as parquet:
+            found = parquet.schema_arrow.names
+            _check_columns(parquet, fields, found if columns is None else [n for n in found if n in columns], name)
+            rows = parquet.read(columns)
+        rows.validate(full=True)
+    except (pa.ArrowException, OSError, ValueError, OverflowError, KeyError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        invalid(name, f"cannot be decoded: {' '.join(str(error).split())[:200]}")
+    for field in fields:
+        _check_column(field, rows[field.name].combine_chunks(), name)
+    return rows
+
+
+def _check_columns(parquet: Any, fields: Sequence[Any], names: Sequence[str], name: str) -> None:
+    """Look at what the file says of itself, before anything is decoded."""
+    expected, found = [field.name for field in fields], parquet.schema_arrow
+    if names != expected:
+        odd = sorted({*names} ^ {*expected})
+        told = f": {', '.join(odd[:5])}" if odd else ", or in another order, or twice"
+        invalid(name, f"has other columns than it must have{told}"[:300])
+    for field in fields:
+        if found.field(field.name).type != field.type:
+            invalid(name, f"is {found.field(field.name).type}, not {field.type}", column=field.name)
+    meta = parquet.metadata
+    size = sum(meta.row_group(number).total_byte_size for number in range(meta.num_row_groups))
+    if not 0 <= size <= _MOST_BYTES or not 0 <= meta.num_rows <= _MOST_BYTES // 8:
+        invalid(name, "would take more than 4 GiB when decoded")
+
+
+def _check_column(field: Any, values: ArrowArray, file: str) -> None:
+    name = field.name
+    if values.null_count and not field.nullable:
+        invalid(file, "there is no value", _first(pc.is_null(values)), name)
+    if kinds.is_list(field.type) or kinds.is_map(field.type):
+        _check_nested(name, field.type, values, file)
+    elif field.type == pa.float64():
+        _check_reals(name, values, file)
+    elif field.type == pa.string():
+        _check_texts(name, values, file)
+    elif kinds.is_integer(field.type) and name in _NOT_NEGATIVE:
+        _refuse(pc.less(values, 0), "is negative", file, name)
+
+
+def _check_nested(name: str, kind: Any, values: ArrowArray, file: str) -> None:
+    """What lists and maps hold; of these the row is that among all items."""
+    parts = [values.flatten()] if kinds.is_list(kind) else [values.keys, values.items]
+    for items in parts:
+        if items.null_count:
+            invalid(file, "an item has no value", column=name)
+        if items.type == pa.float64():
+            _check_reals(name, items, file)
+        elif items.type == pa.string():
+            _check_texts(name, items, file)
+        else:
+            _refuse(pc.less(items, 0), "is negative", file, name)
+
+
+def _check_reals(name: str, values: ArrowArray, file: str) -> None:
+    _refuse(pc.invert(pc.is_finite(values)), "is not finite", file, name)
+    if name in _PLACES:
+        _refuse(pc.greater(pc.abs(values), FARTHEST_M), "is no place on a map", file, name)
+    if name in _TURNS:
+        _refuse(pc.greater(pc.abs(values), _HALF_TURN), "is not an angle between -pi and pi", file, name)
+    if name in _SIZES or name in _NOT_NEGATIVE:
+        _refuse(pc.less(values, 0.0), "is negative", file, name)
+
+
+def _check_texts(name: str, values: ArrowArray, file: str) -> None:
+    is_json = name.endswith(("attributes", "params", "properties"))
+    most = _LONGEST_JSON if is_json else _LONGEST_NAME
+    if name != "properties":  # of which a map may have long ones
+        _refuse(pc.greater(pc.utf8_length(values), most), f"is longer than {most} characters", file, name)
+    if name in _TEXT_KEYS:
+        _refuse(pc.equal(values, ""), "is empty", file, name)
+    if name in ("class", "ego_class"):
+        _check_classes(name, values, file)
+    if is_json and name != "properties":
+        for text in pc.unique(values).to_pylist():
+            problem = None if text is None else _attributes_problem(text)
+            if problem is not None:
+                invalid(file, problem, _first(pc.equal(values, text)), name)
+
+
+def _check_classes(name: str, values: ArrowArray, file: str) -> None:
+    for text in pc.unique(values).to_pylist():
+        if not (is_class(text) or (text == "" and name == "ego_class")):
+            invalid(file, "is no class of the class tree", _first(pc.equal(values, text)), name)
+
+
+def _attributes_problem(text: str) -> str | None:
+    """Why a text is no JSON object of plain values."""
+    values = json_object(text)
+    if values is None:
+        return "is no JSON object of finite numbers"
+    plain = all(isinstance(value, str | int | float | bool) for value in values.values())
+    return None if plain else "has a value that is neither text nor number nor truth value"
+
+
+def json_object(text: str) -> dict[str, Any] | None:
+    """The object that a JSON text is, with numbers that floats can hold; None where it is none."""
+    try:
+        value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_whole)
+    except (ValueError, RecursionError):
+        return None
+    return cast("dict[str, Any]", value) if isinstance(value, dict) else None
+
+
+def _refuse_constant(text: str) -> NoReturn:
+    raise ValueError(text)
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def _whole(text: str) -> int:
+    if len(text) > 300:  # 10**308 is the last that a float can hold
+        raise ValueError(text)
+    return int(text)
+
+
+def _refuse(bad: ArrowArray, what: str, file: str, column: str) -> None:
+    """Refuse the first row where something is true."""
+    if pc.any(bad).as_py():
+        invalid(file, what, _first(bad), column)
+
+
+def _first(bad: ArrowArray) -> int:
+    return int(np.argmax(pc.fill_null(bad, False).to_numpy(zero_copy_only=False)))

@@ -1,0 +1,69 @@
+"""What is computed at ingest computed again and compared: the prefilter believes it, and a stranger may have lied."""
+
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+
+from scenicq.store.dataset import Dataset
+from scenicq.store.rebuild import recordings_of
+from scenicq.store.regions import lane_rows
+from scenicq.store.rows import recording_rows
+from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowArray, ArrowTable
+from scenicq.store.segment import MapIndexes
+from scenicq.store.validation import invalid, read_sound
+
+__all__ = ["verify_computed"]
+
+_CLOSE = 1e-6
+"""How far numbers may be from those computed again, perhaps on another machine: metres, radians."""
+
+
+def verify_computed(dataset: Dataset) -> None:
+    """Compute all again that follows from labels and maps; the dataset must be sound otherwise.
+
+    Raises:
+        DataError: dataset-invalid: a table says something else.
+    """
+    manifest = dataset.manifest
+    maps = {name: dataset.features(name) for name in manifest.maps}
+    for part, file in zip(manifest.tables["lanes"], dataset.files("lanes"), strict=True):
+        _compare("lanes", read_sound("lanes", file, part.path), lane_rows(maps), part.path)
+    indexes = MapIndexes(maps)
+    for number in range(len(manifest.tables["labels"])):
+        parts = {table: manifest.tables[table][number] for table in SEGMENT_TABLES}
+        found = {table: read_sound(table, dataset.place.file(part), part.path) for table, part in parts.items()}
+        pieces: dict[str, list[ArrowTable]] = {table: [] for table in SEGMENT_TABLES}
+        first = dict.fromkeys(SEGMENT_TABLES, 0)
+        for columns in recordings_of(found["labels"], found["objects"], found["sensors"]):
+            index = indexes.of(columns.map)
+            rows = recording_rows(columns, index, first_object=first["objects"], first_sensor=first["sensors"])
+            for table, more in rows.items():
+                pieces[table].append(more)
+                first[table] += len(more)
+        for table, more in pieces.items():
+            expected = pa.concat_tables([SCHEMAS[table].empty_table(), *more])
+            _compare(table, found[table], expected, parts[table].path)
+
+
+def _compare(table: str, found: ArrowTable, expected: ArrowTable, file: str) -> None:
+    if len(found) != len(expected):
+        invalid(file, f"has {len(found)} rows, and what it is computed from makes {len(expected)}")
+    for field in SCHEMAS[table]:
+        told, again = (rows[field.name].combine_chunks() for rows in (found, expected))
+        if not told.equals(again) and not _close(told, again):
+            invalid(file, "is not what is computed from labels and maps", column=field.name)
+
+
+def _close(told: ArrowArray, again: ArrowArray) -> bool:
+    """Whether numbers, or lists of them, are as good as equal."""
+    if pa.types.is_list(told.type):
+        return told.value_lengths().equals(again.value_lengths()) and _close(told.flatten(), again.flatten())
+    if told.type != pa.float64():
+        return False
+    a, b = (values.to_numpy(zero_copy_only=False) for values in (told, again))
+    return bool(np.allclose(a, b, rtol=_CLOSE, atol=_CLOSE, equal_nan=True))

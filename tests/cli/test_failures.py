@@ -1,0 +1,115 @@
+"""Exit codes never lie, and names that a stranger has chosen show as what they are."""
+
+import csv
+import errno
+import io
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+
+from scenicq_cli.failures import refused_by_system
+from scenicq_cli.formats import make_writer
+
+PROGRAM = Path(__file__).parents[2] / "sample_data/scenarios/02_crossing_cars.scenic"
+EVIL = "=cmd|' /C calc'!A0\nother\x1b[31m\u202e"
+
+
+def _raise(error: BaseException):
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (MemoryError(), "memory"),
+        (pa.ArrowMemoryError("malloc of size 64 failed"), "memory"),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), "memory"),
+        (OSError(errno.EMFILE, "Too many open files"), "files"),
+        (RuntimeError("can't start new thread"), "processes"),
+        (ImportError("libx.so: failed to map segment from shared object"), "memory"),
+    ],
+)
+def test_what_the_system_refuses_is_told_and_no_mistake_of_ours(error, told, run, crossroads, monkeypatch):
+    monkeypatch.setattr("scenicq_cli.match.open_checked", lambda _: _raise(error))
+    result = run("match", PROGRAM, crossroads)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error[resources-exhausted]")
+    assert told in result.stderr
+
+
+def test_what_is_behind_an_error_counts():
+    error = ValueError("cannot be read")
+    error.__cause__ = MemoryError()
+    assert refused_by_system(error) == "there is not enough memory"
+    assert refused_by_system(ValueError("cannot be read")) is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")
+def test_too_little_memory_never_means_that_nothing_matched(command, crossroads):
+    code = (
+        "import os, resource, sys; resource.setrlimit(resource.RLIMIT_AS, (256_000_000, 256_000_000)); "
+        "os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    words = [sys.executable, "-c", code, command, "match", str(PROGRAM), str(crossroads)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "resources-exhausted" in done.stderr
+
+
+@pytest.mark.parametrize("module", ["failures", "main"])
+def test_a_program_that_cannot_be_loaded_ends_with_2(module):
+    code = (
+        "import sys, scenicq_cli.start\n"
+        f"sys.modules['scenicq_cli.{module}'] = None\n"
+        "sys.argv = ['scenicq', '--version']\n"
+        "scenicq_cli.start.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "internal error" in done.stderr
+
+
+def test_a_closed_standard_error_changes_no_exit_code(command, crossroads):
+    words = f'exec "{command}" match "{PROGRAM}" "{crossroads}" --format ids --summary 2>&-'
+    done = subprocess.run(["sh", "-c", words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stdout
+
+
+def _written(form: str) -> str:
+    sink = io.BytesIO()
+    writer = make_writer(form, sink, tuple)
+    record = {"frame": EVIL, "recording": EVIL, "timestamp_us": 0, "verdict": "match", "correspondence": {"a": EVIL},
+              "witness": {}, "sensors": {}}  # fmt: skip
+    writer.write(record)
+    writer.finish()
+    return sink.getvalue().decode()
+
+
+def test_an_id_is_one_line_whatever_it_is():
+    assert _written("ids") == "=cmd|' /C calc'!A0\\nother\\x1b[31m\\u202e\n"
+
+
+def test_a_cell_is_no_formula_and_moves_no_cursor():
+    text = _written("csv")
+    assert "\x1b" not in text
+    assert "\u202e" not in text
+    row = next(csv.DictReader(io.StringIO(text)))
+    assert row["frame"].startswith("'=cmd")
+    assert row["timestamp_us"] == "0"
+
+
+def test_json_lines_say_the_same_without_control_characters():
+    text = _written("jsonl")
+    assert json.loads(text)["frame"] == EVIL
+    assert text.isprintable() or text.rstrip("\n").isprintable()
+
+
+def test_a_table_shows_what_a_name_is():
+    text = _written("table")
+    assert "\u202e" not in text
+    assert len(text.splitlines()) == 2

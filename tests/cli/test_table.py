@@ -1,0 +1,110 @@
+"""The table of results: it fits the terminal, breaks no word, and names frames as other commands take them."""
+
+import io
+import itertools
+
+import pytest
+
+from scenicq.errors import DataError
+from scenicq.store.dataset import open_dataset
+from scenicq_cli.report import moment
+from scenicq_cli.table import Table, Text, fitted
+
+UUIDS = ("7fab2350-7eaf-3b7e-a39d-6937a4c1bede", "7fab9911-0510-35b0-a2fa-b4cea13a6d76")
+
+
+def rows(count=12):
+    for number in range(count):
+        log = UUIDS[number % 2]
+        yield (
+            f"{log}/{315966253660357000 + number * 1000:018}", log, f"{315966253.66 + number:.2f} s",
+            "no_match: would match with position=2.544,heading=50.91deg" if number % 3 else "match",
+            f"leftward=1046f1{number:02}-152a-4e82-b61b-7546 rightward=f6964{number:02}a-b84b-4c1e-afcf-9023",
+            f"val/{log}/sensors/lidar/{number}.feather",
+        )  # fmt: skip
+
+
+def dated(count=12):
+    for number in range(count):
+        yield (
+            f"{number:032x}", f"scene-{number:04}", f"2018-09-18 17:43:{number:02}.41", "match",
+            f"other={number + 7:08x}ac5adad2e28e23c6", "samples/CAM_FRONT/n008.jpg",
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(("width", "made"), list(itertools.product((80, 120), (rows, dated))))
+def test_it_is_no_wider_than_the_terminal_and_breaks_no_word(width, made):
+    table = list(made())
+    lines = fitted(
+        table, width, lambda frame: "/".join(part[-24:] if "/" not in frame else part[:8] for part in frame.split("/"))
+    )
+    assert max(map(len, lines)) <= width
+    words = {word for line in lines for word in line.split()}
+    for row in table:
+        assert set(row[3].split()) <= words
+    shown = [word for word in words if word.startswith(("leftward=", "rightward=", "other="))]
+    # ids are cut, and still differ
+    assert len(shown) == len({part for row in table for part in row[4].split()})
+
+
+def test_a_date_that_all_share_stands_in_the_head():
+    lines = fitted(list(dated()), 80, lambda frame: frame[-6:])
+    assert "2018-09-18" in lines[0]
+    assert not any("2018-09-18" in line for line in lines[1:])
+
+
+def test_in_a_pipe_nothing_is_cut(monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    sink = io.BytesIO()
+    table = Table(Text(sink), lambda: str.upper)
+    record = {
+        "frame": "f" * 100, "recording": "r" * 100, "timestamp_us": 0, "verdict": "match",
+        "correspondence": {"ego": "ego"}, "sensors": {},
+    }  # fmt: skip
+    table.write(record)
+    table.finish()
+    assert "f" * 100 in sink.getvalue().decode()
+
+
+def test_the_command_fits_where_the_terminal_is_said_to_be_narrow(run, crossroads, scenarios):
+    done = run("match", scenarios / "02_crossing_cars.scenic", crossroads, "--format", "table", env={"COLUMNS": "70"})
+    lines = done.stdout.splitlines()
+    assert max(map(len, lines)) <= 70
+    frame = lines[1].split()[0]
+    told = run("explain", scenarios / "02_crossing_cars.scenic", crossroads, frame).stdout
+    assert told.startswith("frame 03-busy-intersection/09 matches")
+
+
+def test_frames_are_found_by_beginnings_that_no_other_has(crossroads):
+    dataset = open_dataset(crossroads)
+    assert dataset.label("03-busy-intersection/09").frame == "03-busy-intersection/09"
+    assert dataset.label("03-b/09").frame == "03-busy-intersection/09"
+    cut = dataset.short_frames()
+    for label in itertools.islice(dataset.labels(), 0, None, 39):
+        assert dataset.label(cut(label.frame)) == label
+    with pytest.raises(DataError, match="several frames begin with `03-b`"):
+        dataset.label("03-b")
+    for absent in ("04-b/.*", "nope", "%"):
+        with pytest.raises(DataError, match="has no frame"):
+            dataset.label(absent)
+
+
+def test_a_clock_without_a_date_shows_none():
+    assert moment(315966253660357) == "315966253.66 s"
+    assert moment(0) == "0.00 s"
+    assert moment(-5_000_000) == "-5.00 s"
+    assert moment(1537292630412404) == "2018-09-18 17:43:50.41"
+
+
+def test_ids_say_what_they_leave_out(run, crossroads, scenarios):
+    done = run("match", scenarios / "02_crossing_cars.scenic", crossroads, "--format", "ids", "--near", "3")
+    assert len(done.stdout.splitlines()) == 5
+    assert done.stderr == "`ids` lists frames that match: 3 other frames left out\n"
+
+
+def test_a_witness_does_not_depend_on_the_folder(run, crossroads, scenarios, monkeypatch):
+    name = "02_crossing_cars.scenic"
+    first = run("match", scenarios / name, crossroads, "--limit", "1", "--format", "jsonl").stdout
+    monkeypatch.chdir(scenarios)
+    assert run("match", name, crossroads, "--limit", "1", "--format", "jsonl").stdout == first
+    assert f'"{name}:6:15"' in first

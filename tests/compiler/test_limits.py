@@ -1,0 +1,67 @@
+"""What a program makes is limited where it is made, and what calls do has its price: no error is one of ours."""
+
+import pytest
+
+from scenicq.compiler import program
+from scenicq.compiler.default_street import street
+from scenicq.compiler.program import compile_scenario
+from scenicq.errors import ScenarioError, Source
+
+HEAD = "model scenic.domains.driving.model\nego = new Car\n"
+REFUSED = {
+    "for i in range(0, 10, 0):\n    pass": "wrong-value",
+    "x = range(10**19)": "budget-exceeded",
+    "for i in range(0, -10**19, -1):\n    pass": "budget-exceeded",
+    "x = range()": "wrong-arity",
+    "new Car at 9 @ 9, facing 10**400 deg": "runtime-error",
+    "x = hypot(10**400)": "runtime-error",
+    "x = 10**400 == Range(0, 1) @ 2": "runtime-error",
+    "x = Discrete({1: 10**400})": "runtime-error",
+    'param x = "\\ud800"': "wrong-value",
+    'x = f"\\udfff{1}"': "wrong-value",
+    "a = 'a' * 100000\nb = a.join(a)": "budget-exceeded",
+    "a = ['a' * 90000] * 90\nb = ''.join(a)": "budget-exceeded",
+    "a = 'a' * 90000\nb = a.replace('a', a)": "budget-exceeded",
+    "a = [0] * 10**9": "budget-exceeded",
+    "a = 10 ** 10 ** 10": "budget-exceeded",
+    "a = pow(10, 10**10)": "budget-exceeded",
+    "a = 1 << 10**10": "budget-exceeded",
+    "a = f'{1:>{10**9}}'": "unsupported-construct",
+    "a = str(10**5000)": "budget-exceeded",
+    "for i in range(1000):\n    x = follow roadDirection from (0, 0) for 1e6": "budget-exceeded",
+    "xs = list(range(90000))\nfor i in range(3000):\n    y = sum(xs)": "budget-exceeded",
+    "for i in range(90000):\n    y = network.laneAt((i, i))": "budget-exceeded",
+    "for i in range(90000):\n    y = distance from (i, i) to road": "budget-exceeded",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_grows_or_takes_too_much_is_refused_where_it_stands(text):
+    with pytest.raises(ScenarioError) as caught:
+        compile_scenario(Source("p.scenic", HEAD + text), street())
+    (told,) = caught.value.diagnostics
+    assert told.code == REFUSED[text]
+    assert told.span is not None
+
+
+def test_a_program_ends_where_its_steps_take_too_long(monkeypatch):
+    monkeypatch.setattr(program, "MOST_SECONDS", 0.0)
+    with pytest.raises(ScenarioError, match="evaluating the program takes more than 0 s"):
+        compile_scenario(Source("p.scenic", HEAD + "for i in range(9000):\n    pass"), street())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "new Car beyond ego by Range(-1e308, 1e308)",
+        "new Car at Range(-1e308, 1e308) @ Range(-1e308, 1e308)",
+        "mutate ego by 1e308",
+    ],
+)
+def test_numbers_near_the_end_of_all_numbers_break_nothing(text, run, tmp_path, crossroads):
+    file = tmp_path / "p.scenic"
+    file.write_text(HEAD + text)
+    for words in (["match", file, crossroads, "--jobs", "1"], ["sample", file, "-n", "1"], ["check", file]):
+        told = run(*words)
+        assert told.exit_code in (0, 1, 2)
+        assert "internal error" not in told.stderr
