@@ -42,8 +42,9 @@ def _recording(query: Query, named: str) -> tuple[str, int | None] | None:
     arguments={
         "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a program "
-        "about what happens over time that of a recording, and after `@` the timestamp at which the interval begins.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a "
+        "program about what happens over time that of a recording, and after `@` the timestamp at which the interval "
+        "begins.",
     },
     exits={0: "the frame or recording matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
     topics={"What counts as a match": SHARED},

@@ -77,7 +77,8 @@ def compile_scenario(
     """
     try:
         with limited(MOST_SECONDS):
-            return _compiled(source, network, version, initial=initial, loader=loader, model=model)
+            timed = None if initial or behaviors is None else TimedStatements(behaviors)
+            return _compiled(source, network, version, initial=initial, timed=timed, loader=loader, model=model)
     except TimeIsUp:
         raise fail("budget-exceeded", f"evaluating the program takes more than {MOST_SECONDS:g} s", _start(source), "",
                    ("make loops shorter, and ask less of the map in them",)) from None  # fmt: skip
@@ -89,6 +90,7 @@ def _compiled(
     version: int | None,
     *,
     initial: bool,
+    timed: TimedStatements | None,
     loader: Loader | None,
     model: str | None,
 ) -> Scenario:
@@ -96,7 +98,7 @@ def _compiled(
     chosen = decide_version(module)
     world = _World(network, chosen, initial, loader)
     run = world.interpreter
-    run.timed = None if initial or behaviors is None else TimedStatements(behaviors)
+    run.timed = timed
     try:
         given = None if model is None or _imports(module) else model
         library = given or _left_out(module, chosen)

@@ -193,7 +193,13 @@ class Matcher:
             among: What is known of who may play whom.
             places: What is known of places of the map; see `look_up`.
         """
-        return self._findings(label, None, {}, among, places, rest_too=True)
+        found = self._findings(label, None, {}, among, places, rest_too=True)
+        while True:
+            with limited(self.options.timeout_s):
+                finding = next(found, None)
+            if finding is None:
+                return
+            yield finding
 
     def relaxed(self, options: MatchOptions) -> Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared.

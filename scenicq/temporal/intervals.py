@@ -14,6 +14,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import TimeIsUp, limited, look
 from scenicq.errors import Span
 from scenicq.forest.nodes import Compare, CompareOp, Constant, Leaf, Logic, LogicOp, Node
 from scenicq.forest.scenario import Requirement, Scenario
@@ -182,9 +183,11 @@ class IntervalMatcher:
                 yield _interval(run, start, samples, binding)
             return
         try:
-            yield from self._over_cells(dynamics, columns, expanded, samples, binding, starts)
-        except (UnclearVariable, HiddenVariable) as error:
-            reason = str(error) or "a hidden random variable in a condition over time"
+            with limited(self.match.timeout_s):
+                found = list(self._over_cells(dynamics, columns, expanded, samples, binding, starts))
+            yield from found
+        except (UnclearVariable, HiddenVariable, TimeIsUp) as error:
+            reason = "timeout" if isinstance(error, TimeIsUp) else str(error) or "a hidden random variable over time"
             for start in starts:
                 yield Interval(start.sample, samples.end - 1, int(UNKNOWN), binding, reason=reason)
 
@@ -197,6 +200,7 @@ class IntervalMatcher:
         joint = [leaf for leaf in variables if leaf.identity in self._shared]
         found: list[list[tuple[Run, Cell]]] = [[] for _ in starts]
         for cell in cells(columns, expanded):
+            look()
             runs = _follow(dynamics, columns.assigned(cell.values), expanded, samples, starts)
             for mine, run in zip(found, runs, strict=True):
                 mine.append((run, cell))

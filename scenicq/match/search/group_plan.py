@@ -77,12 +77,12 @@ def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[froz
     return tuple(frozenset(used[thing.index]) for thing in scenario.objects)
 
 
-def _over_time(scenario: Scenario) -> list[Shape]:
+def _over_time(scenario: Scenario, options: MatchOptions) -> list[Shape]:
     """The shape of all that is said about time together, so that objects it tells apart are not interchangeable."""
     if scenario.dynamics is None or not scenario.dynamics.conditions:
         return []
     conditions = [Condition(Requirement(node, node.span), node) for node in scenario.dynamics.conditions]
-    return [shape_of(Group(tuple(conditions), (), ()), scenario.ego)]
+    return [shape_of(Group(tuple(conditions), (), ()), scenario.ego, options.tolerance)]
 
 
 def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, kinds: dict[Hashable, int]) -> MatchPlan:
@@ -113,7 +113,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         for roles in paired if chained else [shape.roles]:
             for index in roles:
                 links.setdefault(index, set()).update(roles)
-    shapes += _over_time(scenario)
+    shapes += _over_time(scenario, options)
     unary: dict[int, list[GroupPlan]] = {}
     for each in groups:
         if len(each.roles) == 1:
