@@ -152,8 +152,9 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
     source, target, model = given_program(ctx, program, scenario, dataset)
     query = Query(open_checked(target), source, query_options({**given, "model": model}))
-    if near is not None and query.is_over_time():
-        raise click.UsageError("--near looks for frames: it cannot be had with intervals", ctx)
+    if (near is not None or advised) and query.is_over_time():
+        option = "--advise" if advised else "--near"
+        raise click.UsageError(f"{option} is about frames: it cannot be had with intervals", ctx)
     if explain:
         show_plan(query)
         return
@@ -187,7 +188,8 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
             raise
         if pieces is not None:
             shutil.rmtree(pieces, ignore_errors=True)
-    if advised or (not quiet and query.options.limit is None and is_nearly_empty(query)):
+    over_time = bool(query.funnel.over_time)
+    if advised or (not quiet and query.options.limit is None and not over_time and is_nearly_empty(query)):
         advise(query, asked=advised)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
