@@ -15,7 +15,8 @@ __all__ = ["show_funnel"]
 
 def _steps(query: Query) -> list[tuple[str, str]]:
     funnel, total = query.funnel, query.dataset.manifest.total.frames
-    stopped = "" if funnel.frames >= total else f" of {total:,} looked at (stopped at --limit)"
+    limit = "--deadline" if funnel.cut else "--limit"
+    stopped = "" if funnel.frames >= total else f" of {total:,} looked at (stopped at {limit})"
     filtered = "after the prefilter" if query.options.prefilter else "the prefilter is off"
     reasons = ", ".join(f"{number:,} {reason}" for reason, number in funnel.reasons.most_common())
     return [

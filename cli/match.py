@@ -14,6 +14,7 @@ from typing import Any
 
 import click
 
+from scenicq.errors import Diagnostic
 from scenicq.exporters.export import EXPORTS
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
@@ -36,6 +37,7 @@ from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
 from .programs import SCENARIO, given_program
 from .remarks import remarks, show_remarks
+from .report import show
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -43,7 +45,7 @@ __all__ = ["match"]
 
 def _near(query: Query, count: int | None) -> Iterator[Result]:
     """The frames that come closest, looked for once the matches are there."""
-    if count is not None:
+    if count is not None and not query.funnel.cut:
         yield from nearest_misses(query, count)
 
 
@@ -93,6 +95,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
               help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
 @click.option("--limit", metavar="N", type=click.IntRange(1), help="Stop after so many matches.")
+@click.option("--deadline", metavar="S", type=click.FloatRange(0, min_open=True), help="Stop after S seconds: what is "
+              "decided by then is written, the rest is counted, and `--resume` goes on.")
 @click.option("--all", "every", is_flag=True, help="Show frames that do not match, too, each with its cause.")
 @click.option("--all-matches", is_flag=True, help="One line for each correspondence by which a frame matches, "
               "interchangeable objects in one order only.")
@@ -136,9 +140,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
 def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
-          output: Path | None, export: tuple[str, Path] | None, near: int | None, report: Path | None,
-          shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None, explain: bool, advised: bool,
-          exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
+          output: Path | None, export: tuple[str, Path] | None, near: int | None, deadline: float | None,
+          report: Path | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None,
+          explain: bool, advised: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames or intervals of a dataset that match a scenario.
 
@@ -151,7 +155,10 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
     source, target, model = given_program(ctx, program, scenario, dataset)
-    query = Query(open_checked(target), source, query_options({**given, "model": model}))
+    options = query_options({**given, "model": model})
+    if deadline is not None:
+        options = replace(options, until=time.time() + deadline)
+    query = Query(open_checked(target), source, options)
     if (near is not None or advised) and query.is_over_time():
         option = "--advise" if advised else "--near"
         raise click.UsageError(f"{option} is about frames: it cannot be had with intervals", ctx)
@@ -186,12 +193,22 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
                 with contextlib.suppress(OSError):
                     pieces.rmdir()  # if nothing is done yet
             raise
-        if pieces is not None:
+        if pieces is not None and not query.funnel.cut:
             shutil.rmtree(pieces, ignore_errors=True)
-    over_time = bool(query.funnel.over_time)
-    if advised or (not quiet and query.options.limit is None and not over_time and is_nearly_empty(query)):
+    if query.funnel.cut:
+        _tell_cut(query, resume=resume)
+    whole = query.options.limit is None and not query.funnel.cut and not query.funnel.over_time
+    if advised or (not quiet and whole and is_nearly_empty(query)):
         advise(query, asked=advised)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
+
+
+def _tell_cut(query: Query, *, resume: bool) -> None:
+    """Say that the time was over, also where no summary is printed."""
+    done, total = query.funnel.frames, query.dataset.manifest.total.frames
+    message = f"the deadline passed: {done:,} of {total:,} frames are decided, and the others are not in the results"
+    again = "the same command goes on from here" if resume else "`--resume` with `-o FILE` keeps what is done"
+    show([Diagnostic("deadline-passed", message, hints=(again,), severity="warning")])
 
 
 def _in_shard(ctx: click.Context, query: Query, shard: Shard, folder: Path | None, *, quiet: bool) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 
+from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.partitions import fingerprint, gather, is_done, partitions, write_partition
 from scenicq.query.execution.record_reader import note_question
 from scenicq.query.execution.results import Funnel, record
@@ -29,6 +32,20 @@ def parse_shard(_ctx: click.Context, _parameter: click.Parameter, text: str | No
     return int(left), int(right)
 
 
+def _whole(query: Query, shard: Shard, bar: ProgressBar) -> Iterator[dict[str, Any]]:
+    """The records of a shard, all of them.
+
+    Raises:
+        DataError: deadline-passed.
+    """
+    yield from map(record, query.results(bar.advance))
+    if query.funnel.cut:
+        number, count = shard
+        message = f"shard {number}/{count} was not finished by the --deadline, and a shard is kept whole or not at all"
+        hints = ("more shards are smaller; those that are finished are kept",)
+        raise DataError(Diagnostic("deadline-passed", message, hints=hints))
+
+
 def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> Funnel:
     """Match one shard into a folder, unless it is there already; what it found is counted."""
     number, count = shard
@@ -41,6 +58,5 @@ def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> Funne
         note_question(folder, query)
         query.recordings = piece.recordings
         with ProgressBar(piece.frames, quiet=quiet) as bar:
-            records = map(record, query.results(bar.advance))
-            write_partition(folder, question, piece, records, query.funnel)
+            write_partition(folder, question, piece, _whole(query, shard, bar), query.funnel)
     return gather(folder, question, only=piece.number).funnel

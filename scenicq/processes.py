@@ -181,7 +181,8 @@ class Workers(Generic[Task, Answer]):
         context = multiprocessing.get_context("spawn")
         mine, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs, *self._call), daemon=False)
-        with _uninterrupted(), _main_hidden():
+        hidden = self._call[0].__module__ != "__main__"
+        with _uninterrupted(), _main_hidden() if hidden else contextlib.nullcontext():
             process.start()
             theirs.close()  # so that the end of the process is the end of the pipe
             self._workers.append(_Worker(process, mine))

@@ -21,13 +21,11 @@ from scenicq.forest.nodes import (
     Constant,
     DirectionAt,
     Feature,
-    Logic,
-    LogicOp,
     Node,
     Normal,
 )
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
-from scenicq.forest.walk import children, features, postorder, transform
+from scenicq.forest.walk import children, conjuncts, features, postorder, transform
 
 __all__ = ["Assembled", "Check", "assemble"]
 
@@ -98,7 +96,7 @@ def assemble(scenario: Scenario, enforce: Set[BuiltIn]) -> Assembled:
         span = each.span if each.built_in is None else scenario.objects[each.objects[-1]].span
         checks += (
             Check(part, number, text, span, probability=each.probability, built_in=each.built_in)
-            for part in _conjuncts(into(each.condition))
+            for part in conjuncts(into(each.condition))
         )
     return Assembled(plain | noise, params, tuple(checks))
 
@@ -118,16 +116,6 @@ def _told(scenario: Scenario, requirement: Requirement) -> str:
         names = " and ".join(f"`{scenario.objects[index].name}`" for index in requirement.objects)
         return f"the {requirement.built_in.value} of {names}"
     return "a requirement" if requirement.span is None else f"`{' '.join(requirement.span.text.split())}`"
-
-
-def _conjuncts(node: Node) -> Iterator[Node]:
-    todo = [node]
-    while todo:
-        part = todo.pop()
-        if isinstance(part, Logic) and part.op is LogicOp.AND:
-            todo += reversed(part.args)
-        else:
-            yield part
 
 
 class _Definitions:

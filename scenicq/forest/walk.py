@@ -24,6 +24,7 @@ from scenicq.forest.nodes import (
     Intersects,
     Leaf,
     Logic,
+    LogicOp,
     Node,
     Norm,
     Normal,
@@ -42,7 +43,17 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 
-__all__ = ["children", "deciding_first", "features", "is_leaf", "leaves", "postorder", "rebuild", "transform"]
+__all__ = [
+    "children",
+    "conjuncts",
+    "deciding_first",
+    "features",
+    "is_leaf",
+    "leaves",
+    "postorder",
+    "rebuild",
+    "transform",
+]
 
 
 def is_leaf(node: Node) -> bool:
@@ -214,6 +225,17 @@ def _known_numbers(index: Node) -> list[int] | None:
     if len(numbers) < len(options) or not all(isinstance(number, float) for number in numbers):
         return None
     return [int(number) for number in numbers if isinstance(number, float)]
+
+
+def conjuncts(root: Node) -> Iterator[Node]:
+    """The parts of a conjunction in their order; of anything else, it alone."""
+    todo = [root]
+    while todo:
+        part = todo.pop()
+        if isinstance(part, Logic) and part.op is LogicOp.AND:
+            todo += reversed(part.args)
+        else:
+            yield part
 
 
 def leaves(*roots: Node) -> tuple[Leaf, ...]:

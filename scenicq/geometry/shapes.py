@@ -208,6 +208,15 @@ def disc_polygon(x: float, y: float, radius: float, quarter: int = 16) -> Shape:
     return cast(Shape, shapely.buffer(Point(x, y), radius, quad_segs=quarter))
 
 
+QUARTER_SEGMENTS = 16
+"""Sides of the polygon that stands for a quarter of a circle in `grown`."""
+
+
+def grown(shape: Shape, width: float) -> Shape:
+    """What lies within `width` metres of a shape, circles as polygons inside of them."""
+    return cast(Shape, shapely.buffer(shape, width, quad_segs=QUARTER_SEGMENTS))
+
+
 def band(shape: Shape, width: float) -> Shape:
     """The polygon of what lies within `width` metres of a line."""
     return cast(Shape, shapely.buffer(shape, width, quad_segs=2))

@@ -13,7 +13,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.geometry.angles import direction
 from scenicq.geometry.boxes import corners
 from scenicq.geometry.shapes import XY, Bounds
-from scenicq.match.problem.observation import observe
+from scenicq.match.explanation import observe
 from scenicq.report.svg import Plane, element, escape, points_path
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label, LabelObject

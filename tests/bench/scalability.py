@@ -37,7 +37,6 @@ from scenicq.forest.scenario import Scenario  # noqa: E402
 from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
-from scenicq.match.problem.map_lookups import MapLookups  # noqa: E402
 from scenicq.match.verdict import Match  # noqa: E402
 from scenicq.smt.answer import Answer, SolverSession, Unknown  # noqa: E402
 from scenicq.smt.formula import Problem  # noqa: E402
@@ -117,7 +116,6 @@ class HeadingAssignment:
     Attributes:
         name: What it is called.
         decide: Whether a label matches.
-        prepare: What is done for all labels beforehand, and counts.
         known: Whether the correspondence is given.
         rounds: How often it is measured; more than once without patience.
         apart: The solver, where each formula gets a process of its own.
@@ -128,7 +126,6 @@ class HeadingAssignment:
     known: bool = False
     rounds: int = 1
     apart: SolverSession | None = None
-    prepare: Callable[[list[Label]], None] = lambda _: None
 
 
 @dataclass(slots=True)
@@ -154,7 +151,6 @@ def measured(way: HeadingAssignment, given: list[Label], solver: Patient) -> tup
     if way.rounds > 1:
         # reading the clock for each label would count as much as the label
         solver.deadline = math.inf
-        way.prepare(given)
         for label in given:
             assert way.decide(label), "a sampled label must match"
         return (cpu_s() - started) / len(given), False
@@ -191,19 +187,13 @@ def ways(scenario: Scenario, solver: Patient) -> list[HeadingAssignment]:
         )
 
     auto = matcher("auto")
-    places = MapLookups()
-
-    def look_up(labels: list[Label]) -> None:
-        # as a query does it: places on the map are looked up for many labels together
-        nonlocal places
-        places = auto.look_up((label, None) for label in labels)
 
     def by_auto(known: Mapping[str, str]) -> Callable[[Label], bool]:
-        return lambda label: isinstance(auto.match(label, given=known, places=places), Match)
+        return lambda label: isinstance(auto.match(label, given=known), Match)
 
     own = [
-        HeadingAssignment(KNOWN, by_auto(given), known=True, rounds=ROUNDS, prepare=look_up),
-        HeadingAssignment(SHUFFLED, by_auto({}), rounds=ROUNDS, prepare=look_up),
+        HeadingAssignment(KNOWN, by_auto(given), known=True, rounds=ROUNDS),
+        HeadingAssignment(SHUFFLED, by_auto({}), rounds=ROUNDS),
     ]
     return own if solver.alone else [*own, ours("smt"), ours("monolithic"), *map(published, VARIANTS)]
 

@@ -13,7 +13,7 @@ from scenes import compiled, drawn, label_of
 
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
-from scenicq.match.decide import linear_program
+from scenicq.match.linear import linear_program
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import find_candidates

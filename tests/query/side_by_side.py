@@ -207,9 +207,8 @@ def _spread(rows: NDArray[np.intp], most: int) -> Iterable[int]:
 
 
 def _decided(matcher: Matcher, batch: list[Candidate]) -> Iterator[Result]:
-    """Decide labels one by one, as a query does."""
-    places = matcher.look_up([(each.label, each.among) for each in batch])
-    for each in batch:
+    """Decide labels as a query does."""
+    verdicts = matcher.match_all([(each.label, each.among) for each in batch])
+    for each, verdict in zip(batch, verdicts, strict=True):
         label = each.label
-        verdict = matcher.match(label, among=each.among, places=places)
         yield Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors)

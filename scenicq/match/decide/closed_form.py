@@ -1,9 +1,9 @@
-"""Groups that closed forms decide: one comparison whose random variables are independent, or one known condition.
+"""Groups with a closed form: one comparison whose random variables are independent, or one ground condition.
 
 What most features look like once the label is known: a point of a region, an offset by ranges in a known frame, a
-heading within ranges of a known one, a value that is known altogether. The formulas are worked out once per scenario; a
-label costs a few operations of arithmetic. Only clear answers are given: whatever is close to a boundary is left to the
-decision ladder.
+heading within ranges of a known one, a condition that is known altogether. The formulas are worked out once per
+scenario, and hold for one assignment of label objects (floats) and for many (columns) alike. Only clear answers are
+given: whatever is close to a boundary is left to the cascade.
 """
 
 from __future__ import annotations
@@ -46,17 +46,33 @@ from scenicq.match.decide.compiled_expressions import (
     truth,
     turned,
 )
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
-from scenicq.match.problem.map_lookups import XY, Disc, MapLookups
+from scenicq.match.problem.map_lookups import XY, MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied
-from scenicq.match.tolerance import SLACK, Margin, Tolerance
+from scenicq.match.tolerance import SLACK, Margin
 
-__all__ = ["Certified", "ClosedForm", "closed_form_of"]
+__all__ = ["ClosedForm", "Evaluated", "closed_form_of"]
 
 _MOST_CHOICES = 8
 
-Certified: TypeAlias = "tuple[Sequence[bool], Mapping[Identity, Column | Sequence[Value]]]"
-"""Which of many labels surely satisfy a group, and a witness for each of them; for the others it means nothing."""
+
+@dataclass(frozen=True, slots=True)
+class Evaluated:
+    """A group under one assignment of label objects, or under many.
+
+    Attributes:
+        holds: Whether it is surely satisfied; of many assignments, one truth value each.
+        fails: Whether it surely cannot be. Where neither is true nothing is said.
+        values: A witness for where it holds; elsewhere it means nothing.
+    """
+
+    holds: bool | Sequence[bool]
+    fails: bool | Sequence[bool]
+    values: Mapping[Identity, Value | Column | list[Value]]
+
+
+Evaluate: TypeAlias = Callable[[Get, MatchOptions, MapLookups], Evaluated]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,26 +80,80 @@ class ClosedForm:
     """A group's closed form.
 
     Attributes:
-        decide: From the observed values, the area looked at, the tolerance and what is known of places to the outcome;
-            None where it is not clear.
+        constraint: Its one constraint.
+        evaluate: From the observed values, tolerance and radius, and what is known of the map, to what is clear.
+            It may raise `UnclearError` or `CannotEvaluate`, of columns where single values would do.
         field: The field that it asks at the position of `index`.
         region: The region that it asks for the position of `index`.
         index: The object whose position matters to field or region.
-        narrow: The answer where a position is missed by less than its tolerance would reach in another direction.
-        satisfied: The same question about many labels at once, with the area of each; None if they are to be asked one
-            by one. Where `decide` says yes it does too, with the same witness. It may raise `UnclearError`.
+        detail: What a refutation says.
     """
 
-    decide: Callable[[Get, Disc | None, Tolerance, MapLookups], Outcome | None]
+    constraint: Comparison | Condition
+    evaluate: Evaluate
     field: RoadDirection | None = None
     region: Region | None = None
     index: int = -1
-    narrow: Refuted | None = None
-    satisfied: Callable[[Columns, Sequence[Disc | None], Tolerance, MapLookups], Certified] | None = None
+    detail: Callable[[Get, MapLookups], str] | None = None
+
+    def decide(self, get: Get, options: MatchOptions, lookups: MapLookups) -> Outcome | None:
+        """Decide one assignment.
+
+        Args:
+            get: Its observed values.
+            options: Tolerance and radius.
+            lookups: What is known of the map.
+
+        Returns:
+            None where it is not clear.
+        """
+        try:
+            found = self.evaluate(get, options, lookups)
+            if found.holds:
+                return Satisfied(cast("Mapping[Identity, Value]", found.values))
+            if found.fails:
+                return Refuted(self.constraint, "" if self.detail is None else self.detail(get, lookups))
+        except (UnclearError, CannotEvaluate):
+            pass
+        return None
+
+    def decide_many(
+        self, row: Callable[[int], Get], columns: Columns, options: MatchOptions, lookups: MapLookups
+    ) -> Evaluated:
+        """Decide many assignments, each as `decide` does.
+
+        Args:
+            row: The observed values of each, by its number.
+            columns: The same, side by side.
+            options: Tolerance and radius.
+            lookups: What is known of the map.
+        """
+        try:
+            with np.errstate(all="ignore"):
+                return self.evaluate(columns, options, lookups)
+        except (UnclearError, CannotEvaluate):
+            return self._one_by_one([row(number) for number in range(columns.size)], options, lookups)
+
+    def _one_by_one(self, rows: Sequence[Get], options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        """Where columns do not do; nothing is said of those whose witness has other variables than the first one's."""
+        outcomes = [self.decide(get, options, lookups) for get in rows]
+        witnesses = [outcome.values if isinstance(outcome, Satisfied) else None for outcome in outcomes]
+        known = next((values.keys() for values in witnesses if values is not None), frozenset[Identity]())
+        kept = [values if values is not None and values.keys() == known else None for values in witnesses]
+        return Evaluated(
+            [values is not None for values in kept],
+            [isinstance(outcome, Refuted) for outcome in outcomes],
+            {identity: [math.nan if values is None else values[identity] for values in kept] for identity in known},
+        )
 
 
-def closed_form_of(group: Group) -> ClosedForm | None:
-    """The closed form of a group, None if it has none."""
+def closed_form_of(group: Group, ego: int) -> ClosedForm | None:
+    """The closed form of a group, None if it has none.
+
+    Args:
+        group: The group.
+        ego: Index of the object around which the radius is.
+    """
     if len(group.constraints) != 1:
         return None
     item = group.constraints[0]
@@ -92,114 +162,84 @@ def closed_form_of(group: Group) -> ClosedForm | None:
     if isinstance(item, Condition):
         found = _condition(item)
     elif item.object != PARAMS and item.property == "position":
-        found = _point(item, node) if isinstance(node, PointIn) else _place(item) or _offset(item)
+        found = _point(item, node, ego) if isinstance(node, PointIn) else _known_position(item) or _offset(item)
     elif item.object != PARAMS and item.property == "heading":
         found = _heading(item)
     return found
-
-
-def _decided(
-    decide: Callable[[Get, Disc | None, Tolerance, MapLookups], Outcome | None],
-) -> Callable[[Get, Disc | None, Tolerance, MapLookups], Outcome | None]:
-    """A decision that says nothing where a formula has no value."""
-
-    def guarded(get: Get, disc: Disc | None, tolerance: Tolerance, places: MapLookups) -> Outcome | None:
-        try:
-            return decide(get, disc, tolerance, places)
-        except (UnclearError, CannotEvaluate):
-            return None
-
-    return guarded
 
 
 def _condition(item: Condition) -> ClosedForm | None:
     holds = truth(item.expression)
     if holds is None:
         return None
-    yes, no = Satisfied({}), Refuted(item, "does not hold")
 
-    @_decided
-    def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: MapLookups) -> Outcome | None:
-        return yes if holds(get) else no
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        found = holds(get)
+        return Evaluated(found, not found, {})
 
-    return ClosedForm(decide)
+    return ClosedForm(item, evaluate, detail=lambda get, lookups: "does not hold")
 
 
-def _place(item: Comparison) -> ClosedForm | None:
-    """A position that is known."""
+def _known_position(item: Comparison) -> ClosedForm | None:
     exact = CompiledExpressions({}).exact(item.expression)
     if exact is None:
         return None
-    index, yes = item.object, Satisfied({})
+    index = item.object
 
-    @_decided
-    def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: MapLookups) -> Outcome | None:
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, "position"))
-        off, margin = math.hypot(x - px, y - py), tolerance.of(index, "position")
-        if off > margin.reach + SLACK and math.isfinite(off):
-            return Refuted(item, unlike("position", (x, y), (px, py)))
-        return yes if off <= _surely(margin) else None
+        return _close(x - px, y - py, options.tolerance.of(index, "position"), {})
 
-    def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: MapLookups) -> Certified:
-        (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, "position"))
-        return _close(x - px, y - py, tolerance.of(index, "position")), {}
+    def detail(get: Get, lookups: MapLookups) -> str:
+        return unlike("position", cast(XY, exact(get)), cast(XY, get(index, "position")))
 
-    return ClosedForm(decide, satisfied=satisfied)
+    return ClosedForm(item, evaluate, detail=detail)
 
 
-def _surely(margin: Margin) -> float:
-    """How far off a value is within tolerance whatever the direction."""
+def _close(dx: float, dy: float, margin: Margin, values: Mapping[Identity, Value]) -> Evaluated:
+    """Whether a position that is off by a vector is within tolerance, whatever the direction; of columns, each."""
+    off = _length(dx, dy)
+    return Evaluated(off <= _sure(margin), (off > margin.reach + SLACK) & (off < math.inf), values)
+
+
+def _sure(margin: Margin) -> float:
+    """How far off a value is within tolerance whatever the direction and the rounding."""
     return max(0.0, margin.sure - SLACK)
 
 
-def _point(item: Comparison, node: PointIn) -> ClosedForm | None:
+def _length(x: float, y: float) -> float:
+    """The length of a vector; of columns, a column of the same numbers to the last bit."""
+    if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
+        pairs = zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True)
+        return cast(float, np.array([math.hypot(*pair) for pair in pairs]))
+    return math.hypot(x, y)
+
+
+def _point(item: Comparison, node: PointIn, ego: int) -> ClosedForm | None:
     if not isinstance(node.region, Constant):
         return None
     region, index = cast(Region, node.region.value), item.object
 
-    def is_in(place: XY, disc: Disc | None, places: MapLookups) -> bool:
-        if disc is not None and math.dist(place, disc[0]) > disc[1] - SLACK:
-            return False
-        return places.within(region, place)
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        places = _each(get(index, "position"))
+        holds = [lookups.within(region, place) for place in places]
+        if options.radius is not None:
+            near, centres = options.radius - SLACK, _each(get(ego, "position"))
+            distances = itertools.starmap(math.dist, zip(places, centres, strict=True))
+            holds = [held and distance <= near for held, distance in zip(holds, distances, strict=True)]
+        if isinstance(get, Columns):
+            return Evaluated(holds, [False] * get.size, {node.identity: cast("list[Value]", places)})
+        return Evaluated(holds[0], False, {node.identity: places[0]})
 
-    def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: MapLookups) -> Outcome | None:
-        place = cast(XY, get(index, "position"))
-        return Satisfied({node.identity: place}) if is_in(place, disc, places) else None
-
-    def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: MapLookups) -> Certified:
-        where = _pairs(get, index)
-        return [is_in(place, disc, places) for place, disc in zip(where, discs, strict=True)], {node.identity: where}
-
-    return ClosedForm(decide, region=region, index=index, satisfied=satisfied)
+    return ClosedForm(item, evaluate, region=region, index=index)
 
 
-def _pairs(get: Columns, index: int) -> list[XY]:
-    """The positions of an object in many labels."""
-    x, y = cast("tuple[Column, Column]", get(index, "position"))
-    return list(zip(x.tolist(), y.tolist(), strict=True))
-
-
-def _misses(margin: Margin, sides: tuple[float, float, float, float], turn: float) -> bool:
-    """Whether a box along the map's axes around an observed position surely misses a rectangle.
-
-    Args:
-        margin: A box; else nothing is said.
-        sides: Of the rectangle, from the observed position, in a frame of its own: west, east, south, north.
-        turn: The angle of that frame.
-    """
-    if margin.kind != "box" or not all(map(math.isfinite, sides)):
-        return False
-    c, s = math.cos(turn), math.sin(turn)
-    west, east, south, north = sides
-    corners = [(u * c - v * s, u * s + v * c) for u in (west, east) for v in (south, north)]
-    across, along = abs(c) * margin.size + abs(s) * margin.y, abs(s) * margin.size + abs(c) * margin.y
-    gaps = (
-        max(west, -east) - across,
-        max(south, -north) - along,
-        max(min(p for p, _ in corners), -max(p for p, _ in corners)) - margin.size,
-        max(min(q for _, q in corners), -max(q for _, q in corners)) - margin.y,
-    )
-    return max(gaps) > SLACK
+def _each(position: Value) -> list[XY]:
+    """The positions that a pair of columns has; of one position, it alone."""
+    x, y = cast(XY, position)
+    if isinstance(x, np.ndarray):
+        return list(zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True))
+    return [(x, y)]
 
 
 def _offset(item: Comparison) -> ClosedForm | None:
@@ -224,119 +264,105 @@ def _offset(item: Comparison) -> ClosedForm | None:
     if x is None or y is None or x.fields or y.fields or not (x.terms or y.terms) or set(x.terms) & set(y.terms):
         return None
     index = item.object
-    no, narrow = Refuted(item), Refuted(item)
 
-    def seen(get: Get) -> tuple[XY, XY, XY, float]:
-        """The position in the frame of the offset, the offset's known part and what comes nearest; the frame's turn."""
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         px, py = cast(XY, get(index, "position"))
-        turn = 0.0
+        # into the frame of the offset
         for shift, exact in steps:
             if shift:
                 qx, qy = cast(XY, exact(get))
                 px, py = px - qx, py - qy
             else:
-                angle = cast(float, exact(get))
-                turn = turn + angle
-                c, s = turned(angle)
+                c, s = turned(cast(float, exact(get)))
                 px, py = px * c + py * s, py * c - px * s
         a, b = x.known(get), y.known(get)
-        return (px, py), (a, b), (clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)), turn
+        u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
+        margin = options.tolerance.of(index, "position")
+        return _close(u - px, v - py, margin, {**spread(x, u - a), **spread(y, v - b)})
 
-    @_decided
-    def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: MapLookups) -> Outcome | None:
-        (px, py), (a, b), (u, v), turn = seen(get)
-        off, margin = math.hypot(u - px, v - py), tolerance.of(index, "position")
-        if off > margin.reach + SLACK and math.isfinite(off):
-            return no
-        if not off <= _surely(margin):
-            sides = a + x.low - px, a + x.high - px, b + y.low - py, b + y.high - py
-            return narrow if _misses(margin, sides, turn) else None
-        return Satisfied({**spread(x, u - a), **spread(y, v - b)})
-
-    def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: MapLookups) -> Certified:
-        (px, py), (a, b), (u, v), _ = seen(get)
-        values = {**spread(x, u - a), **spread(y, v - b)}
-        return _close(u - px, v - py, tolerance.of(index, "position")), cast("Mapping[Identity, Column]", values)
-
-    return ClosedForm(decide, narrow=narrow, satisfied=satisfied)
-
-
-def _close(x: float, y: float, margin: Margin) -> list[bool]:
-    """Whether positions that are off by columns are surely within tolerance."""
-    sure = _surely(margin)
-    offs = zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True)
-    return [math.hypot(*off) <= sure for off in offs]
+    return ClosedForm(item, evaluate)
 
 
 def _heading(item: Comparison) -> ClosedForm | None:
     indices = [node for node in postorder((item.expression,)) if isinstance(node, Index)]
     if math.prod(len(node.weights) for node in indices) > _MOST_CHOICES:
         return None
-    ways: list[tuple[dict[Identity, Value], Form]] = []
+    choices: list[tuple[dict[Identity, Value], Form]] = []
     for picked in itertools.product(*(range(len(node.weights)) for node in indices)):
         chosen = {node.identity: float(option) for node, option in zip(indices, picked, strict=True)}
         form = CompiledExpressions(chosen).form(item.expression)
         if form is None:
             return None
-        ways.append((cast("dict[Identity, Value]", chosen), form))
-    fields = {id(node): node for _, form in ways for node in form.fields}
-    if len(fields) > 1 or any(len(form.fields) != len(fields) for _, form in ways):
+        choices.append((cast("dict[Identity, Value]", chosen), form))
+    fields = {id(node): node for _, form in choices for node in form.fields}
+    if len(fields) > 1 or any(len(form.fields) != len(fields) for _, form in choices):
         return None
     along = next(iter(fields.values()), None)
-    if along is not None and not _plain(along):
+    if along is not None and not _asks_for_roads(along):
         return None
-    index = item.object
-    no = Refuted(item)
-    # what the ladder tries first is what it words
-    known_first = not ways[0][1].terms
+    index, first = item.object, choices[0][1]
     flow = cast(RoadDirection, cast(Constant, along.field).value) if along is not None else None
     where = cast(Feature, along.point).object if along is not None else -1
 
-    @_decided
-    def decide(get: Get, disc: Disc | None, tolerance: Tolerance, places: MapLookups) -> Outcome | None:
-        seen = cast(float, get(index, "heading"))
-        allowed: tuple[float, ...] = (0.0,)
-        if flow is not None:
-            allowed = places.allowed(flow, cast(XY, get(where, "position")))
-            if not allowed:
-                return None
-        clear, margin = True, tolerance.of(index, "heading")
-        for chosen, form in ways:
-            if form.unbounded:
-                return Satisfied({**chosen, **spread(form, seen - form.known(get) - allowed[0])})
-            middle, half = (form.low + form.high) / 2, (form.high - form.low) / 2
-            rest = seen - form.known(get) - middle
-            for direction in allowed:
-                off = math.remainder(rest - direction, math.tau)
-                beyond = abs(off) - half
-                if beyond <= _surely(margin):
-                    return Satisfied({**chosen, **spread(form, middle + min(max(off, -half), half))})
-                clear = clear and beyond > margin.reach + SLACK
-        if not clear:
-            return None
-        return Refuted(item, unlike("heading", ways[0][1].known(get) + allowed[0], seen)) if known_first else no
+    def directions(get: Get, lookups: MapLookups, size: int) -> list[tuple[float, ...]]:
+        if flow is None:
+            return [(0.0,)] * size
+        return [lookups.allowed(flow, place) for place in _each(get(where, "position"))]
 
-    if len(ways) > 1 or ways[0][1].unbounded:
-        return ClosedForm(decide, field=flow, index=where)
-    form = ways[0][1]
-    middle, half = (form.low + form.high) / 2, (form.high - form.low) / 2
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        many, margin = isinstance(get, Columns), options.tolerance.of(index, "heading")
+        if many and len(choices) > 1:
+            raise UnclearError
+        fails = True
+        allowed = directions(get, lookups, get.size if isinstance(get, Columns) else 1)
+        for chosen, form in choices:
+            middle = 0.0 if form.unbounded else (form.low + form.high) / 2
+            half = (form.high - form.low) / 2
+            rest = cast(float, get(index, "heading")) - form.known(get) - middle
+            rests: list[float] = cast(Column, rest).tolist() if isinstance(rest, np.ndarray) else [rest]
+            sure = _sure(margin)
+            offs = [_turn(*each, half, sure) for each in zip(rests, allowed, strict=True)]
+            off = cast(float, np.array(offs)) if many else offs[0]
+            beyond = abs(off) - half
+            holds, misses = beyond <= sure, beyond > margin.reach + SLACK
+            if many or holds:
+                values = spread(form, middle + clipped(off, -half, half))
+                return Evaluated(holds, misses, {**chosen, **values})
+            fails = fails and misses
+        return Evaluated(False, fails, {})
 
-    def satisfied(get: Columns, discs: Sequence[Disc | None], tolerance: Tolerance, places: MapLookups) -> Certified:
-        seen = cast(Column, get(index, "heading"))
-        sure = _surely(tolerance.of(index, "heading"))
-        plain = [(0.0,)] * get.size
-        directions = plain if flow is None else [places.allowed(flow, place) for place in _pairs(get, where)]
-        offs: list[float] = []
-        for rest, allowed in zip((seen - form.known(get) - middle).tolist(), directions, strict=True):
-            turns = (math.remainder(rest - direction, math.tau) for direction in allowed)
-            offs.append(next((off for off in turns if abs(off) - half <= sure), math.nan))
-        values = spread(form, middle + clipped(cast(float, np.array(offs)), -half, half))
-        return [not math.isnan(off) for off in offs], cast("Mapping[Identity, Column]", values)
+    def detail(get: Get, lookups: MapLookups) -> str:
+        # what the cascade tries first is what it words
+        if first.terms:
+            return ""
+        direction, seen = directions(get, lookups, 1)[0][0], cast(float, get(index, "heading"))
+        return unlike("heading", first.known(get) + direction, seen)
 
-    return ClosedForm(decide, field=flow, index=where, satisfied=satisfied)
+    return ClosedForm(item, evaluate, field=flow, index=where, detail=detail)
 
 
-def _plain(node: DirectionAt) -> bool:
+def _turn(angle: float, allowed: Sequence[float], half: float, sure: float) -> float:
+    """How far an angle is turned from the first direction that it is within reach of, or else from the nearest one.
+
+    Args:
+        angle: In radians.
+        allowed: The directions; without any the answer is NaN.
+        half: Half the range that is allowed besides; unbounded, the first direction does.
+        sure: How much further is within reach.
+    """
+    nearest = math.nan
+    for direction in allowed:
+        if math.isinf(half):
+            return angle - direction
+        off = math.remainder(angle - direction, math.tau)
+        if abs(off) - half <= sure:
+            return off
+        if not abs(off) >= abs(nearest):
+            nearest = off
+    return nearest
+
+
+def _asks_for_roads(node: DirectionAt) -> bool:
     """Whether a field is asked for the direction of roads at an observed position."""
     field_, point = node.field, node.point
     return (

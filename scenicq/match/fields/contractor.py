@@ -28,8 +28,6 @@ from scenicq.forest.nodes import (
     DirectionAt,
     Identity,
     Leaf,
-    Logic,
-    LogicOp,
     Node,
     Norm,
     PointIn,
@@ -40,7 +38,7 @@ from scenicq.forest.nodes import (
     VectorOf,
     VectorSum,
 )
-from scenicq.forest.walk import is_leaf
+from scenicq.forest.walk import conjuncts, is_leaf
 from scenicq.match.fields.constraint_network import Tape
 from scenicq.match.fields.interval_affine import Multiples, interval_affine_of, solved
 from scenicq.match.fields.interval_domain import (
@@ -287,7 +285,8 @@ class BoxSet:
     def _compare(self, item: Item) -> None:
         constraint, node, seen = item
         if not isinstance(constraint, Comparison):
-            self._hold(node)
+            for part in conjuncts(node):
+                self._hold(part)
         elif isinstance(seen, tuple) and constraint.property == "position":
             margin = self.tape.tolerance.of(constraint.object, "position")
             a, b = margin.size + SLACK, margin.y + SLACK
@@ -301,9 +300,6 @@ class BoxSet:
 
     def _hold(self, node: Node) -> None:
         match node:
-            case Logic() if node.op is LogicOp.AND:
-                for part in node.args:
-                    self._hold(part)
             case Compare():
                 left, right = self._scalar(node.left), self._scalar(node.right)
                 if left.ndim > 2 or right.ndim > 2:

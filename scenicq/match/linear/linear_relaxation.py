@@ -25,15 +25,13 @@ from scenicq.forest.nodes import (
     Contains,
     Identity,
     Leaf,
-    Logic,
-    LogicOp,
     Node,
     Norm,
     PointIn,
     Value,
 )
 from scenicq.forest.proximity_pruning import close_boxes
-from scenicq.forest.walk import leaves
+from scenicq.forest.walk import conjuncts, leaves
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
@@ -186,7 +184,8 @@ class _Problem:
         """Add a constraint."""
         constraint, node, observed = item
         if not isinstance(constraint, Comparison):
-            self._add_condition(node)
+            for part in conjuncts(node):
+                self._add_condition(part)
         elif isinstance(observed, tuple):
             self._add_vector(constraint, node, observed)
         else:
@@ -223,9 +222,6 @@ class _Problem:
 
     def _add_condition(self, node: Node) -> None:
         match node:
-            case Logic() if node.op is LogicOp.AND:
-                for part in node.args:
-                    self._add_condition(part)
             case Contains() if isinstance(node.region, Constant):
                 place = affine_vector(node.point)
                 if place is None:

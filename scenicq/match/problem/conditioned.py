@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 from scenicq.forest.condition import Observation, condition
 from scenicq.forest.groups import Comparison, Condition, Constraint, Group
-from scenicq.forest.nodes import Identity, Node, Value
+from scenicq.forest.nodes import Feature, Identity, Node, Value
 from scenicq.forest.scenario import Requirement
+from scenicq.forest.walk import children, postorder
 
 __all__ = ["Item", "condition_group", "conditioned", "fact"]
 
@@ -18,7 +20,7 @@ Item = tuple[Constraint, Node, Value]
 def condition_group(group: Group, observed: Observation, scope: Mapping[Identity, Value] | None = None) -> list[Item]:
     """A group's constraints given the label (algorithm 1, line 11); what they share stays shared."""
     items: list[Item] = []
-    memo: dict[int, Node] = {}
+    memo = {} if scope else dict(_unobserved(group))
     for constraint in group.constraints:
         node = condition(constraint.expression, observed, scope, memo)
         known: Value = None
@@ -26,6 +28,22 @@ def condition_group(group: Group, observed: Observation, scope: Mapping[Identity
             known = observed[(constraint.object, constraint.property)]
         items.append((constraint, node, known))
     return items
+
+
+@lru_cache(maxsize=256)
+def _unobserved(group: Group) -> Mapping[int, Node]:
+    """The largest parts of a group's expressions that no label changes, by their ids: choices among map elements."""
+    roots = [constraint.expression for constraint in group.constraints]
+    observing: set[int] = set()
+    largest: dict[int, Node] = {}
+    for node in postorder(roots):
+        below = children(node)
+        if isinstance(node, Feature) or any(id(child) in observing for child in below):
+            observing.add(id(node))
+            largest.update((id(child), child) for child in below if children(child) and id(child) not in observing)
+    largest.update((id(root), root) for root in roots if id(root) not in observing)
+    memo: dict[int, Node] = {}
+    return {key: condition(node, {}, None, memo) for key, node in largest.items()}
 
 
 def conditioned(

@@ -21,6 +21,7 @@ from scenicq.match.problem.conditioned import Item, condition_group
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.problem.radius import within_radius
+from scenicq.match.search.choice_search import decide_with_choices
 from scenicq.match.search.group_plan import GroupPlan
 
 __all__ = ["Asker", "GroupCache", "translated"]
@@ -42,13 +43,13 @@ class GroupCache:
         options: The options.
         cast: The label and who may play whom.
         ask: The solver.
-        places: What is known of places of the map.
+        lookups: What is known of the map.
     """
 
     options: MatchOptions
     cast: Cast
     ask: Asker
-    places: MapLookups
+    lookups: MapLookups
     _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
         default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
     )
@@ -67,30 +68,32 @@ class GroupCache:
         return items if self.cast.disc is None else within_radius(items, *self.cast.disc)
 
     def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
-        """What is decided for the things in a group's roles, said of a group of the same shape (see `translated`)."""
+        """What is decided for the label objects in a group's roles, said of a group of its shape (see `translated`)."""
         key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
         known = self._known.get(key)
         if known is None:
-            outcome = self._in_closed_form(plan, assignment) or self._by_ladder(plan.group, assignment)
+            outcome = self._in_closed_form(plan, assignment) or self._by_cascade(plan.group, assignment)
             known = self._known[key] = (plan.group, outcome)
         return known
 
     def _in_closed_form(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
         """What a closed form says, if it is clear."""
-        if plan.quick is None or self.options.method != "auto":
+        if plan.closed_form is None or self.options.method != "auto":
             return None
         seen = self.cast.seen
-        return plan.quick.decide(
-            lambda index, name: seen[assignment[index]][name], self.cast.disc, self.options.tolerance, self.places
-        )
+        return plan.closed_form.decide(lambda index, name: seen[assignment[index]][name], self.options, self.lookups)
 
-    def _by_ladder(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
+    def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
         try:
             look()
             items = self.items(group, assignment)
             if self.options.method == "smt":
                 return self.ask([items])
-            outcome = decide_decomposed(items, self.options.tolerance)
+            tolerance = self.options.tolerance
+            chosen = decide_with_choices(items, tolerance, lambda left: decide_decomposed(left, tolerance), self.ask)
+            if chosen is not None:
+                return chosen
+            outcome = decide_decomposed(items, tolerance)
             return self.ask([items]) if isinstance(outcome, Undecided) else outcome
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")

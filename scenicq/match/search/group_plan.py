@@ -26,7 +26,7 @@ class GroupPlan:
         group: The group.
         kind: Number of its shape: equal for groups that ask the same question of their roles.
         roles: The objects that it is about, the ego left out, in the order in which the question speaks of them.
-        quick: Its closed form, if it has one.
+        closed_form: Its closed form, if it has one.
         parts: What a group about many objects demands of one or two of them.
         steps: In which its necessary conditions are evaluated.
     """
@@ -34,7 +34,7 @@ class GroupPlan:
     group: Group
     kind: int
     roles: tuple[int, ...]
-    quick: ClosedForm | None = None
+    closed_form: ClosedForm | None = None
     parts: tuple[GroupPlan, ...] = ()
     steps: Steps = ()
 
@@ -104,9 +104,10 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         for part in parts_of(group, scenario.ego):
             small = shape_of(part, scenario.ego, options.tolerance)
             number = kinds.setdefault(small.key, len(kinds))
-            parts.append(GroupPlan(part, number, small.roles, closed_form_of(part)))
+            parts.append(GroupPlan(part, number, small.roles, closed_form_of(part, scenario.ego)))
         number = kinds.setdefault(shape.key, len(kinds))
-        groups.append(GroupPlan(group, number, shape.roles, closed_form_of(group), tuple(parts), steps_of(group)))
+        form = closed_form_of(group, scenario.ego)
+        groups.append(GroupPlan(group, number, shape.roles, form, tuple(parts), steps_of(group)))
         paired = [part.roles for part in parts if len(part.roles) > 1]
         # of a chain, the next one is what can be checked next
         chained = set(shape.roles) == {index for roles in paired for index in roles}

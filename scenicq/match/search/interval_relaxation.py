@@ -14,7 +14,7 @@ from typing import Any, TypeAlias, assert_never, cast
 
 import numpy as np
 
-from scenicq.forest.bounds import EVERYTHING, scalar_bounds, vector_bounds
+from scenicq.forest.bounds import EVERYTHING, vector_bounds
 from scenicq.forest.groups import Comparison, Group
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -210,8 +210,12 @@ class _Evaluation:
                 return (low[0], high[1])
             case Index():
                 return (0.0, len(node.weights) - 1.0)
-            case Normal() | Distance() | Bearing() | DirectionAt():
-                return scalar_bounds(node)
+            case Normal():
+                return EVERYTHING
+            case Distance():
+                return (0.0, math.inf)
+            case Bearing() | DirectionAt():
+                return (-math.pi, math.pi)
             case PointIn():
                 return vector_bounds(node)
             case Contains() | Intersects() | Encloses():

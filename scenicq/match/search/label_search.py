@@ -76,7 +76,7 @@ class LabelSearch:
         cast: The label and who may play whom.
         ask: The solver.
         reporter: Watches the search.
-        places: What is known of places of the map.
+        lookups: What is known of the map.
         failure: What excluded the correspondence that came furthest.
         undecided: What kept a correspondence that was not excluded from being a match.
     """
@@ -86,14 +86,14 @@ class LabelSearch:
     cast: Cast
     ask: Asker
     reporter: Reporter | None = None
-    places: MapLookups = field(default_factory=MapLookups)
+    lookups: MapLookups = field(default_factory=MapLookups)
     failure: Failure | None = None
     undecided: Failure | None = None
     _decisions: GroupCache = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Begin with nothing decided."""
-        self._decisions = GroupCache(self.options, self.cast, self.ask, self.places)
+        self._decisions = GroupCache(self.options, self.cast, self.ask, self.lookups)
 
     def solutions(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
         """Every correspondence that matches, interchangeable objects in one order; what is left open is noted.
@@ -366,7 +366,7 @@ def _easy(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
     """
     pairs = 0
     for group in plan.groups:
-        if group.quick is None or not group.group.variables:
+        if group.closed_form is None or not group.group.variables:
             return False
         pairs += math.prod(len(candidates[index]) for index in group.roles)
     return pairs <= _FEW
@@ -374,7 +374,7 @@ def _easy(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
 
 def _little(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
     """Whether there is little to try, all of it in closed form, in the order of the program."""
-    if len(candidates) > _FEW_SLOTS or any(group.quick is None for group in plan.groups):
+    if len(candidates) > _FEW_SLOTS or any(group.closed_form is None for group in plan.groups):
         return False
     tries = {(group.kind, tuple([candidates[index] for index in group.roles])) for group in plan.groups if group.roles}
     return sum(len(numbers) for _, options in tries for numbers in options) <= _FEW_TRIES

@@ -16,9 +16,9 @@ from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
-from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.verdict import Verdict
+from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
 from scenicq.query.execution.results import Result
@@ -90,6 +90,7 @@ class Decider:
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
         time: Options of a query over time.
+        until: When the time is over; see `check_deadline`.
     """
 
     dataset: Dataset
@@ -100,6 +101,7 @@ class Decider:
     all_matches: bool
     every: bool
     time: IntervalOptions = field(default_factory=IntervalOptions)
+    until: float | None = None
     _worlds: dict[str, tuple[CompiledMap, Matcher]] = field(default_factory=dict["str", "tuple[CompiledMap, Matcher]"])
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
@@ -118,7 +120,9 @@ class Decider:
 
         Raises:
             ScenarioError: The program does not fit the map.
+            DeadlineError: The time is over; while results are taken, too.
         """
+        check_deadline(self.until)
         if self._connection is None:
             self._connection = self.dataset.connect(threads=self.threads)
             self._open.callback(self._connection.close)
@@ -157,21 +161,21 @@ class Decider:
         size = _FIRST_BATCH
         while batch := list(islice(left, size)):
             labels = [(each.label, each.among) for each in batch]
-            places = matcher.look_up(labels)
             verdicts: Iterator[list[Verdict]]
             if self.all_matches:
-                verdicts = (_every_match(matcher, label, among, places) for label, among in labels)
+                verdicts = (_every_match(matcher, label, among) for label, among in labels)
             else:
-                verdicts = ([verdict] for verdict in matcher.match_all(labels, places))
+                verdicts = ([verdict] for verdict in matcher.match_all(labels))
             for (label, _), found in zip(labels, verdicts, strict=True):
+                check_deadline(self.until)
                 yield [Result(label.frame, label.recording, label.timestamp_us, each, label.sensors) for each in found]
             size = _BATCH
 
 
-def _every_match(matcher: Matcher, label: Label, among: Candidates | None, places: MapLookups) -> list[Verdict]:
+def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> list[Verdict]:
     """Every correspondence by which a label matches, or else why none does."""
-    matches: list[Verdict] = [*matcher.matches(label, among=among, places=places)]
-    return matches or [matcher.match(label, among=among, places=places)]
+    matches: list[Verdict] = [*matcher.matches(label, among=among)]
+    return matches or [matcher.match(label, among=among)]
 
 
 def every_label(dataset: Dataset, block: Block, *, motion: bool = False) -> Iterator[Label]:

@@ -79,7 +79,7 @@ def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
     asked = asdict(options)
     asked["match"]["enforce"] = sorted(asked["match"]["enforce"])
     asked["match"]["ignore_params"] = sorted(asked["match"]["ignore_params"])
-    for name in ("jobs", "prefilter", "strict"):
+    for name in ("jobs", "prefilter", "strict", "until"):
         asked.pop(name)
     text = json.dumps([tables, program, asked], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -10,7 +10,8 @@ from itertools import groupby
 
 from scenicq.forest.groups import Condition
 from scenicq.forest.scenario import Requirement, Scenario
-from scenicq.match.matcher import Finding, Matcher
+from scenicq.match.explanation import Finding
+from scenicq.match.matcher import Matcher
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import describe_constraint
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
@@ -102,8 +103,7 @@ class RecordingMatcher:
                 found.failed[describe_constraint(self.matcher.scenario, Condition(narrowed, narrowed.condition))] += 1
                 continue
             among, matcher = narrowed
-            places = matcher.look_up([(candidate.label, among)])
-            findings = list(matcher.findings(candidate.label, among=among, places=places))
+            findings = list(matcher.findings(candidate.label, among=among))
             for each in findings:
                 if isinstance(each.verdict, NoMatch):
                     found.failed[each.verdict.cause.what] += 1
@@ -195,8 +195,8 @@ def starts_of(scenario: Scenario, label: Label, sample: int, findings: Iterable[
         if isinstance(verdict, NoMatch):
             continue
         chosen = dict(finding.assignment)
-        if isinstance(verdict, Match) and finding.attempt is not None and finding.plan is not None:
-            chosen[scenario.ego] = finding.attempt.cast.ego
+        if isinstance(verdict, Match) and finding.search is not None and finding.plan is not None:
+            chosen[scenario.ego] = finding.search.cast.ego
             tracks = {index: track_of(label, things[number]) for index, number in chosen.items()}
             for members in _classes(finding.plan.twins):
                 ordered = sorted(tracks[index] for index in members)

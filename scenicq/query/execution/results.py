@@ -110,6 +110,7 @@ class Funnel:
         broken: Of a query over time: how many bindings without a match broke which requirement.
         missing: Frames of the dataset in which a property that the program sets is missing, although others have it.
         warnings: What the user should know, such as a map that the program does not fit.
+        cut: Whether the time was over before all frames were decided.
     """
 
     frames: int = 0
@@ -123,6 +124,7 @@ class Funnel:
     broken: Counter[str] = field(default_factory=Counter[str])
     missing: dict[str, int] = field(default_factory=dict[str, int])
     warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
+    cut: bool = False
 
     def add(self, other: Funnel) -> None:
         """Count in what was found elsewhere."""
@@ -136,6 +138,7 @@ class Funnel:
         self.over_time.update(other.over_time)
         self.broken.update(other.broken)
         self.missing.update(other.missing)
+        self.cut = self.cut or other.cut
         self.warnings += [warning for warning in other.warnings if warning not in self.warnings]
 
     def exclude(self, what: str, frames: int = 1) -> None:

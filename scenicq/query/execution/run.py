@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Se
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal, TypeVar, cast
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
 from scenicq.query.execution.compiled_map import about_dataset, map_remark
+from scenicq.query.execution.deadline import DeadlineError
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
@@ -53,6 +54,7 @@ class QueryOptions:
         time: Options of intervals.
         model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
+        until: When the time is over, in seconds since 1970; None for never. What is decided by then are the results.
     """
 
     match: MatchOptions = MatchOptions()
@@ -68,6 +70,7 @@ class QueryOptions:
     time: IntervalOptions = field(default_factory=IntervalOptions)
     model: str | None = None
     strict: bool = False
+    until: float | None = None
 
 
 def read_program(path: str | Path) -> Source:
@@ -309,6 +312,7 @@ class Query:
             all_matches=options.all_matches,
             every=options.every,
             time=options.time,
+            until=options.until,
         )
 
     def over_time(self, world: CompiledMap) -> bool:
@@ -366,6 +370,8 @@ class Query:
                             left -= 1
                             if left <= 0:
                                 return
+                if self.funnel.cut:
+                    return
 
     def _lacking(self, map_name: str, told: Diagnostic, progress: Callable[[int], None]) -> Iterator[Result]:
         """The frames of a map that lacks what the program needs, which are counted already."""
@@ -378,14 +384,19 @@ class Query:
         progress(self._frames(map_name))
 
     def _merge(self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]) -> Generator[Result]:
-        for block in decided:
-            found = iter(block.found)
+        for block in _until_deadline(decided, self.funnel):
+            found = _until_deadline(block.found, self.funnel)
             start = 0
             try:
                 for place in np.flatnonzero(block.missed < 0).tolist():
                     if self.options.every:
                         yield from _excluded(plan, block, start, place)
-                    first, *more = next(found)
+                    verdicts = next(found, None)
+                    if verdicts is None:
+                        # the time was over in another process
+                        self.funnel.cut = True
+                        return
+                    first, *more = verdicts
                     self.funnel.count(first.verdict)
                     progress(place + 1 - start)
                     start = place + 1
@@ -407,7 +418,7 @@ class Query:
         self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]
     ) -> Generator[Result]:
         funnel = self.funnel
-        for block in decided:
+        for block in _until_deadline(decided, funnel):
             assert block.recordings is not None
             past = block.missed[block.missed >= 0]
             for step, count in enumerate(np.bincount(past, minlength=len(plan.steps)).tolist()):
@@ -422,6 +433,17 @@ class Query:
                 if self.options.every or isinstance(result.verdict, Match | Unknown):
                     yield result
             progress(len(block.missed))
+
+
+_Item = TypeVar("_Item")
+
+
+def _until_deadline(found: Iterable[_Item], funnel: Funnel) -> Iterator[_Item]:
+    """What comes before the time is over."""
+    try:
+        yield from found
+    except DeadlineError:
+        funnel.cut = True
 
 
 def _excluded(plan: Plan, block: Decided, start: int, end: int) -> Iterator[Result]:
@@ -460,6 +482,6 @@ def _start_worker(
 
     def work(block: Block, _tell: Callable[[object], None]) -> Decided:
         decided = decider.decide(block)
-        return replace(decided, found=list(decided.found))
+        return replace(decided, found=list(_until_deadline(decided.found, Funnel())))
 
     return work

@@ -151,6 +151,10 @@ def kept(engine: Engine, folder: Path) -> Engine:
             for piece in every:
                 if piece.number in missing:
                     _, (results, funnel) = next(running)
+                    if funnel.cut:
+                        # only whole pieces are kept
+                        yield piece, (results, funnel)
+                        return
                     write_partition(folder, question, piece, map(record, results), funnel)
                     yield piece, (results, funnel)
                 else:
@@ -178,6 +182,8 @@ def in_order(query: Query, engine: Engine, pieces: Iterable[Partition], progress
                 left -= 1
                 if left <= 0:
                     return
+        if funnel.cut:
+            return
 
 
 def _start() -> Callable[[Asked, Callable[[object], None]], Done]:

@@ -13,12 +13,17 @@ from dataclasses import dataclass, replace
 from scenicq.errors import Diagnostic, Span, render
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Group
-from scenicq.match.decide.solver_step import encoded
-from scenicq.match.matcher import Finding, Matcher
-from scenicq.match.problem.constraints import describe_constraint
-from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
-from scenicq.match.search.group_plan import MatchPlan
-from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.explanation import (
+    Finding,
+    LabelSearch,
+    MatchPlan,
+    Refuted,
+    Satisfied,
+    Undecided,
+    describe_constraint,
+    encoded,
+)
+from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.explain.margins import Margin, margins
 from scenicq.query.explain.nearest_miss import Closest, closest, separated, show_tolerance
@@ -88,14 +93,14 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
     """
     finding = matcher.examine(label)
     if isinstance(finding.verdict, Match):
-        assert finding.attempt is not None
+        assert finding.search is not None
         assert finding.plan is not None
         return Explanation(
             label.frame,
             finding.verdict,
             finding.verdict.correspondence,
             _proofs(finding),
-            margins(matcher, finding.attempt, finding.plan, finding.assignment),
+            margins(matcher, finding.search, finding.plan, finding.assignment),
             formulas=_formulas(matcher, finding) if formulas else (),
         )
     nearest = closest(matcher, label)
@@ -103,7 +108,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
         return _without_match(matcher, label, finding, formulas=formulas)
     nearest = separated(matcher, label, nearest)
     assert isinstance(nearest.finding.verdict, Match)
-    found = replace(nearest.finding, attempt=_again(matcher, nearest.finding))
+    found = replace(nearest.finding, search=_again(matcher, nearest.finding))
     return Explanation(
         label.frame,
         finding.verdict,
@@ -116,7 +121,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
 
 def _again(matcher: Matcher, finding: Finding) -> LabelSearch | None:
     """The search of a finding with the matcher's own options."""
-    old = finding.attempt
+    old = finding.search
     return None if old is None else LabelSearch(matcher.scenario, matcher.options, old.cast, matcher.ask)
 
 
@@ -129,10 +134,10 @@ def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas
             cause, shown = finding.verdict.cause, finding.verdict.correspondence
         case Match():
             raise AssertionError("a match is explained by its witness")
-    failure = finding.attempt.failure if finding.attempt is not None else None
+    failure = finding.search.failure if finding.search is not None else None
     found: tuple[Violation, ...] = ()
-    if failure is not None and finding.attempt is not None and isinstance(finding.verdict, NoMatch):
-        found = violations(matcher, finding.attempt, failure.group, failure.assignment)
+    if failure is not None and finding.search is not None and isinstance(finding.verdict, NoMatch):
+        found = violations(matcher, finding.search, failure.group, failure.assignment)
     if not found:
         told = "is not met" if isinstance(finding.verdict, NoMatch) else "is not decided"
         found = (Violation(cause.what, told, cause.detail, cause.span),)
@@ -140,11 +145,11 @@ def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas
 
 
 def _proofs(finding: Finding) -> tuple[Proof, ...]:
-    assert finding.attempt is not None
+    assert finding.search is not None
     assert finding.plan is not None
     found: list[Proof] = []
     for plan in finding.plan.groups:
-        outcome = finding.attempt.decide(plan, finding.assignment)
+        outcome = finding.search.decide(plan, finding.assignment)
         if isinstance(outcome, Satisfied):
             for leaf in plan.group.variables:
                 value = outcome.values.get(leaf.identity)
@@ -156,7 +161,7 @@ def _proofs(finding: Finding) -> tuple[Proof, ...]:
 
 
 def _violations(matcher: Matcher, finding: Finding) -> tuple[Violation, ...]:
-    attempt, plan = finding.attempt, finding.plan
+    attempt, plan = finding.search, finding.plan
     assert attempt is not None
     assert plan is not None
     found: list[Violation] = []
@@ -171,7 +176,7 @@ def _violations(matcher: Matcher, finding: Finding) -> tuple[Violation, ...]:
 
 
 def _formulas(matcher: Matcher, finding: Finding) -> tuple[Formula, ...]:
-    attempt, plan = finding.attempt, finding.plan
+    attempt, plan = finding.search, finding.plan
     assert attempt is not None
     assert plan is not None
     return tuple(

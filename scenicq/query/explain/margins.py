@@ -16,13 +16,8 @@ from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Comparison, Condition
 from scenicq.forest.nodes import Constant, Identity, Node, Value
 from scenicq.geometry.angles import normalize
+from scenicq.match.explanation import Item, LabelSearch, MatchPlan, Satisfied, describe_constraint, show_value
 from scenicq.match.matcher import Matcher
-from scenicq.match.problem.conditioned import Item
-from scenicq.match.problem.constraints import describe_constraint
-from scenicq.match.problem.evaluation import show_value
-from scenicq.match.problem.outcome import Satisfied
-from scenicq.match.search.group_plan import MatchPlan
-from scenicq.match.search.label_search import LabelSearch
 from scenicq.query.explain.sides import amount, sides
 from scenicq.query.explain.violations import allowed_values, choices, distance_off
 

@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from scenicq.forest.groups import Comparison
-from scenicq.match.matcher import Finding, Matcher
+from scenicq.match.explanation import Finding
+from scenicq.match.matcher import Matcher
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch
 from scenicq.query.execution.block_matcher import CompiledMap

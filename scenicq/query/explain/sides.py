@@ -11,8 +11,7 @@ from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Condition, Group
 from scenicq.forest.nodes import Compare, Constant, Distance, Identity, Logic, LogicOp, Node, Norm, Value
 from scenicq.forest.walk import features, leaves
-from scenicq.match.problem.conditioned import conditioned
-from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.explanation import LabelSearch, conditioned
 
 __all__ = ["Side", "amount", "sides"]
 

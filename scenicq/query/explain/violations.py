@@ -15,13 +15,16 @@ from scenicq.forest.groups import Comparison, Condition, Group
 from scenicq.forest.nodes import Constant, Encloses, Index, Node, PointIn, Undefined, Value
 from scenicq.forest.walk import leaves
 from scenicq.geometry.angles import normalize
-from scenicq.match.decide.cascade import decide
+from scenicq.match.explanation import (
+    Item,
+    LabelSearch,
+    Refuted,
+    Satisfied,
+    decide_decomposed,
+    describe_constraint,
+    show_value,
+)
 from scenicq.match.matcher import Matcher
-from scenicq.match.problem.conditioned import Item
-from scenicq.match.problem.constraints import describe_constraint
-from scenicq.match.problem.evaluation import show_value
-from scenicq.match.problem.outcome import Refuted, Satisfied
-from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.tolerance import Tolerance
 from scenicq.query.explain.sides import sides
 
@@ -66,7 +69,7 @@ def violations(
         return ()
     try:
         items = attempt.items(group, assignment)
-        alone = [item for item in items if isinstance(decide([item], matcher.options.tolerance), Refuted)]
+        alone = [item for item in items if isinstance(decide_decomposed([item], matcher.options.tolerance), Refuted)]
         return tuple(_violation(matcher, attempt, item, assignment) for item in alone or items)
     except CannotEvaluate:
         return ()
@@ -178,7 +181,7 @@ def distance_off(constraint: Comparison, node: Node, observed: Value) -> float |
 
     def reached(size: float) -> bool:
         wide = Tolerance(position=size, heading=size, other=size)
-        return isinstance(decide([(constraint, node, observed)], wide), Satisfied)
+        return isinstance(decide_decomposed([(constraint, node, observed)], wide), Satisfied)
 
     if reached(0.0):
         return 0.0

@@ -20,8 +20,6 @@ from scenicq.forest.nodes import (
     DirectionAt,
     DiscAt,
     Feature,
-    Logic,
-    LogicOp,
     Node,
     PointIn,
     RegionIntersection,
@@ -30,7 +28,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import features
+from scenicq.forest.walk import conjuncts, features
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import IntersectionOf, Region
 from scenicq.geometry.road_direction import RoadDirection
@@ -288,20 +286,17 @@ class _Reader:
 
     def requirement(self, root: Node) -> Iterator[tuple[tuple[int, ...], str, str]]:
         """The same for a requirement."""
-        if isinstance(root, Logic) and root.op is LogicOp.AND:
-            for part in root.args:
-                yield from self.requirement(part)
-            return
-        objects = self.involved(root)
-        if len(objects) > 2:
-            return
-        if isinstance(root, Contains) and isinstance(root.point, Feature) and root.point.property == "position":
-            if isinstance(root.region, Constant) and isinstance(root.region.value, Region):
-                near = near_region(root.region.value, self.names, 0.0)
-                if near is not None:
-                    yield objects, "", near
-            return
-        yield objects, _sql(self.of(objects).can_hold(root)), ""
+        for part in conjuncts(root):
+            objects = self.involved(part)
+            if len(objects) > 2:
+                continue
+            if isinstance(part, Contains) and isinstance(part.point, Feature) and part.point.property == "position":
+                if isinstance(part.region, Constant) and isinstance(part.region.value, Region):
+                    near = near_region(part.region.value, self.names, 0.0)
+                    if near is not None:
+                        yield objects, "", near
+                continue
+            yield objects, _sql(self.of(objects).can_hold(part)), ""
 
 
 def _sql(condition: str | bool) -> str:

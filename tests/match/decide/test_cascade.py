@@ -15,14 +15,12 @@ from scenicq.forest import build
 from scenicq.forest.nodes import (
     ArithmeticOp,
     Constant,
-    DirectionAt,
     DiscreteRange,
     Index,
     Normal,
     PointIn,
     Select,
 )
-from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.regions import Disc, PointSet, PolygonSet, PolylineSet, Rectangle, intersection, union
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.solver_step import ask
@@ -223,46 +221,6 @@ def test_very_many_choices_are_left_to_a_solver():
     for each in picks[1:]:
         total = build.arithmetic(ArithmeticOp.ADD, total, each)
     assert isinstance(decide([compared("width", total, 450.25)], DEFAULT), Undecided)
-
-
-class Split:
-    """A field whose cell says too much: north in the left half, west in the right, in one cell for each."""
-
-    name = "split"
-
-    def values(self, x, y):
-        return (0.0,) if x <= 5 else (math.pi / 2,)
-
-    def cells(self, bounds):
-        square = np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)])
-        return [FieldCell(square, 0.0, exact=False), FieldCell(square, math.pi / 2, exact=False)]
-
-
-def split_items(x, heading):
-    spot = PointIn(c(Rectangle((5.0, 5.0), 0.0, 10.0, 10.0)))
-    return [
-        compared("position", build.vector_sum(spot, build.vector(between(-0.2, 0.2), c(0.0))), (x, 5.0)),
-        compared("heading", DirectionAt(c(Split()), spot), heading),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("x", "heading"), [(2.0, 0.0), (4.9, 0.0), (5.15, 0.0), (8.0, math.pi / 2), (4.85, math.pi / 2)]
-)
-def test_a_cell_that_covers_too_much_is_refined_until_a_witness_holds(x, heading):
-    assert isinstance(check(split_items(x, heading)), Satisfied)
-
-
-@pytest.mark.parametrize(("x", "heading"), [(8.0, 0.0), (5.25, 0.0), (4.7, math.pi / 2)])
-def test_a_cell_that_covers_too_much_proves_nothing(x, heading):
-    assert not isinstance(check(split_items(x, heading)), Satisfied)
-
-
-def test_a_decision_that_takes_too_many_linear_programs_is_left_to_a_solver(monkeypatch):
-    monkeypatch.setattr("scenicq.match.decide.cascade._MOST_PROGRAMS", 2)
-    found = check(split_items(5.15, 0.0))
-    assert isinstance(found, Undecided)
-    assert found.reason == "nonlinear"
 
 
 def test_distance_to_a_region_and_boxes_in_the_solver(solver):

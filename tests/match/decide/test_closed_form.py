@@ -75,17 +75,16 @@ def test_a_clear_answer_is_that_of_the_ladder(name):
                 tried = LabelSearch(scenario, options, replace(cast, disc=disc), matcher.ask)
                 for signature, candidates in cast.signatures(matcher._relevant):
                     for group in matcher.plan(signature).groups:
-                        if group.quick is None:
+                        if group.closed_form is None:
                             continue
                         for _ in range(3):
                             ways = {index: rng.choice(candidates[index]) for index in group.roles}
                             assignment = {scenario.ego: 0, **ways}
                             if len(set(assignment.values())) < len(assignment):
                                 continue
-                            answer = group.quick.decide(
+                            answer = group.closed_form.decide(
                                 lambda index, key, a=assignment, seen=cast.seen: seen[a[index]][key],
-                                disc,
-                                options.tolerance,
+                                options,
                                 MapLookups(),
                             )
                             if answer is None:
@@ -131,8 +130,7 @@ def test_a_label_with_known_candidates_has_the_verdict_that_a_search_finds(name)
                 among = getattr(cast, "candidates", None)
                 if among is None:
                     continue
-                places = matcher.look_up([(label, among)])
-                short = matcher.match(label, among=among, places=places)
+                (short,) = matcher.match_all([(label, among)])
                 assert type(short) is type(full)
                 assert getattr(short, "correspondence", None) == getattr(full, "correspondence", None)
 

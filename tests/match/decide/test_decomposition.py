@@ -32,7 +32,7 @@ TEXTS = {**PROGRAMS, "a row with one shift": ROW, "following": FOLLOWING}
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_parts_and_narrower_ranges_lose_no_solution(name):
+def test_parts_lose_no_solution(name):
     tolerance = MatchOptions().tolerance
     for seed in range(3):
         for items, true in groups(TEXTS[name], seed):

@@ -14,7 +14,6 @@ from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.condition import condition
 from scenicq.forest.nodes import ArithmeticOp
 from scenicq.forest.walk import leaves
-from scenicq.match.decide import decomposition
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.fields import field_solver
 from scenicq.match.fields.shared_variable import find_shared_value, joined
@@ -64,8 +63,6 @@ def asked(monkeypatch):
         return find_shared_value(parts, *rest)
 
     monkeypatch.setattr(field_solver, "find_shared_value", counted)
-    # where the parts together are not decided, going through all cells takes minutes
-    monkeypatch.setattr(decomposition, "_FEW", 0)
     return counts
 
 

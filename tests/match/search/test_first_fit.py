@@ -1,4 +1,4 @@
-"""Labels decided without a search: the same verdict, correspondence, witness and cause as by the search."""
+"""First fit: the same verdict, correspondence, witness and cause as by the search."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import pytest
 from programs import HEADER, PROGRAMS
 from scenes import compiled, drawn, label_of
 
-from scenicq.match import matcher as matching
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.search.backtracking import SilentReporter
+from scenicq.match.search.first_fit import FirstFit
 from scenicq.match.verdict import Match
 from scenicq.smt.solver import open_solver
 
@@ -43,17 +43,17 @@ def solver():
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("radius", [None, 30.0])
-def test_the_same_is_found_without_a_search(name, radius, solver, monkeypatch):
+def test_a_search_finds_the_same(name, radius, solver, monkeypatch):
     scenario = compiled(HEADER + CASES[name])
     matcher = Matcher(scenario, MatchOptions(radius=radius), solver)
-    direct = []
-    solve = matching.Casting.solve
+    filled = []
+    fill = FirstFit.fill
 
-    def counted(casting):
-        direct.append(solve(casting))
-        return direct[-1]
+    def counted(*args):
+        batches = list(fill(*args))
+        filled.append(len(batches))
+        return iter(batches)
 
-    monkeypatch.setattr(matching.Casting, "solve", counted)
     matched = 0
     for seed in range(4):
         rng = random.Random(seed)
@@ -61,10 +61,17 @@ def test_the_same_is_found_without_a_search(name, radius, solver, monkeypatch):
         moved = tuple(replace(each, x=each.x + rng.choice([0.0, 4.0])) for each in label.objects)
         for each in (label, replace(label, objects=moved), replace(label, objects=label.objects[1:])):
             given = {scenario.objects[-1].name: each.objects[0].id} if each.objects and seed % 2 else {}
-            found = matcher.match(each, given=given)
+            with monkeypatch.context() as patched:
+                patched.setattr(FirstFit, "fill", counted)
+                found = matcher.match(each, given=given)
+            with monkeypatch.context() as patched:
+                patched.setattr(FirstFit, "fill", lambda *_: iter(()))
+                assert found == matcher.match(each, given=given)
             assert found == matcher.match(each, SilentReporter(), given=given)
             matched += isinstance(found, Match)
         if name in BY_THEMSELVES and radius is None:
-            assert isinstance(matcher.match(label), Match)
-            assert isinstance(direct[-1], matching.Solution)
+            with monkeypatch.context() as patched:
+                patched.setattr(FirstFit, "fill", counted)
+                assert isinstance(matcher.match(label), Match)
+            assert filled[-1] == 1
     assert matched or radius

@@ -1,4 +1,4 @@
-"""Labels decided together: the same verdict, correspondence and witness, to the last bit, as one by one."""
+"""First fit over columns: the same verdict, correspondence and witness, to the last bit, as in batches of one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from scenicq.match.decide.compiled_expressions import clipped, turned
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import candidates_of
-from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match
 from scenicq.smt.solver import open_solver
@@ -86,7 +85,7 @@ def test_the_same_is_found_together(name, options, solver):
     matcher = Matcher(scenario, options, solver)
     asked = with_candidates(matcher.scenario, options, labels(scenario, range(4)))
     alone = [matcher.match(label, among=among) for label, among in asked]
-    together = list(matcher.match_all(asked, matcher.look_up(asked)))
+    together = list(matcher.match_all(asked))
     assert together == alone
     assert list(map(str, together)) == list(map(str, alone))
     if not options.radius:
@@ -104,8 +103,8 @@ def test_what_surely_matches_is_not_decided_one_by_one(name, monkeypatch):
         who = {each.id: number for number, each in enumerate(label.objects, 1)}
         asked.append((label, {each.index: (who[f"object-{each.index}"],) for each in scenario.objects if each.index}))
     alone = []
-    monkeypatch.setattr(Matcher, "match", lambda *args, **more: alone.append(args))
-    found = list(matcher.match_all(asked, MapLookups()))
+    monkeypatch.setattr(Matcher, "_findings", lambda *args: alone.append(args))
+    found = list(matcher.match_all(asked))
     assert not alone
     assert all(isinstance(verdict, Match) for verdict in found)
 

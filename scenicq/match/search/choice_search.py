@@ -1,0 +1,325 @@
+"""Groups with random choices: their outcomes are searched as roles are, and what is left is decided without choices.
+
+Each tree of choices is a slot whose candidates are its outcomes. Constraints on one slot alone leave it few of them (by
+boxes, for all outcomes together); choices that several slots share must come out the same in all; then the search of
+`backtracking` goes through what is left, fewest candidates first, and goes back to what is to blame. A look-up at a
+hidden place is a choice, too: that the place has the element is one more constraint.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scenicq.forest import build
+from scenicq.forest.groups import Constraint
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import (
+    CompareOp,
+    Constant,
+    DirectionAt,
+    Identity,
+    LogicOp,
+    Node,
+    Value,
+)
+from scenicq.forest.walk import postorder
+from scenicq.match.options import Exhausted
+from scenicq.match.problem.bipartite_matching import Slot
+from scenicq.match.problem.conditioned import Item, conditioned, fact
+from scenicq.match.problem.evaluation import ground_cause, holds
+from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.search.backtracking import Answer, find_assignments
+from scenicq.match.search.choice_problem import ChoiceProblem, Lookup, Part, conjuncts
+from scenicq.match.search.outcome_bounds import possible_outcomes
+from scenicq.match.search.outcome_tables import TooManyOutcomesError
+from scenicq.match.tolerance import Tolerance
+
+__all__ = ["decide_with_choices"]
+
+_MOST_TRIES = 20_000
+"""Outcomes of choices that are tried for one group of one label."""
+
+Decide = Callable[[list[Item]], Outcome]
+"""Decides constraints that hold no choices."""
+
+
+Ask = Callable[[Sequence[Sequence[Item]]], Outcome]
+"""Asks a solver about constraints that hold no choices."""
+
+
+def decide_with_choices(
+    items: Sequence[Item], tolerance: Tolerance, decide: Decide, ask: Ask | None = None
+) -> Outcome | None:
+    """Decide a group that random choices are part of; None if there are none.
+
+    Args:
+        items: The group's constraints, conditioned.
+        tolerance: Per feature.
+        decide: Decides what is left when all choices have come out.
+        ask: The same by a solver, where nothing else decides it.
+    """
+    parts = [part for item in items for part in conjuncts(item)]
+    try:
+        found = [Part(item) for item in parts]
+    except TooManyOutcomesError:
+        return Undecided(items[0][0], "budget")
+    if not any(part.trees for part in found):
+        return None
+    for part in found:
+        if any(not tree.results for tree in part.trees.values()):
+            return Refuted(part.item[0])
+    for constraint, node, seen in parts:
+        if isinstance(node, Constant) and not holds(constraint, node.value, seen, tolerance):
+            return Refuted(constraint, ground_cause((constraint, node, seen)))
+    return _ChoiceSearch(list(items), found, tolerance, decide, ask).solve()
+
+
+class _ChoiceSearch:
+    """The search for one group and one label."""
+
+    def __init__(
+        self, items: list[Item], parts: list[Part], tolerance: Tolerance, decide: Decide, ask: Ask | None
+    ) -> None:
+        self.items = items
+        self.constraints = [constraint for constraint, _, _ in items]
+        self.parts = parts
+        self.tolerance = tolerance
+        self.decide = decide
+        self.ask = ask
+        self.asking = False
+        self.blamed: tuple[int, Refuted] | None = None
+        self.doubt: Undecided | None = None
+        self.known: dict[tuple[int, tuple[tuple[int, int], ...]], Outcome] = {}
+        problem = ChoiceProblem(parts)
+        self.domains = problem.domains
+        self.slot_of = problem.slot_of
+        self.columns = problem.columns
+        self.components = problem.components
+
+    def solve(self) -> Outcome:
+        """Decide the group."""
+        excluded = self._narrow()
+        if excluded is not None:
+            return excluded
+        values: dict[Identity, Value] = {}
+        unsettled: Undecided | None = None
+        for component in self.components:
+            if not component.slots:
+                outcome = self._by_solver([part.item for part in component.parts])
+                if isinstance(outcome, Refuted):
+                    return outcome
+                if isinstance(outcome, Undecided):
+                    unsettled = outcome
+                else:
+                    values.update(outcome.values)
+        try:
+            for assignment in self._assignments():
+                return unsettled or self._values(assignment, values)
+            if self.doubt is not None and self.ask is not None:
+                # nothing else matches: now a solver is worth its time
+                self.asking, self.doubt = True, None
+                for assignment in self._assignments():
+                    return unsettled or self._values(assignment, values)
+        except Exhausted:
+            return Undecided(self.items[0][0], "budget")
+        if self.doubt is not None:
+            return self.doubt
+        return Refuted(self.items[0][0]) if self.blamed is None else self.blamed[1]
+
+    # --- domains
+
+    def _narrow(self) -> Refuted | None:
+        """Leave out outcomes that a constraint excludes by itself, or that do not agree with what is left elsewhere."""
+        for part in sorted(self.parts, key=lambda part: len(part.slots)):
+            for slot in {self.slot_of[id(tree.outcomes)] for tree in part.trees.values()}:
+                domain = self.domains[slot]
+                chosen = {
+                    key: (tree, domain.rows, True) if self.slot_of[id(tree.outcomes)] == slot
+                    else (tree, self.domains[self.slot_of[id(tree.outcomes)]].rows, False)
+                    for key, tree in part.trees.items()
+                }  # fmt: skip
+                domain.rows = domain.rows[possible_outcomes(part.item, chosen, len(domain.rows), self.tolerance)]
+                if not len(domain.rows):
+                    return Refuted(part.item[0])
+        changed = True
+        while changed:
+            changed = False
+            for places in self.columns.values():
+                for (one, column), (other, place) in itertools.permutations(places, 2):
+                    mine, theirs = self.domains[one], self.domains[other]
+                    allowed = theirs.outcomes.picks[theirs.rows, place]
+                    if (allowed < 0).any():
+                        continue
+                    own = mine.outcomes.picks[mine.rows, column]
+                    kept = (own < 0) | np.isin(own, allowed)
+                    if not kept.all():
+                        changed = True
+                        mine.rows = mine.rows[kept]
+                        if not len(mine.rows):
+                            return Refuted(self._about(one))
+        return None
+
+    def _about(self, slot: int) -> Constraint:
+        """A constraint that hangs on a slot."""
+        return next((part.item[0] for part in self.parts if slot in part.slots), self.items[0][0])
+
+    # --- the search
+
+    def _assignments(self) -> Iterator[dict[int, int]]:
+        slots = [
+            Slot(number, tuple((domain.rows + domain.first).tolist())) for number, domain in enumerate(self.domains)
+        ]
+        together = [part.slots for part in self.parts] + [
+            frozenset(slot for slot, _ in places) for places in self.columns.values()
+        ]
+        links: dict[int, set[int]] = {}
+        for group in together:
+            for slot in group:
+                links.setdefault(slot, set()).update(group - {slot})
+        return find_assignments(slots, self._check, links=links, budget=_MOST_TRIES)
+
+    def _check(self, slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+        domain = self.domains[slot]
+        picks = domain.outcomes.picks[assignment[slot] - domain.first]
+        for variable, pick in zip(domain.outcomes.variables, picks.tolist(), strict=True):
+            if pick < 0:
+                continue
+            for other, column in self.columns[variable]:
+                if other != slot and other in assignment:
+                    theirs = self.domains[other]
+                    own = theirs.outcomes.picks[assignment[other] - theirs.first, column]
+                    if own >= 0 and own != pick:
+                        return Answer.NO, frozenset((slot, other))
+        answer = Answer.YES
+        assigned = assignment.keys()
+        for number, part in enumerate(self.parts):
+            if slot in part.slots and part.slots <= assigned:
+                outcome = self._of(number, [part], [], part.slots, assignment, whole=False)
+                if isinstance(outcome, Refuted):
+                    return self._refuted(outcome, part.slots, assignment)
+        for number, component in enumerate(self.components):
+            if slot not in component.slots:
+                continue
+            if component.slots <= assigned:
+                outcome = self._of(
+                    number + len(self.parts), component.parts, component.lookups, component.slots, assignment
+                )
+                if isinstance(outcome, Refuted):
+                    return self._refuted(outcome, frozenset(component.slots), assignment)
+                if isinstance(outcome, Undecided):
+                    self.doubt = self.doubt or outcome
+                    answer = Answer.NO
+                continue
+            # what already hangs on nothing open may be unsatisfiable together
+            ready = [part for part in component.parts if part.slots <= assigned]
+            if len(ready) > 1 and any(slot in part.slots for part in ready):
+                slots = frozenset(each for part in ready for each in part.slots)
+                outcome = self._of(number + len(self.parts) + len(self.components), ready, [], slots, assignment)
+                if isinstance(outcome, Refuted):
+                    return self._refuted(outcome, slots, assignment)
+        return answer, frozenset(assigned)
+
+    def _refuted(
+        self, outcome: Refuted, slots: frozenset[int], assignment: Mapping[int, int]
+    ) -> tuple[Answer, frozenset[int]]:
+        if self.blamed is None or len(assignment) > self.blamed[0]:
+            self.blamed = (len(assignment), outcome)
+        return Answer.NO, slots
+
+    def _of(
+        self,
+        number: int,
+        parts: Sequence[Part],
+        lookups: Sequence[Lookup],
+        slots: frozenset[int] | set[int],
+        assignment: Mapping[int, int],
+        *,
+        whole: bool = True,
+    ) -> Outcome:
+        """What is decided of constraints for the outcomes of their slots, once; of a part only what is cheap."""
+        key = (number, tuple([(slot, assignment[slot]) for slot in sorted(slots)]))
+        if key not in self.known:
+            self.known[key] = self._decided(parts, lookups, slots, assignment, self.decide if whole else self._cheaply)
+        found = self.known[key]
+        if whole and self.asking and isinstance(found, Undecided):
+            found = self.known[key] = self._decided(parts, lookups, slots, assignment, self._by_solver)
+        return found
+
+    def _cheaply(self, items: list[Item]) -> Outcome:
+        """What is decided of a constraint that others share random variables with."""
+        if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in items])):
+            return Undecided(items[0][0], "nonlinear")
+        return self.decide(items)
+
+    def _by_solver(self, items: list[Item]) -> Outcome:
+        outcome = self.decide(items)
+        return self.ask([items]) if isinstance(outcome, Undecided) and self.ask is not None else outcome
+
+    def _decided(
+        self,
+        parts: Sequence[Part],
+        lookups: Sequence[Lookup],
+        slots: frozenset[int] | set[int],
+        assignment: Mapping[int, int],
+        decide: Decide,
+    ) -> Outcome:
+        given, taken = self._given(slots, assignment)
+        asked = {id(lookup.variable) for lookup in lookups}
+        memo: dict[int, Node] = {id(node): Constant(float(pick), span=node.span) for node, pick in taken}
+        left = conditioned([part.item for part in parts], given, memo=dict(memo))
+        for node, pick in taken:
+            if id(node) in asked:
+                inner = {key: value for key, value in memo.items() if key != id(node)}
+                (placed,) = conditioned([fact(_is(node, pick))], given, memo=inner)
+                left.append(placed)
+        for constraint, node, seen in left:
+            if isinstance(node, Constant) and not holds(constraint, node.value, seen, self.tolerance):
+                blamed = constraint if constraint in self.constraints else self.items[0][0]
+                return Refuted(blamed, ground_cause((constraint, node, seen)))
+        left = [item for item in left if not isinstance(item[1], Constant)]
+        if not left:
+            return Satisfied({})
+        found = decide_with_choices(left, self.tolerance, decide) or decide(left)
+        if isinstance(found, Satisfied) or found.constraint in self.constraints:
+            return found
+        return replace(found, constraint=self.items[0][0] if not parts else parts[0].item[0])
+
+    def _given(
+        self, slots: frozenset[int] | set[int], assignment: Mapping[int, int]
+    ) -> tuple[dict[Identity, Value], list[tuple[Node, int]]]:
+        """Values of random choices, and the options that expressions take."""
+        given: dict[Identity, Value] = {}
+        taken: dict[int, tuple[Node, int]] = {}
+        for slot in slots:
+            domain = self.domains[slot]
+            for variable, pick in domain.outcomes.given(assignment[slot] - domain.first):
+                if isinstance(variable, Identity):
+                    given[variable] = float(pick)
+                else:
+                    taken[id(variable)] = (variable, pick)
+        return given, list(taken.values())
+
+    def _values(self, assignment: Mapping[int, int], values: Mapping[Identity, Value]) -> Satisfied:
+        """Values of all random variables."""
+        found = dict(values)
+        for number, component in enumerate(self.components):
+            if not component.slots:
+                continue
+            outcome = self._of(
+                number + len(self.parts), component.parts, component.lookups, component.slots, assignment
+            )
+            if isinstance(outcome, Satisfied):
+                found.update(outcome.values)
+        given, _ = self._given(frozenset(range(len(self.domains))), assignment)
+        return Satisfied({**found, **given})
+
+
+def _is(index: Node, pick: int) -> Node:
+    """That an expression takes an option."""
+    if kind_of(index) == "boolean":
+        return index if pick else build.logic(LogicOp.NOT, index, span=index.span)
+    return build.compare(CompareOp.EQ, index, Constant(float(pick), span=index.span), index.span)

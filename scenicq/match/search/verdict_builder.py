@@ -1,0 +1,119 @@
+"""Verdicts made of what a search found, in the words of the program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from scenicq.forest.groups import Comparison
+from scenicq.forest.nodes import Leaf, Value
+from scenicq.forest.scenario import Scenario
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.constraints import describe_constraint
+from scenicq.match.problem.outcome import Refuted
+from scenicq.match.search.first_fit import FilledBatch, FirstFit
+from scenicq.match.search.label_search import Failure, LabelSearch, Solution
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
+from scenicq.store.labels import Label
+
+__all__ = ["Ended", "VerdictBuilder"]
+
+Ended = Literal["budget", "timeout"]
+"""What may end a search early: its steps, or the clock."""
+
+_UNDECIDED, _EXHAUSTED = 2_000_000, 1_000_000
+"""Weights of verdicts that are unknown: above every depth that a search comes to."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VerdictBuilder:
+    """Names objects and random variables of one scenario.
+
+    Attributes:
+        scenario: The scenario.
+        options: The options.
+    """
+
+    scenario: Scenario
+    options: MatchOptions
+    _keys: dict[Leaf, str] = field(default_factory=dict["Leaf", "str"], repr=False)
+
+    def match(self, label: Label, solution: Solution) -> Match:
+        """The match that a search found."""
+        known = [
+            (leaf, value)
+            for group, outcome in solution.outcomes
+            for leaf in group.group.variables
+            if (value := outcome.values.get(leaf.identity)) is not None
+        ]
+        keys = self._named([leaf for leaf, _ in known])
+        return Match(self.names(label, solution.assignment), _witness(keys, [value for _, value in known]))
+
+    def matches(self, fit: FirstFit, batch: FilledBatch) -> Iterator[tuple[int, Match]]:
+        """The matches of labels whose roles are filled, with their places."""
+        keys = self._named(batch.variables)
+        for row, numbers, values in zip(batch.rows, batch.numbers, batch.witnesses, strict=True):
+            names = self.names(row.label, dict(zip(fit.order, numbers, strict=True)))
+            yield row.place, Match(names, _witness(keys, values))
+
+    def without_match(self, label: Label, search: LabelSearch, ended: Ended | None) -> tuple[int, Verdict]:
+        """The verdict of a search without a match, and its weight: an unknown outweighs every no.
+
+        Args:
+            label: The label.
+            search: Its search.
+            ended: What ended the search before all candidates were tried.
+        """
+        ego, failure = {self.scenario.ego: search.cast.ego}, search.failure
+        if search.undecided is not None:
+            found = search.undecided
+            reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
+            return _UNDECIDED, Unknown(reason, self._cause(found), self.names(label, ego | dict(found.assignment)))
+        if ended is not None:
+            limit = f"{self.options.budget:,} steps" if ended == "budget" else f"{self.options.timeout_s:g} s"
+            return _EXHAUSTED, Unknown(ended, Cause("correspondence search", f"more than {limit}"))
+        if failure is None:
+            return 0, self.excluded(
+                label, search.cast.ego, Cause("correspondence", "no distinct label objects for all objects")
+            )
+        return failure.depth, NoMatch(self._cause(failure), self.names(label, ego | dict(failure.assignment)))
+
+    def excluded(self, label: Label, ego: int, cause: Cause) -> NoMatch:
+        """What excludes a label before any object but the ego has a candidate."""
+        return NoMatch(cause, self.names(label, {self.scenario.ego: ego}))
+
+    def without_ego(self) -> NoMatch:
+        """What excludes a label in which nothing can be the ego."""
+        ego = self.scenario.objects[self.scenario.ego]
+        detail = "the source has no ego" if self.options.ego == "label" else f"no {ego.category}"
+        return NoMatch(Cause(f"{ego.name}.class", detail, ego.span, (ego.index,)))
+
+    def names(self, label: Label, assignment: Mapping[int, int]) -> dict[str, str]:
+        """A correspondence by names of objects and ids of label objects."""
+        return {
+            self.scenario.objects[index].name: label.objects[number - 1].id if number else "ego"
+            for index, number in sorted(assignment.items())
+        }
+
+    def _cause(self, failure: Failure) -> Cause:
+        constraint = failure.constraint
+        about = (constraint.object,) if isinstance(constraint, Comparison) else constraint.requirement.objects
+        detail = failure.outcome.detail if isinstance(failure.outcome, Refuted) else ""
+        return Cause(describe_constraint(self.scenario, constraint), detail, constraint.span, about)
+
+    def _named(self, variables: Sequence[Leaf]) -> list[str]:
+        """What a witness calls random variables: their places in the program, numbered where several share one."""
+        keys: list[str] = []
+        counts: dict[str, int] = {}
+        for leaf in variables:
+            key = self._keys.get(leaf)
+            if key is None:
+                key = self._keys[leaf] = leaf.span.mark if leaf.span else type(leaf).__name__
+            counts[key] = counts.get(key, 0) + 1
+            keys.append(key if counts[key] == 1 else f"{key}#{counts[key]}")
+        return keys
+
+
+def _witness(keys: Sequence[str], values: Sequence[Value]) -> dict[str, WitnessValue]:
+    return {key: value for key, value in zip(keys, values, strict=True) if isinstance(value, float | tuple)}

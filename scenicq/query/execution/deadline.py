@@ -1,0 +1,24 @@
+"""A limit on a whole run: what is decided when the time is over is given out, and no more is begun."""
+
+from __future__ import annotations
+
+from time import time
+
+__all__ = ["DeadlineError", "check_deadline"]
+
+
+class DeadlineError(Exception):
+    """The time that a run may take is over."""
+
+
+def check_deadline(until: float | None) -> None:
+    """Look at the clock.
+
+    Args:
+        until: When the time is over, in seconds since 1970 so that other processes can tell, too; None for never.
+
+    Raises:
+        DeadlineError: It is over.
+    """
+    if until is not None and time() >= until:
+        raise DeadlineError

@@ -1,0 +1,67 @@
+"""Choices among map elements, one below the other: the verdict of every combination evaluated plainly."""
+
+from __future__ import annotations
+
+import random
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from scenicq.compiler.program import compile_scenario
+from scenicq.errors import ScenarioError, Source
+from scenicq.geometry.network import Network
+from scenicq.importers.base import read_maps
+from scenicq.importers.report import Report
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
+from scenicq.match.verdict import Match, NoMatch
+
+from .nested_choices import REACH, Composer, clear, label_for, small_map
+
+MAP = Path(__file__).parents[3] / "sample_data" / "crossroads" / "maps"
+LABELS = 3
+
+
+@cache
+def network() -> Network:
+    features = read_maps({"crossroads": next(MAP.iterdir())}, Report())["crossroads"]
+    return small_map(list(features), 3)
+
+
+def check(seed: int) -> list[bool]:
+    """The verdicts of one program on a few labels, each compared with the plain one."""
+    rng = random.Random(seed)
+    program = Composer(network(), rng).compose()
+    text = "\n".join([*program.lines, ""])
+    if not any(True for _ in program.combinations()):
+        return []
+    try:
+        scenario = compile_scenario(Source("nested.scenic", text), network())
+    except ScenarioError as error:
+        if error.diagnostics[0].code != "impossible-requirement":
+            raise
+        return []
+    matcher = Matcher(scenario, MatchOptions(tolerance=parse_tolerance(f"position={REACH},heading=180deg")))
+    found: list[bool] = []
+    for _ in range(LABELS):
+        label = label_for(program, rng)
+        expected = clear(program, label)
+        if expected is None:
+            continue
+        verdict = matcher.match(label)
+        assert isinstance(verdict, Match if expected else NoMatch), (seed, text, label, verdict)
+        found.append(expected)
+    return found
+
+
+def test_verdicts_are_those_of_all_combinations() -> None:
+    found = [each for seed in range(40) for each in check(seed)]
+    assert 0.2 < sum(found) / len(found) < 0.9
+
+
+@pytest.mark.slow
+def test_verdicts_are_those_of_all_combinations_of_many_programs() -> None:
+    found = [each for seed in range(40, 400) for each in check(seed)]
+    assert len(found) > 800

@@ -1,0 +1,97 @@
+"""A run that is stopped by its deadline gives what it has decided, and can be gone on with."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenicq.match.options import MatchOptions
+from scenicq.query.execution import deadline
+from scenicq.query.execution.partitions import fingerprint
+from scenicq.query.execution.results import record
+from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.shards import in_order, kept, run_here, shards_of
+from scenicq.store.dataset import Dataset, open_dataset
+
+PROGRAM = Path(__file__).parents[3] / "sample_data" / "scenarios" / "01_pedestrian_facing_ego.scenic"
+OPTIONS = QueryOptions(MatchOptions(classes="coarse"), prefilter=False, every=True)
+
+
+@pytest.fixture(scope="module")
+def dataset(crossroads: Path) -> Dataset:
+    return open_dataset(crossroads)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that goes on by a second whenever it is looked at."""
+    seconds = itertools.count()
+    monkeypatch.setattr(deadline, "time", lambda: float(next(seconds)))
+
+
+def query(dataset: Dataset, **changes: Any) -> Query:
+    return Query(dataset, read_program(PROGRAM), replace(OPTIONS, **changes))
+
+
+def records(found: Query) -> list[dict[str, Any]]:
+    return [record(result) for result in found.results()]
+
+
+@pytest.mark.usefixtures("clock")
+def test_what_is_decided_in_time_is_out_and_the_rest_is_not_counted(dataset: Dataset) -> None:
+    whole, cut = query(dataset), query(dataset, until=8.0)
+    every, some = records(whole), records(cut)
+    assert 0 < len(some) < len(every)
+    assert some == every[: len(some)]
+    assert cut.funnel.frames == len(some)
+    assert (whole.funnel.cut, cut.funnel.cut) == (False, True)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_nothing_is_begun_when_the_time_is_over(dataset: Dataset, jobs: int) -> None:
+    late = query(dataset, until=1.0, jobs=jobs)
+    assert records(late) == []
+    assert late.funnel.cut
+    assert late.funnel.frames == 0
+
+
+@pytest.mark.usefixtures("clock")
+def test_whole_pieces_are_kept_and_a_later_run_does_the_others(dataset: Dataset, tmp_path: Path) -> None:
+    # each frame, and each block, is a second
+    first = query(dataset, until=shards_of(query(dataset), 16)[0].frames + 4.0)
+    some = [record(each) for each in in_order(first, kept(run_here, tmp_path), shards_of(first, 16), lambda _: None)]
+    pieces = len(list(tmp_path.iterdir()))
+    second = query(dataset)
+    rest = [record(each) for each in in_order(second, kept(run_here, tmp_path), shards_of(second, 16), lambda _: None)]
+    every = records(query(dataset))
+    assert 0 < pieces < len(shards_of(second, 16))
+    assert some == every[: len(some)]
+    assert rest == every
+    assert (first.funnel.cut, second.funnel.cut) == (True, False)
+
+
+def test_a_deadline_does_not_make_another_question(dataset: Dataset) -> None:
+    text = PROGRAM.read_text(encoding="utf-8")
+    assert fingerprint(dataset, text, OPTIONS) == fingerprint(dataset, text, replace(OPTIONS, until=5.0))
+
+
+def test_the_command_says_that_it_stopped_and_goes_on(run: Any, crossroads: Path, tmp_path: Path) -> None:
+    words = ("match", PROGRAM, crossroads, "--classes", "coarse", "-o", tmp_path / "found.jsonl", "--resume")
+    stopped = run(*words, "--deadline", "1e-9")
+    assert stopped.exit_code == 1
+    assert "warning[deadline-passed]" in stopped.stderr
+    assert "goes on from here" in stopped.stderr
+    assert (tmp_path / "found.jsonl").read_text(encoding="utf-8") == ""
+    assert run(*words).exit_code == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["found.jsonl"]
+
+
+def test_a_shard_is_kept_whole_or_not_at_all(run: Any, crossroads: Path, tmp_path: Path) -> None:
+    found = run("match", PROGRAM, crossroads, "--shard", "1/2", "-o", tmp_path, "--deadline", "1e-9")
+    assert found.exit_code == 2
+    assert "error[deadline-passed]" in found.stderr
+    assert not list(tmp_path.glob("*-of-*"))

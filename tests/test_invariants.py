@@ -1,0 +1,141 @@
+"""What scenicq/README.md claims of the code that no other test guards."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+LIBRARY = ROOT / "scenicq"
+FILES = sorted(LIBRARY.rglob("*.py"))
+README = (LIBRARY / "README.md").read_text()
+
+PASSES = ("forest/", "match/", "query/prefilter/")
+"""Where expressions are gone through. Syntax and compiler recurse over the program's text, which the parser limits."""
+RECURSIVE = {
+    "forest/angle_wrap.py": "a stated number of angles inside each other",
+    "forest/containment_pruning.py": "unions of regions, which the compiler flattens",
+    "match/decide/cascade.py": "the discrete variables of a group, at most a stated number of them",
+    "match/decide/decomposition.py": "each part has fewer variables, each case one choice less",
+    "match/fields/field_solver.py": "once: without a shared number",
+    "match/linear/linear_relaxation.py": "the alternatives of a linear program",
+    "query/prefilter/conditions.py": "intersections of regions",
+    "query/prefilter/regions.py": "unions of regions",
+}
+"""Files with functions that call themselves, and what bounds the depth."""
+DATASETS = re.compile(r"nuscenes|argoverse|waymo|lyft|kitti|interaction dataset|boston", re.IGNORECASE)
+CORE = ("syntax", "geometry", "forest", "compiler", "smt", "match")
+MOST_LINES = 200
+PROGRAMS = ("importers/opendrive_worker.py", "processes.py", "smt/worker.py")
+
+
+@cache
+def tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_text())
+
+
+def named(file: Path) -> str:
+    return file.relative_to(LIBRARY).as_posix()
+
+
+def functions(scope: ast.AST, prefix: str = "", owner: str = "") -> Iterator[tuple[str, str, ast.AST]]:
+    """Functions with their qualified name and that of the class around them."""
+    for node in ast.iter_child_nodes(scope):
+        if isinstance(node, ast.ClassDef):
+            yield from functions(node, f"{prefix}{node.name}.", f"{prefix}{node.name}.")
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield f"{prefix}{node.name}", owner, node
+            yield from functions(node, f"{prefix}{node.name}.", owner)
+        else:
+            yield from functions(node, prefix, owner)
+
+
+def calls(name: str, owner: str, function: ast.AST, known: set[str]) -> set[str]:
+    """Functions of the same file that a function calls by their plain name, or as methods of `self`."""
+    found: set[str] = set()
+    for node in ast.walk(function):
+        match node:
+            case ast.Call(func=ast.Name(id=called)):
+                # a name in a function is one of its own, of a function around it, or of the file
+                around = [name[:end] for end, sign in enumerate(name) if sign == "."]
+                scopes = [f"{each}." for each in (name, *reversed(around)) if each in known]
+                found.update(next(([f"{s}{called}"] for s in (*scopes, "") if f"{s}{called}" in known), []))
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="self" | "cls"), attr=called)):
+                found.add(f"{owner}{called}")
+            case _:
+                pass
+    return found & known
+
+
+def recursive(file: Path) -> set[str]:
+    """Functions of a file that may call themselves, directly or through others of the file."""
+    there = {name: (owner, node) for name, owner, node in functions(tree(file))}
+    graph = {name: calls(name, owner, node, set(there)) for name, (owner, node) in there.items()}
+    found: set[str] = set()
+    for start, called in graph.items():
+        todo, seen = list(called), set[str]()
+        while todo:
+            name = todo.pop()
+            if name == start:
+                found.add(start)
+                break
+            if name not in seen:
+                seen.add(name)
+                todo += graph[name]
+    return found
+
+
+def test_passes_over_expressions_are_iterative_or_say_what_bounds_them():
+    found = {named(file) for file in FILES if named(file).startswith(PASSES) and recursive(file)}
+    assert found == set(RECURSIVE)
+
+
+def test_recursion_is_found(tmp_path):
+    file = tmp_path / "some.py"
+    file.write_text(
+        "def plain(x):\n    return other(x)\n\ndef other(x):\n    return x\n\n"
+        "def direct(x):\n    return direct(x)\n\n"
+        "class Some:\n    def one(self):\n        return self.two()\n    def two(self):\n        return self.one()\n"
+        "    def plain(self):\n        return plain(self)\n"
+    )
+    assert recursive(file) == {"direct", "Some.one", "Some.two"}
+
+
+def test_the_library_never_prints_exits_or_reads_the_environment():
+    names = {"print", "input", "exit", "quit", "breakpoint"}
+    attributes = {("sys", "exit"), ("sys", "argv"), ("sys", "stdout"), ("sys", "stderr"), ("os", "_exit")}
+    attributes |= {("os", "environ"), ("os", "getenv"), ("os", "environb")}
+    found: set[str] = set()
+    for file in FILES:
+        for node in ast.walk(tree(file)):
+            match node:
+                case ast.Call(func=ast.Name(id=name)) if name in names:
+                    found.add(f"{named(file)}: {name}")
+                case ast.Attribute(value=ast.Name(id=module), attr=name) if (module, name) in attributes:
+                    found.add(f"{named(file)}: {module}.{name}")
+                case _:
+                    pass
+    # programs of their own, which the library starts, read their arguments, and end as processes do
+    assert {each for each in found if not each.startswith(PROGRAMS)} == set()
+
+
+def test_the_core_knows_no_dataset():
+    for file in FILES:
+        if named(file).startswith(tuple(f"{folder}/" for folder in CORE)):
+            assert not DATASETS.search(file.read_text()), named(file)
+
+
+def test_the_matcher_is_a_page():
+    assert len((LIBRARY / "match" / "matcher.py").read_text().splitlines()) <= MOST_LINES
+
+
+def test_every_path_that_the_map_names_exists():
+    paths = re.findall(r"`((?:tests|scenicq|sample_data|cli)/[\w./]*[\w/])`", README)
+    assert paths
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+    inside = re.findall(r"`((?:match|query|smt|forest|compiler|report|store|geometry)/[\w./]+\.py)`", README)
+    assert inside
+    assert [path for path in inside if not (LIBRARY / path).exists()] == []
