@@ -10,7 +10,7 @@ LINTED := scenicq cli tests sample_data
 FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/test_search.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check test test-all golden bench bench-scale conformance browser dreal clean
+.PHONY: help setup demo check test test-all golden bench bench-scale conformance fuzz mutate browser dreal clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
@@ -46,12 +46,13 @@ test-all: $(READY) ## All tests
 golden: $(READY) ## Rewrite the golden files that tests compare with
 	$(PYTEST) --update-golden -m 'not slow'
 
-bench: $(READY) ## Measure queries, start-up, ingest and pictures; numbers go to bench-results/
+bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each step of matching is worth; numbers go to bench-results/
 	$(BIN)/python tests/bench/queries.py
 	$(BIN)/python tests/bench/jointly.py
 	$(BIN)/python tests/bench/scalability.py --patience 5
 	$(BIN)/python tests/bench/ingest.py
 	$(BIN)/python tests/bench/pictures.py
+	$(BIN)/python tests/bench/steps.py
 
 FRAMES ?= 10000 100000
 bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=1000000 is the largest bar)
@@ -66,6 +67,16 @@ ifdef SCENIC
 else
 	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(SEED)
 endif
+
+MINUTES ?= 60
+fuzz: $(READY) ## Attack with hostile programs, datasets and kills, MINUTES=60 of each
+	$(BIN)/python tests/fuzz/hostile_programs.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/fuzz/kills.py --minutes $(MINUTES) --seed $(SEED)
+
+MUTATIONS ?= 200
+mutate: $(READY) ## Change the code in MUTATIONS=200 small ways and count which the fast tests notice
+	$(BIN)/python tests/mutation/mutate.py --count $(MUTATIONS) --seed $(SEED)
 
 browser: ## Install the Chromium that the tests of reports are driven in, where the system has it
 	@$(call install_browser)

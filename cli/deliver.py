@@ -39,6 +39,7 @@ class Wanted:
         report: Folder of a report.
         work: Folder for what is not complete yet; beside the file by default.
         sensors: Folder that the paths of sensor files start from, for the report.
+        ranked: Whether results have a density.
     """
 
     file: Path | None
@@ -47,6 +48,7 @@ class Wanted:
     report: Path | None = None
     work: Path | None = None
     sensors: Path | None = None
+    ranked: bool = False
 
 
 def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar) -> None:
@@ -76,9 +78,14 @@ def _deliver(
     close: list[Result] | None = None if report is None else []
     with destination(file, wanted.work) as sink, bar, contextlib.closing(results):
         with writing(file):
-            over_time = query.is_over_time()
-            shorten = query.dataset.short_frames
-            writer = make_writer(wanted.form, sink, query.roles, shorten, over_time=over_time)
+            writer = make_writer(
+                wanted.form,
+                sink,
+                query.roles,
+                query.dataset.short_frames,
+                ranked=wanted.ranked,
+                over_time=query.is_over_time(),
+            )
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
                 writer.write(record(result))

@@ -23,6 +23,7 @@ from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, tables
 from scenicq.report.write import check_target
 
 from .datasets import open_checked
+from .formats import safe_cell
 from .manual import Manual
 from .output import choose_format, destination, writing
 from .report import columns, plain, show
@@ -123,7 +124,7 @@ def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
             lines = io.StringIO(newline="")
             rows = csv.DictWriter(lines, COLUMNS, lineterminator="\n")
             rows.writeheader()
-            rows.writerows(flat_rows(found))
+            rows.writerows({name: safe_cell(value) for name, value in row.items()} for row in flat_rows(found))
             text = lines.getvalue()
         case "parquet":
             _write_parquet(found, sink)

@@ -13,13 +13,13 @@ from typing import Any, BinaryIO, Protocol
 
 import pyarrow.parquet as pq
 
-from scenicq.query.execution.result_tables import result_schema, result_table
+from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
 
 from .report import CONTROL as _CONTROL
 from .report import plain
 from .table import Table, Text
 
-__all__ = ["FORMATS", "Writer", "make_writer"]
+__all__ = ["FORMATS", "Writer", "make_writer", "safe_cell"]
 
 FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 """Names of the formats."""
@@ -99,7 +99,7 @@ def _escaped(record: Mapping[str, Any]) -> str:
     return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", _json(record))
 
 
-def _cell(value: Any) -> Any:
+def safe_cell(value: Any) -> Any:
     """A text that a terminal shows as it is, and that no spreadsheet takes for a formula."""
     if not isinstance(value, str):
         return value
@@ -114,7 +114,8 @@ class _Csv:
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        self._rows.writerow({name: _cell(value) for name, value in _flat(record, self._names).items()})
+        row = _flat(record, self._names) | {name: record.get(name) for name in DENSITY_COLUMNS if name in self._names}
+        self._rows.writerow({name: safe_cell(value) for name, value in row.items()})
         self._text.flush()
 
     def finish(self) -> None:
@@ -122,8 +123,8 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, roles: Sequence[str], *, over_time: bool) -> None:
-        self._schema = result_schema(roles, over_time=over_time)
+    def __init__(self, sink: BinaryIO, roles: Sequence[str], *, ranked: bool, over_time: bool) -> None:
+        self._schema = result_schema(roles, ranked=ranked, over_time=over_time)
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Mapping[str, Any]] = []
 
@@ -147,6 +148,7 @@ def make_writer(
     roles: Callable[[], Sequence[str]],
     shorten: Callable[[], Callable[[str], str]] | None = None,
     *,
+    ranked: bool = False,
     over_time: bool = False,
 ) -> Writer:
     """The writer of a format.
@@ -156,17 +158,18 @@ def make_writer(
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
         shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
+        ranked: Whether results have a density.
         over_time: Whether the results are intervals.
     """
     names = _INTERVAL_COLUMNS if over_time else _COLUMNS
     if name == "parquet":
-        return _Parquet(sink, roles(), over_time=over_time)
+        return _Parquet(sink, roles(), ranked=ranked, over_time=over_time)
     text = Text(sink)
     match name:
         case "table":
             return Table(text, shorten, over_time=over_time)
         case "csv":
-            return _Csv(text, names)
+            return _Csv(text, (*names, *(DENSITY_COLUMNS if ranked else ())))
         case "ids":
             return _Lines(text, _name)
         case _:

@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import click
 
 from scenicq.errors import Diagnostic
 from scenicq.exporters.export import EXPORTS
+from scenicq.match.verdict import Match
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
@@ -102,6 +103,11 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               "interchangeable objects in one order only.")
 @click.option("--near", metavar="K", type=click.IntRange(1), help="Show the K frames, too, that do not match but come "
               "closest, each with the tolerance under which it would.")
+@click.option("--rank", is_flag=True, help="Order matches from typical to borderline: by the density with which the "
+              "program generates what the label observes.")
+@click.option("--sample", metavar="N", type=click.IntRange(1), help="Show N of the matches, drawn at random.")
+@click.option("--diverse", is_flag=True, help="With --sample: matches that spread over recordings and over the "
+              "program's random variables.")
 @click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most, and how many frames each "
               "single change of the program would leave. Without it, this is said where hardly any frame matches.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
@@ -142,7 +148,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
           output: Path | None, export: tuple[str, Path] | None, near: int | None, deadline: float | None,
           report: Path | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None,
-          explain: bool, advised: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
+          explain: bool, advised: bool, rank: bool, sample: int | None, diverse: bool, exit_zero: bool, summary: bool,
+          quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames or intervals of a dataset that match a scenario.
 
@@ -154,6 +161,8 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     chosen = choose_format(format_, None if shard else file)
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
+    if diverse and sample is None:
+        raise click.UsageError("--diverse needs --sample N", ctx)
     source, target, model = given_program(ctx, program, scenario, dataset)
     options = query_options({**given, "model": model})
     if deadline is not None:
@@ -185,9 +194,12 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         engine = kept(engine or run_here, pieces)
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
     results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
+    wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
+    if rank or sample is not None:
+        results = _selected(query, results, sample, rank=rank, diverse=diverse)
     with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
         try:
-            deliver(query, results, _near(query, near), Wanted(file, chosen, export, report, pieces, sensors), bar)
+            deliver(query, results, _near(query, near), wanted, bar)
         except BaseException:
             if pieces is not None:
                 with contextlib.suppress(OSError):
@@ -211,11 +223,25 @@ def _tell_cut(query: Query, *, resume: bool) -> None:
     show([Diagnostic("deadline-passed", message, hints=(again,), severity="warning")])
 
 
+def _selected(
+    query: Query, results: Generator[Result], sample: int | None, *, rank: bool, diverse: bool
+) -> Generator[Result]:
+    """Some of the matches, or all in another order, once all are there."""
+    from scenicq.evaluate.ranking import rank_results, sample_diverse, sample_plain  # noqa: PLC0415 - takes long to load
+
+    with contextlib.closing(results):
+        found = list(results)
+    if sample is not None:
+        found = [each for each in found if isinstance(each.verdict, Match)]
+        found = sample_diverse(found, sample) if diverse else sample_plain(found, sample)
+    yield from rank_results(query, found) if rank else found
+
+
 def _in_shard(ctx: click.Context, query: Query, shard: Shard, folder: Path | None, *, quiet: bool) -> None:
     """Run one shard into a folder."""
     if folder is None:
         raise click.UsageError("--shard needs -o FOLDER, which the shards of a query share", ctx)
-    for name in ("near", "limit", "resume", "engine", "report", "export"):
+    for name in ("near", "limit", "resume", "engine", "report", "export", "rank", "sample"):
         if ctx.params.get(name):
             later = ": give it to `scenicq gather`" if name in ("report", "export") else ""
             raise click.UsageError(f"--shard cannot be had with --{name}{later}", ctx)

@@ -27,8 +27,8 @@ TOPICS = {
     "Over time": {"behaviors", "min_duration", "intervals", "gap"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
-        "limit", "every", "all_matches", "near", "format_", "output", "report", "sensors", "export", "explain",
-        "advised",
+        "limit", "every", "all_matches", "near", "rank", "sample", "diverse", "advised",
+        "format_", "output", "report", "sensors", "export", "explain",
     },
     "Long runs": {"shard", "resume"},
     "Messages and exit code": {"strict", "exit_zero", "summary", "quiet", "help"},

@@ -10,7 +10,7 @@ import click
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
-from scenicq.match.verdict import NoMatch
+from scenicq.match.verdict import Unknown
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain
@@ -57,7 +57,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(compiled, query.options.match, solver)
         verdict = matcher.match(label)
-        why = explain(matcher, label) if isinstance(verdict, NoMatch) else None
+        why = None if isinstance(verdict, Unknown) else explain(matcher, label)
     return Shot(label, compiled, verdict, why), Backdrop(network)
 
 

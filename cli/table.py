@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import IO, Any, BinaryIO, cast
 
 import click
@@ -56,12 +55,12 @@ class Table:
         """Take where to write.
 
         Args:
-            text: The stream; on a terminal, or where COLUMNS says how wide it is, the table fits.
+            text: The stream; on a terminal the table fits its width.
             shorten: Gives what cuts names of frames short; asked only where the table does not fit.
             over_time: Whether the results are intervals, whose table is as wide as it is.
         """
         self._text, self._over_time = text, over_time
-        self._width = shutil.get_terminal_size().columns if text.isatty() or os.environ.get("COLUMNS") else None
+        self._width = shutil.get_terminal_size().columns if text.isatty() else None
         self._shorten = shorten
         self._short: Callable[[str], str] | None = None
         self._rows: list[Row] = []
@@ -101,21 +100,34 @@ def fitted(rows: list[Row], width: int, short: Callable[[str], str]) -> list[str
         width: Columns of the terminal.
         short: Cuts names of frames short.
     """
-    ids = _cut([part.partition("=")[2] for row in rows for part in row[_OBJECTS].split()])
-    table = [
-        (short(row[_FRAME]), row[_RECORDING], row[_TIME], row[_VERDICT], _with_ids(row[_OBJECTS], ids)) for row in rows
-    ]
     head: list[str] = [*_HEAD[:_SENSOR]]
+    table = [row[:_SENSOR] for row in rows]
     kept = list(range(_SENSOR))
     dates = {row[_TIME][:_DATE] for row in table}
-    if len(dates) == 1 and all(row[_TIME][_DATE - 1 : _DATE] == " " for row in table):
+    if (
+        not _fits(head, table, kept, width)
+        and len(dates) == 1
+        and all(row[_TIME][_DATE - 1 :][:1] == " " for row in table)
+    ):
         head[_TIME] = dates.pop().strip()
         table = [(*row[:_TIME], row[_TIME][_DATE:], *row[_VERDICT:]) for row in table]
-    named = all(row[_FRAME].startswith(f"{row[_RECORDING]}/") for row in rows)
-    for dispensable in [_RECORDING] * named + [_TIME, _RECORDING]:
+    if not _fits(head, table, kept, width):
+        table = [(short(row[_FRAME]), *row[_RECORDING:]) for row in table]
+    if not _fits(head, table, kept, width) and all(row[_FRAME].startswith(f"{row[_RECORDING]}/") for row in rows):
+        kept.remove(_RECORDING)
+    if not _fits(head, table, kept, width):
+        ids = _cut([part.partition("=")[2] for row in rows for part in row[_OBJECTS].split()])
+        table = [(*row[:_OBJECTS], _with_ids(row[_OBJECTS], ids)) for row in table]
+    for dispensable in (_TIME, _RECORDING):
         if dispensable in kept and _narrowest(table, kept) > width:
             kept.remove(dispensable)
     return _wrapped([tuple(head), *table], kept, width)
+
+
+def _fits(head: Sequence[str], table: list[Row], kept: list[int], width: int) -> bool:
+    """Whether rows fit without long cells going on below."""
+    widths = [max(len(plain(row[column])) for row in (head, *table)) for column in kept]
+    return sum(widths) + 2 * (len(kept) - 1) <= width
 
 
 def _cut(ids: list[str]) -> dict[str, str]:
@@ -171,7 +183,10 @@ def _wrapped(table: list[Row], kept: list[int], width: int) -> list[str]:
 def _cells(record: Mapping[str, Any]) -> Row:
     cause = record.get("cause", {})
     near = cause.get("what") == "tolerance"
-    why = cause.get("reason") or cause.get("detail" if near else "what", "")
+    density = record.get("log_density")
+    why = (
+        f"{density:.2f}" if density is not None else cause.get("reason") or cause.get("detail" if near else "what", "")
+    )
     objects = [f"{role}={label}" for role, label in record["correspondence"].items() if (role, label) != ("ego", "ego")]
     verdict = f"{record['verdict']}: {why}" if why else record["verdict"]
     if "frames" in record:

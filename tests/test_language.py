@@ -26,6 +26,7 @@ from scenicq.forest.improvise import draw_scene
 from scenicq.forest.scenario import Scenario
 from scenicq.lint.program import lint
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.syntax import ast as scenic
 from scenicq.syntax.parser import parse
 from scenicq.syntax.walk import walk
@@ -129,7 +130,7 @@ WARNED = [block for block in BLOCKS if block.page == "warnings.md" and not block
 def test_warnings(block: Block) -> None:
     """What the page of warnings marks is warned of, and nothing else."""
     scenario = block.compiled()
-    options = MatchOptions(classes="coarse" if "coarse" in block.options else "fine")
+    options = MatchOptions(tolerance=EXACT, classes="coarse" if "coarse" in block.options else "fine")
     found = lint(scenario.source, [(scenario, street())], options)
     assert {(d.span.source.position(d.span.start)[0], d.code) for d in found if d.span} == block.marked(_WARNING)
 

@@ -197,7 +197,9 @@ class Interpreter:
             raise fail("unsupported-construct", "an object of a random class is not supported", node.cls.span,
                        "which class is random", ("write one program per class",))  # fmt: skip
         if not isinstance(cls, ScenicClass):
-            raise fail("wrong-type", "an object needs a class", node.cls.span, f"this is {describe(cls)}")
+            further = node.specifiers[0].span.text.split()[0] if node.specifiers and not node.keyword else ""
+            hints = (f"a comma separates specifiers: write `{node.cls.span.text}, {further} ...`",) if further else ()
+            raise fail("wrong-type", "an object needs a class", node.cls.span, f"this is {describe(cls)}", hints)
         return self._make(cls, node.specifiers, scope, node.span)
 
     def _make(

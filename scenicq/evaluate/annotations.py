@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.store.dataset import Dataset
+from scenicq.store.schema import ArrowArray
 
 __all__ = ["Annotations", "Frames", "read_annotations"]
 
@@ -56,8 +57,8 @@ class Annotations:
     """The label objects of a dataset, in the order of its frames and of the source.
 
     Attributes:
-        ids: Identifiers, unique in a frame.
-        tracks: Identifiers of the physical object; empty where there is none.
+        ids: Identifiers, unique in a frame, as an Arrow array: a list would take three times the room.
+        tracks: Identifiers of the physical object, as an Arrow array; empty where there is none.
         frame: Number of the frame, shape (n,).
         classes, source_classes: Names of classes: of the class tree, and the source's own.
         category, source_category: Numbers of them, shape (n,).
@@ -67,8 +68,8 @@ class Annotations:
         visible: Number of the level, shape (n,).
     """
 
-    ids: list[str]
-    tracks: list[str]
+    ids: ArrowArray
+    tracks: ArrowArray
     frame: Numbers
     classes: list[str]
     category: Numbers
@@ -136,8 +137,8 @@ def _annotations(objects: Any, points: tuple[str, ...]) -> Annotations:
         return lambda each: float(each.get(name, -1))
 
     return Annotations(
-        ids=objects["id"].to_pylist(),
-        tracks=objects["track"].fill_null("").to_pylist(),
+        ids=objects["id"].combine_chunks(),
+        tracks=objects["track"].fill_null("").combine_chunks(),
         frame=objects["number"].to_numpy().astype(np.int32),
         classes=classes,
         category=category,

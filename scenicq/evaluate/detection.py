@@ -109,12 +109,12 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
     pairs = _pairs(predictions, frame, prediction_class, objects, object_class, protocol)
     rank = np.arange(len(frame))
     owner = {
-        threshold: assign(pairs, rank, len(objects.ids), threshold, nearest_only=protocol.nearest_only)
+        threshold: assign(pairs, rank, len(objects.frame), threshold, nearest_only=protocol.nearest_only)
         for threshold in THRESHOLDS_M
     }
     score: dict[float, Reals] = {}
     for threshold, mine in owner.items():
-        score[threshold] = np.full(len(objects.ids), -math.inf)
+        score[threshold] = np.full(len(objects.frame), -math.inf)
         score[threshold][mine[mine >= 0]] = predictions.score[mine >= 0]
     turned = np.array([name in protocol.half_turn for name in classes], dtype=np.bool_)
     return Detection(
@@ -258,7 +258,7 @@ def _in_range(
 def _without_points(objects: Annotations) -> Bools:
     """Label objects whose points are counted, and are none."""
     if not objects.points:
-        return np.zeros(len(objects.ids), dtype=np.bool_)
+        return np.zeros(len(objects.frame), dtype=np.bool_)
     counts = np.stack(list(objects.points.values()))
     return (counts >= 0).any(axis=0) & (np.maximum(counts, 0).sum(axis=0) == 0)
 

@@ -85,7 +85,10 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
         cast = {role: its for role, its in _known(each, "correspondence").items() if its != _EGO}
         for frame in where:
             witness.setdefault(frame, known)
-            here = {names[number]: number for number in range(starts[frame + 1] - 1, starts[frame] - 1, -1)}
+            first, count = int(starts[frame]), int(starts[frame + 1] - starts[frame])
+            own: list[str] = names.slice(first, count).to_pylist()
+            # the first of those that share a name
+            here = {own[place]: first + place for place in range(count - 1, -1, -1)}
             for role, its in cast.items():
                 if its in here:
                     played.setdefault(role, {})[here[its]] = None

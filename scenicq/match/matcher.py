@@ -31,7 +31,7 @@ from scenicq.match.search.batch_lookups import look_up_positions
 from scenicq.match.search.first_fit import FirstFit, Row, first_fit_of, signature_of
 from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
 from scenicq.match.search.label_search import LabelSearch
-from scenicq.match.search.verdict_builder import Ended, VerdictBuilder
+from scenicq.match.search.verdict_builder import VerdictBuilder
 from scenicq.match.verdict import Cause, Match, Unknown, Verdict
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -100,10 +100,10 @@ class Matcher:
             label: The label.
             among: As of `match`.
         """
-        found = self._findings(label, MapLookups(), None, {}, among)
+        findings = self._findings(label, MapLookups(), None, {}, among)
         while True:
             with limited(self.options.timeout_s):
-                finding = next(found, None)
+                finding = next(findings, None)
             if finding is None:
                 return
             if isinstance(finding.verdict, Match):
@@ -162,16 +162,16 @@ class Matcher:
     ) -> Iterator[Verdict]:
         """The verdicts of labels: by first fit side by side, else each by a search of its own."""
         found: dict[int, Match] = {}
-        with suppress(TimeIsUp), limited(self.options.timeout_s):
-            for fit, rows in self._batches(labels, given).items():
+        for fit, rows in self._batches(labels, given).items():
+            # labels that are left when the time is up are searched for, each on a clock of its own
+            with suppress(TimeIsUp), limited(self.options.timeout_s * len(rows)):
                 for batch in fit.fill(rows, self.options, lookups):
                     found.update(self._verdicts.matches(fit, batch))
         for place, (label, among) in enumerate(labels):
-            if place in found:
-                yield found[place]
-                continue
-            with limited(self.options.timeout_s):
-                verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
+            verdict: Verdict | None = found.get(place)
+            if verdict is None:
+                with limited(self.options.timeout_s):
+                    verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
             yield verdict
 
     def _batches(
@@ -216,18 +216,16 @@ class Matcher:
                 rest.append((0, Finding(self._verdicts.excluded(label, ego, roles))))
                 continue
             search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups)
-            ended: Ended | None = None
+            exhausted: Exhausted | TimeIsUp | None = None
             try:
                 for signature, candidates in roles.signatures(self._relevant):
                     plan = self.plan(signature)
                     for solution in search.solutions(plan, candidates):
                         matched = True
                         yield Finding(self._verdicts.match(label, solution), search, plan, solution.assignment)
-            except Exhausted:
-                ended = "budget"
-            except TimeIsUp:
-                ended = "timeout"
-            weight, verdict = self._verdicts.without_match(label, search, ended)
+            except (Exhausted, TimeIsUp) as error:
+                exhausted = error
+            weight, verdict = self._verdicts.without_match(label, search, exhausted)
             rest.append((weight, Finding(verdict, search)))
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest

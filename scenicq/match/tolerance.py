@@ -185,18 +185,6 @@ class Tolerance:
         size = sizes.get(name, self.heading if name == "heading" else self.other)
         return Margin("arc" if name == "heading" else "interval", size, size)
 
-    def scaled(self, factor: float) -> Tolerance:
-        """All sizes times a factor."""
-        return replace(
-            self,
-            x=None if self.x is None else self.x * factor,
-            y=None if self.y is None else self.y * factor,
-            position=self.position * factor,
-            heading=self.heading * factor,
-            other=self.other * factor,
-            rules=tuple((scope, name, size * factor) for scope, name, size in self.rules),
-        )
-
     def widened(self, amount: float, heading: float) -> Tolerance:
         """All sizes grown.
 

@@ -100,6 +100,16 @@ def _witness(verdict: Match, source: Source, texts: Mapping[str, str]) -> str:
     return table("Values that prove it", ("place", "from", "value"), rows)
 
 
+def _margins(shot: Shot) -> str:
+    """What a match shows of each feature and requirement, where somebody asked."""
+    told = shot.explanation.margins if shot.explanation is not None else ()
+    rows = [
+        (element("code", escape(each.what)), escape(each.value), escape(each.allowed), escape(each.spare))
+        for each in told
+    ]
+    return table("What the label shows", ("feature or requirement", "value", "allowed", "to spare"), rows)
+
+
 def _cause(shot: Shot) -> str:
     match shot.verdict:
         case NoMatch(cause):
@@ -177,6 +187,7 @@ def frame_facts(shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str])
         _roles(shot),
     ]
     if isinstance(shot.verdict, Match) and shot.scenario is not None:
+        parts.append(_margins(shot))
         parts.append(_witness(shot.verdict, shot.scenario.source, texts))
     return "".join([*parts, _sensors(sensors)])
 

@@ -226,7 +226,12 @@ class _Report:
                 for result in run.results:
                     label = labels[result.frame]
                     matcher = Matcher(world.scenario, self.query.options.match, solver)
-                    why = explain(matcher, label) if isinstance(result.verdict, NoMatch) else None
+                    # of the frames of a run that match the first is explained
+                    matched = result.verdict if isinstance(result.verdict, Match) else None
+                    asked = isinstance(result.verdict, NoMatch) or (matched is not None and not shots)
+                    why = explain(matcher, label) if asked else None
+                    if why is not None and matched is not None and why.correspondence != matched.correspondence:
+                        why = None
                     shots.append(Shot(label, world.scenario, result.verdict, why))
                 sensors = tuple(self.files.find(shot.label.sensors) for shot in shots)
                 pictures = None if inline else tuple(self.picture(shot, world.backdrop) for shot in shots)

@@ -207,7 +207,7 @@ def _provenance(value: Any) -> Mapping[str, Any]:
     for key in ("source", "time"):
         _text(given.get(key, ""))
     for key in ("versions", "facts"):
-        for name, each in (given.get(key) or {}).items():
+        for name, each in cast("dict[str, Any]", given.get(key) or {}).items():
             _text(name)
             if key == "versions":
                 _text(each)

@@ -38,7 +38,7 @@ def verify_computed(dataset: Dataset) -> None:
         parts = {table: manifest.tables[table][number] for table in SEGMENT_TABLES}
         found = {table: read_sound(table, dataset.place.file(part), part.path) for table, part in parts.items()}
         pieces: dict[str, list[ArrowTable]] = {table: [] for table in SEGMENT_TABLES}
-        first = dict.fromkeys(SEGMENT_TABLES, 0)
+        first: dict[str, int] = dict.fromkeys(SEGMENT_TABLES, 0)
         for columns in recordings_of(found["labels"], found["objects"], found["sensors"]):
             index = indexes.of(columns.map)
             rows = recording_rows(columns, index, first_object=first["objects"], first_sensor=first["sensors"])

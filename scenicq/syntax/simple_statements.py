@@ -35,6 +35,8 @@ class SimpleParser(OperatorParser):
             return self.unknown()
         if self.text == "=":
             hint = "`==` compares"
+        elif self.text and self.starts_specifier(self.index):
+            hint = f"a comma separates specifiers: write `, {self.text} ...`"
         message = f"`{self.text}` does not continue the statement" if self.text else "the statement is not complete"
         return self.fail(message, label="an operator or the end of the line can stand here", hint=hint)
 

@@ -113,6 +113,9 @@ def _mixed(item: ast.Evidence, other: ast.Evidence) -> ScenarioError:
     hints: tuple[str, ...] = ()
     for place in (item, other):
         if place.construct == "an instance without `new`":
-            hints = (f"Scenic 3 writes `new {place.span.text} ...`",)
+            name = place.span.text
+            # classes begin with a capital letter; a region before a specifier lacks a comma
+            comma = f"a comma separates specifiers: write `{name}, ...`"
+            hints = (f"Scenic 3 writes `new {name} ...`" if name[:1].isupper() else comma,)
     label = f"this is {_names(item.versions)}"
     return ScenarioError(Diagnostic("mixed-versions", message, item.span, label, (note,), hints))

@@ -33,6 +33,7 @@ from scenicq.forest.scenario import Scenario  # noqa: E402
 from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
+from scenicq.match.tolerance import EXACT  # noqa: E402
 from scenicq.match.verdict import Match, NoMatch  # noqa: E402
 from scenicq.smt.answer import Solver  # noqa: E402
 from scenicq.smt.solver import open_solver  # noqa: E402
@@ -98,7 +99,7 @@ def examples(scenario: Scenario, count: int) -> list[tuple[Label, type]]:
 
 def decided(scenario: Scenario, labels: list[tuple[Label, type]], method: Method, solver: Solver) -> Run:
     """Decide every label."""
-    matcher = Matcher(scenario, MatchOptions(method=method), solver)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT, method=method), solver)
     matcher.match(labels[0][0])
     right, wrong, times = 0, Counter[str](), list[float]()
     for label, expected in labels:

@@ -16,6 +16,7 @@ import argparse
 import json
 import platform
 import random
+import signal
 import sys
 import time
 from collections import Counter
@@ -59,6 +60,8 @@ CHAINS = {
     "platoon, one shift": "shift = Range(-0.5, 0.5)\nego = new Car on road\nlast = ego\nfor i in range(3):\n"
     "    center = new OrientedPoint following roadDirection from (front of last) for Range(2, 8)\n"
     "    last = new Car right of center by shift",
+    "right edge": "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car on lane.centerline\n"
+    "spot = new OrientedPoint on lane.rightEdge\nother = new Car left of spot by 0.5, facing roadDirection",
     "crowd of 24": "ego = new Car on road\nfor i in range(24):\n"
     "    new Pedestrian offset by (Range(-5, 5), Range(2, 60)), facing Range(-120, 120) deg relative to ego.heading",
 }
@@ -67,12 +70,12 @@ ON_MAP = {
     "figure 6, curb": PROGRAMS["figure 6"].replace("network.laneRegion", "curb"),
     "lane of a spot": "ego = new Car\nspot = new OrientedPoint in visible network.laneRegion\n"
     "other = new Car on network.laneAt(spot)",
-    "right edge": "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car on lane.centerline\n"
-    "spot = new OrientedPoint on lane.rightEdge\nother = new Car left of spot by 0.5, facing roadDirection",
     "one lane of many": "ego = new Car on Uniform(*network.lanes)\nother = new Car ahead of ego by Range(4, 10)",
 } | {name: CHAINS[name] for name in ("row of 12, one shift", "platoon")} | {
     name: PROGRAMS[name] for name in ("facing field", "badly parked", "follow", "figure 3")
 }  # fmt: skip
+LIMIT_S = 3.0
+"""Processor time after which a label is given up: "late"."""
 TOLERANCE = Tolerance(position=0.25, heading=0.0873)
 
 Off = Callable[[ExitStack], object]
@@ -93,8 +96,8 @@ STEPS: dict[str, Off] = {
     "arc consistency": _set(label_search, "thinned", lambda plan, candidates, *_: (candidates, None)),
     "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
-    "decomposition": _set(label_search, "decide_decomposed", cascade.decide),
-    "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
+    "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
+    "choice search": _set(group_cache, "decide_with_choices", lambda *_, **__: None),
     "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
     "heading propagation": _set(decomposition, "decide_directions", _undecided),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
@@ -123,11 +126,29 @@ def decided(
             off(stack)
         for name, (scenario, labels) in scenarios.items():
             matcher = Matcher(scenario, MatchOptions(tolerance=TOLERANCE))
-            matcher.match(labels[0])
+            _verdict(matcher, labels[0])
             started = time.process_time()
-            verdicts = [type(matcher.match(label)).__name__ for label in labels]
+            verdicts = [_verdict(matcher, label) for label in labels]
             found[name] = time.process_time() - started, verdicts
     return found
+
+
+class LateError(Exception):
+    """A label took all the time that it may."""
+
+
+def _verdict(matcher: Matcher, label: Label) -> str:
+    def late(*_: object) -> None:
+        raise LateError
+
+    signal.signal(signal.SIGVTALRM, late)
+    signal.setitimer(signal.ITIMER_VIRTUAL, LIMIT_S)
+    try:
+        return type(matcher.match(label)).__name__
+    except LateError:
+        return "late"
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
 
 
 def main() -> None:
@@ -138,7 +159,7 @@ def main() -> None:
     parser.add_argument("--program", action="append", help="default: all")
     given = parser.parse_args()
     texts = [(f"{name}", text, STREET) for name, text in (PROGRAMS | CHAINS).items()]
-    if MAP.exists():
+    if MAP.exists() and given.program is None:
         network = Network(MAP.stem, read_geojson(MAP, lambda identifier, message: None))
         texts += [(f"{name} (Boston)", text, network) for name, text in ON_MAP.items()]
     scenarios: dict[str, tuple[Scenario, list[Label]]] = {}

@@ -75,3 +75,37 @@ def test_refusals(judge, parked, tmp_path):
     (tmp_path / "pages").mkdir()
     (tmp_path / "pages" / "mine").touch()
     assert "target-exists" in judge("--report", tmp_path / "pages").stderr
+
+
+def test_ranked_matches(run, parked, tmp_path):
+    source, folder = parked
+    words = ["match", str(source / "parked_car.scenic"), str(folder / "street"), "--rank"]
+    found = [json.loads(line) for line in run(*words).stdout.splitlines()]
+    logs = [each["log_density"] for each in found]
+    known = [log for log in logs if log is not None]
+    assert known == sorted(known, reverse=True)
+    assert logs == known + [None] * (len(logs) - len(known))
+    for name in ("a.csv", "a.parquet"):
+        assert run(*words, "-o", tmp_path / name).exit_code == 0
+    rows = list(csv.DictReader((tmp_path / "a.csv").open()))
+    assert [row["log_density"] for row in rows] == ["" if log is None else str(log) for log in logs]
+    assert pq.read_table(tmp_path / "a.parquet")["log_density"].to_pylist() == logs
+    assert run(*words, "--format", "table").exit_code == 0
+
+
+def test_samples_of_matches(run, parked):
+    source, folder = parked
+    words = ["match", str(source / "parked_car.scenic"), str(folder / "street"), "--format", "ids", "--sample", "16"]
+    plain, spread = run(*words).stdout.splitlines(), run(*words, "--diverse").stdout.splitlines()
+    assert len(plain) == len(spread) == 16
+    assert len({frame.partition("/")[0] for frame in spread}) == 16
+    assert run(*words[:-2], "--diverse").exit_code == 2
+    assert run(*words, "--shard", "1/2", "-o", "x").exit_code == 2
+
+
+def test_from_python(parked):
+    import scenicq
+
+    source, folder = parked
+    matches = scenicq.open(folder / "street").match(source / "parked_car.scenic")
+    assert "missed" in str(matches.evaluate(source / "predictions.jsonl", simulated=source / "runs.csv"))

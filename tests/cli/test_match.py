@@ -67,6 +67,7 @@ def test_the_summary_is_a_funnel(run, crossroads, crossing):
     assert counts == sorted(counts, reverse=True)
     assert sum(counts) == 156 - 5
     assert "waived: containment, collision" in result.stderr
+    assert "tolerance: position=0.25,heading=5deg" in result.stderr
 
 
 def test_the_summary_says_what_is_waived_and_where_it_stopped(run, crossroads, crossing):
@@ -175,6 +176,7 @@ def test_options_reach_the_matcher(run, crossroads, crossing, monkeypatch):
         (["SCENARIO", "DATASET", "--tolerance", "position=-1"], "option-invalid", "not negative"),
         (["SCENARIO", "DATASET", "--tolerance", "wheel=1"], "option-invalid", "position="),
         (["SCENARIO", "DATASET", "--tolerance", "x=1"], "option-invalid", "go together"),
+        (["SCENARIO", "DATASET", "--tolerance", "egoo.heading=5deg"], "option-invalid", "`ego`"),
         (["SCENARIO", "DATASET", "--enforce", "gravity"], "option-invalid", "gravity"),
         (["SCENARIO", "DATASET", "-o", "matches.xyz"], "option-invalid", ".parquet"),
         (["SCENARIO", "DATASET", "-o", "no/folder/matches.csv"], "target-unwritable", "No such file"),

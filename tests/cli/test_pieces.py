@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.query.execution.record_reader import read_record
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions, read_program
@@ -125,7 +126,7 @@ def test_records_come_back_as_they_were(run, scenarios, crossroads):
     source = read_program(scenarios / "02_crossing_cars.scenic")
     for options in (
         QueryOptions(every=True),
-        QueryOptions(MatchOptions(method="smt", timeout_s=1e-6), prefilter=False),
+        QueryOptions(MatchOptions(tolerance=EXACT, method="smt", timeout_s=1e-6), prefilter=False),
     ):
         records = [record(result) for result in Query(open_dataset(crossroads), source, options).results()]
         assert records

@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import re
 
 import pytest
 
@@ -66,13 +67,30 @@ def test_in_a_pipe_nothing_is_cut(monkeypatch):
     assert "f" * 100 in sink.getvalue().decode()
 
 
-def test_the_command_fits_where_the_terminal_is_said_to_be_narrow(run, crossroads, scenarios):
-    done = run("match", scenarios / "02_crossing_cars.scenic", crossroads, "--format", "table", env={"COLUMNS": "70"})
-    lines = done.stdout.splitlines()
+class Terminal(io.BytesIO):
+    """What is written to a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def test_on_a_terminal_it_fits_and_names_frames_as_other_commands_take_them(crossroads, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "70")
+    dataset = open_dataset(crossroads)
+    sink = Terminal()
+    table = Table(Text(sink), dataset.short_frames)
+    labels = list(itertools.islice(dataset.labels(), 120))
+    for label in labels:
+        table.write({
+            "frame": label.frame, "recording": label.recording, "timestamp_us": label.timestamp_us, "verdict": "match",
+            "correspondence": {"leftward": label.objects[0].id if label.objects else "ego"}, "sensors": {},
+        })  # fmt: skip
+    table.finish()
+    lines = [re.sub("\x1b\\[[0-9;]*m", "", line) for line in sink.getvalue().decode().splitlines()]
     assert max(map(len, lines)) <= 70
-    frame = lines[1].split()[0]
-    told = run("explain", scenarios / "02_crossing_cars.scenic", crossroads, frame).stdout
-    assert told.startswith("frame 03-busy-intersection/09 matches")
+    names = [line.split()[0] for line in lines if line[:1] not in ("F", " ")]
+    assert len(names) == len(labels)
+    assert [dataset.label(name).frame for name in names[::40]] == [label.frame for label in labels[::40]]
 
 
 def test_frames_are_found_by_beginnings_that_no_other_has(crossroads):

@@ -10,6 +10,7 @@ import pytest
 from scenicq.forest.improvise import draw_scene
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
@@ -42,7 +43,7 @@ def label(*places: tuple[float, float, float]) -> Label:
 def test_a_truth_value_is_one_or_zero_where_a_number_is_needed(name: str, method: str) -> None:
     scenario = compiled(A + NUMBERS[name])
     with open_solver("portable") as solver:
-        matcher = Matcher(scenario, MatchOptions(method=method), solver)  # type: ignore[arg-type]
+        matcher = Matcher(scenario, MatchOptions(tolerance=EXACT, method=method), solver)  # type: ignore[arg-type]
         for seed in range(3):
             scene = draw_scene(scenario, random.Random(seed))
             assert scene is not None
@@ -60,7 +61,7 @@ def test_a_truth_value_is_one_or_zero_where_a_number_is_needed(name: str, method
     [((4, 0), True), ((6, 1), True), ((4, 1), False), ((6, 0), False), ((6, 0.5), False), ((11, 1), False)],
 )
 def test_a_truth_value_depends_on_what_it_is_about(place: tuple[float, float], matches: bool) -> None:
-    matcher = Matcher(compiled(A + "ego = new Object at (a, a > 5)\n"))
+    matcher = Matcher(compiled(A + "ego = new Object at (a, a > 5)\n"), MatchOptions(tolerance=EXACT))
     assert isinstance(matcher.match(label((*place, 0.0))), Match if matches else NoMatch)
 
 
@@ -85,7 +86,7 @@ def test_a_vector_is_in_a_list_if_it_equals_an_item(requirement: str, left: set[
     scenario = compiled(f"{P}require {requirement}\n")
     scenes = [draw_scene(scenario, random.Random(seed)) for seed in range(20)]
     assert {scene.values[0, "position"] for scene in scenes if scene is not None} == left
-    matcher = Matcher(scenario)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
     for place in ((1, 2), (3, 4), (5, 6), (7, 8)):
         verdict = matcher.match(label((float(place[0]), float(place[1]), 0.0)))
         assert isinstance(verdict, Match if place in left else NoMatch), place

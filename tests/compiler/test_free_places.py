@@ -19,7 +19,9 @@ from scenicq.forest.simplify import roots_of
 from scenicq.forest.walk import postorder
 from scenicq.geometry.elements import NetworkElement
 from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match
 from scenicq.store.labels import Label, LabelObject
 
@@ -88,7 +90,7 @@ def somewhere_in(name: str, area: shapely.Geometry) -> set[NetworkElement]:
 @pytest.mark.parametrize("name", ["laneAt", "roadAt", "laneGroupAt", "elementAt"])
 def test_an_element_at_a_free_point_is_any_that_some_point_of_its_area_has(name: str, area: str) -> None:
     scenario = compiled(f"p = new Point on {area}\nother = new Car on network.{name}(p), facing Range(-180, 180) deg\n")
-    matcher, rng, seen = Matcher(scenario), random.Random(area), set[bool]()
+    matcher, rng, seen = Matcher(scenario, MatchOptions(tolerance=EXACT)), random.Random(area), set[bool]()
     found = somewhere_in(name, AREAS[area])
     assert fields(scenario) > fields(matcher.scenario) == 0
     allowed = shapely.union_all([element.polygon for element in found])

@@ -22,6 +22,7 @@ from scenicq.forest.walk import postorder
 from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
@@ -86,7 +87,7 @@ def drawn(name: str, seed: int) -> Label:
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_drawn_scene_matches(name: str) -> None:
     with open_solver("portable") as solver:
-        matcher = Matcher(scenario(name), MatchOptions(), solver)
+        matcher = Matcher(scenario(name), MatchOptions(tolerance=EXACT), solver)
         for seed in range(4):
             verdict = matcher.match(drawn(name, seed))
             assert isinstance(verdict, Match), (seed, verdict)
@@ -119,7 +120,9 @@ IN_LANES: dict[str, tuple[float, float, float]] = {
 )
 def test_a_scene_pushed_out_of_its_element_does_not_match(name: str, where: str, matches: bool) -> None:
     x, y, heading = IN_LANES[where]
-    found = Matcher(scenario(name)).match(label([("Car", 5.25, 20.0, 0.0), ("Car", x, y, heading)]))
+    found = Matcher(scenario(name), MatchOptions(tolerance=EXACT)).match(
+        label([("Car", 5.25, 20.0, 0.0), ("Car", x, y, heading)])
+    )
     assert isinstance(found, Match if matches else NoMatch), found
 
 
@@ -129,7 +132,11 @@ def test_every_method_gives_the_same_verdict() -> None:
         for name in ("own lane", "other lanes", "same lane", "on through"):
             for place in places:
                 verdicts = {
-                    type(Matcher(scenario(name), MatchOptions(method=method), solver).match(label([places[0], place])))
+                    type(
+                        Matcher(scenario(name), MatchOptions(tolerance=EXACT, method=method), solver).match(
+                            label([places[0], place])
+                        )
+                    )
                     for method in ("auto", "smt", "monolithic")
                 }
                 assert len(verdicts) == 1, (name, place, verdicts)
@@ -145,17 +152,20 @@ def test_overlapping_elements_are_each_allowed_and_one_at_a_time() -> None:
     ego = label([("Car", *CROSSED, 0.3)])
     first, second = (f"require ego.lane is network.elements['{name}']\n" for name in here[:2])
     for text, verdict in ((first, Match), (second, Match), (first + second, NoMatch)):
-        assert isinstance(Matcher(compiled(HEADER + ANY + text)).match(ego), verdict), text
+        assert isinstance(Matcher(compiled(HEADER + ANY + text), MatchOptions(tolerance=EXACT)).match(ego), verdict), (
+            text
+        )
     elsewhere = next(lane.id for lane in network().lanes if lane.id not in here)
     text = f"require ego.lane is network.elements['{elsewhere}']\n"
-    assert isinstance(Matcher(compiled(HEADER + ANY + text)).match(ego), NoMatch)
+    assert isinstance(Matcher(compiled(HEADER + ANY + text), MatchOptions(tolerance=EXACT)).match(ego), NoMatch)
     # the road and the section are those of the lane that is meant
     own = "require ego.road is ego.lane.road\nrequire ego.laneSection.lane is ego.lane\n"
-    assert isinstance(Matcher(compiled(HEADER + ANY + first + own)).match(ego), Match)
+    assert isinstance(Matcher(compiled(HEADER + ANY + first + own), MatchOptions(tolerance=EXACT)).match(ego), Match)
     assert isinstance(
-        Matcher(compiled(HEADER + ANY + first + f"require ego.road.lanes[0] is network.elements['{here[1]}']\n")).match(
-            ego
-        ),
+        Matcher(
+            compiled(HEADER + ANY + first + f"require ego.road.lanes[0] is network.elements['{here[1]}']\n"),
+            MatchOptions(tolerance=EXACT),
+        ).match(ego),
         NoMatch,
     )
 

@@ -18,13 +18,16 @@ from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.smt.solver import Solver
 from scenicq.store.classes import is_class
 from scenicq.store.labels import Label, LabelObject
 
-OPTIONS = {"default": MatchOptions(), "enforced": MatchOptions(enforce=frozenset(BuiltIn))}
+OPTIONS = {
+    "default": MatchOptions(tolerance=EXACT),
+    "enforced": MatchOptions(tolerance=EXACT, enforce=frozenset(BuiltIn)),
+}
 NOT_IN_SCENIC = re.compile(
     r"must be real number, not \w+|'tuple' object has no attribute 'coordinates'|cannot iterate through a random value|"
     r"heading of \w+ not a scalar|expected Vector, got float|^AssertionError: $"
@@ -214,7 +217,7 @@ def compare_random(name: str, text: str, answer: dict[str, Any], network: Networ
         with patience(PATIENCE_S):
             match_scenes(outcome, scenario, answer["scenes"], Tolerance(), solver)
             outcome.kind = "not matched" if outcome.faults else "compared"
-            matcher = Matcher(scenario, MatchOptions(), solver)
+            matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
             for number, scene in enumerate(() if outcome.faults else answer["scenes"]):
                 for what, moved in _outside(text, scene, number):
                     _tell_apart(outcome, matcher, moved, number, what)

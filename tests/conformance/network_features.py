@@ -47,7 +47,13 @@ def features_of(network: Any) -> list[dict[str, Any]]:
     # Scenic closes the cracks between its elements
     drivable = mapping(network.drivableRegion.polygons)
     whole = {"type": "Feature", "geometry": drivable, "properties": {"id": "drivable", "kind": "drivable"}}
-    found = [whole, *(_feature(each, "intersection", roads=_identity(each.roads)) for each in network.intersections)]
+    found = [
+        whole,
+        *(
+            _feature(each, "intersection", roads=_identity(each.roads), signalized=bool(each.isSignalized))
+            for each in network.intersections
+        ),
+    ]
     for road in network.allRoads:
         forward, backward = _name(road.forwardLanes), _name(road.backwardLanes)
         found.append(_feature(road, "road", forward=forward, backward=backward, intersection=inside.get(road.uid)))

@@ -68,8 +68,7 @@ def draw_all(
     (work / "scenes").mkdir(parents=True, exist_ok=True)
     for town in dict.fromkeys(each.town for each in wanted):
         missing = [each for each in wanted if each.town == town and not _enough(work, each, count)]
-        if not missing:
-            continue
+        # also where nothing is missing: it writes the map afresh, so that none of an older conversion is matched with
         original = Original(python, towns[town], work / town)
         try:
             for seed, each in enumerate(missing):

@@ -16,6 +16,8 @@ from scenicq.forest.improvise import Scene, draw_scene
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Range
 from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.store.labels import Label, LabelObject
 
@@ -69,7 +71,7 @@ def test_a_label_matches_whatever_turns_its_heading_has(version: int, degrees: f
     scenario = compiled("x = Range(190, 200) deg\nego = NEW Object facing x, at 3 @ 4\n".replace(
         "3 @ 4", "(3, 4)" if version == 3 else "3 @ 4"), version)  # fmt: skip
     ego = LabelObject("ego", "Object", "Object", 3.0, 4.0, D(degrees), 1.0, 1.0)
-    verdict = Matcher(scenario).match(Label("frame", "recording", 0, "street", ego, ()))
+    verdict = Matcher(scenario, MatchOptions(tolerance=EXACT)).match(Label("frame", "recording", 0, "street", ego, ()))
     assert isinstance(verdict, Match if matches else NoMatch)
 
 

@@ -15,6 +15,7 @@ from scenicq.exporters.sample import sample_labels
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import Solver
 from scenicq.store.labels import Label, LabelObject
@@ -91,8 +92,8 @@ def examine(example: Example, count: int, seed: int, solver: Solver) -> Outcome:
     """Draw labels from a program, match them, push them out."""
     scenario, outcome = example.compiled(), Outcome()
     labels, outcome.waived = drawn_labels(scenario, count, seed)
-    usual = Matcher(scenario, MatchOptions(), solver)
-    strict = Matcher(scenario, MatchOptions(enforce=frozenset(BuiltIn) - outcome.waived), solver)
+    usual = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
+    strict = Matcher(scenario, MatchOptions(tolerance=EXACT, enforce=frozenset(BuiltIn) - outcome.waived), solver)
     for number, label in enumerate(labels):
         rng = random.Random(f"{seed}/{number}")
         crowd = shuffled(label, rng)

@@ -23,11 +23,12 @@ from scenicq.forest.improvise import Improviser, Scene
 from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import Solver, open_solver
 from scenicq.store.labels import Label, LabelObject
 
-OPTIONS = MatchOptions(enforce=frozenset(), timeout_s=5.0)
+OPTIONS = MatchOptions(tolerance=EXACT, enforce=frozenset(), timeout_s=5.0)
 
 
 @pytest.fixture(scope="module")

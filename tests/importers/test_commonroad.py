@@ -18,6 +18,7 @@ from scenicq.importers.ingest import ingest
 from scenicq.importers.report import Report
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
@@ -83,12 +84,12 @@ def test_no_ego_is_no_ego(file: Path, tmp_path: Path) -> None:
     source = Source("p", "model scenic.domains.driving.model\nego = new Car\nother = new Car\n")
     with pytest.raises(DataError, match="without an ego"):
         list(Query(dataset, source).results())
-    found = list(Query(dataset, source, QueryOptions(MatchOptions(ego="any"))).results())
+    found = list(Query(dataset, source, QueryOptions(MatchOptions(tolerance=EXACT, ego="any"))).results())
     assert len(found) == len(labels)
     for result in found:
         assert isinstance(result.verdict, Match)
         assert set(result.verdict.correspondence.values()) == {"100", "101"}
-    matcher = Matcher(Query(dataset, source).compile(labels[0].map)[0], MatchOptions())
+    matcher = Matcher(Query(dataset, source).compile(labels[0].map)[0], MatchOptions(tolerance=EXACT))
     verdict = matcher.match(labels[0])
     assert isinstance(verdict, NoMatch)
     assert (verdict.cause.what, verdict.cause.detail) == ("ego.class", "the source has no ego")

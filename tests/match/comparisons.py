@@ -5,7 +5,7 @@ from __future__ import annotations
 from scenicq.forest import build
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Range
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT
 
 
 def c(value):
@@ -20,4 +20,4 @@ def compared(property_, node, observed):
     return (Comparison(1, property_, node, None), node, observed)
 
 
-DEFAULT = Tolerance()
+DEFAULT = EXACT

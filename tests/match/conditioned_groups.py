@@ -11,6 +11,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import find_candidates
 from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.tolerance import EXACT
 
 
 def groups(text, seed):
@@ -18,7 +19,7 @@ def groups(text, seed):
     scenario = compiled(HEADER + text, STREET)
     rng = random.Random(seed)
     label = label_of(scenario, drawn(scenario, seed), rng, distractors=2)
-    options = MatchOptions()
+    options = MatchOptions(tolerance=EXACT)
     cast = find_candidates(scenario, label, 0, options, {})
     matcher = Matcher(scenario, options)
     attempt = LabelSearch(scenario, options, cast, matcher.ask)

@@ -21,7 +21,7 @@ from scenicq.match.problem.outcome import Undecided
 from scenicq.match.search import group_cache, group_plan
 from scenicq.match.search.arc_consistency import thinned
 from scenicq.match.search.group_plan import relevant_properties
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.answer import Sat, Unsat
 from scenicq.smt.answer import Unknown as NoAnswer
@@ -144,7 +144,7 @@ def test_exact_counts_what_the_radius_holds():
 def test_given_roles_restrict_the_search():
     scenario = compiled(HEADER + "ego = new Car\nother = new Car ahead of ego by Range(1, 30)")
     label = frame(car("a", 1.75, 60.0), car("b", 1.75, 70.0), car("c", 5.25, 70.0))
-    matcher = Matcher(scenario)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
     assert matcher.match(label, given={"other": "b"}).correspondence["other"] == "b"
     assert isinstance(matcher.match(label, given={"other": "c"}), NoMatch)
     assert [match.correspondence["other"] for match in matcher.matches(label)] == ["a", "b"]
@@ -156,14 +156,16 @@ def test_regions_of_one_name_do_not_make_twins():
     for seed in range(8):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed))
         for objects in (label.objects, label.objects[::-1]):
-            assert isinstance(Matcher(scenario).match(replace(label, objects=objects)), Match)
+            assert isinstance(
+                Matcher(scenario, MatchOptions(tolerance=EXACT)).match(replace(label, objects=objects)), Match
+            )
 
 
 def test_objects_that_must_not_touch_are_still_interchangeable():
     scenario = compiled(HEADER + "ego = new Car\nfor i in range(9):\n    new Pedestrian")
     things = [LabelObject(f"{i}", "Pedestrian", "person", 9.5, 60.0 + 2 * max(i, 1), 0.0, 0.5, 0.5) for i in range(9)]
     enforce = frozenset({BuiltIn.COLLISION})
-    crowd = Matcher(scenario, MatchOptions(enforce=enforce, budget=10_000))
+    crowd = Matcher(scenario, MatchOptions(tolerance=EXACT, enforce=enforce, budget=10_000))
     assert isinstance(crowd.match(frame(*things)), NoMatch)
     assert isinstance(crowd.match(frame(*things, replace(things[0], id="x", y=100.0))), Match)
 
@@ -228,14 +230,21 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
 
     real = group_cache.decide_decomposed
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(group_plan, "closed_form_of", lambda _: None)
+        patch.setattr(group_plan, "closed_form_of", lambda *_: None)
         patch.setattr(group_cache, "decide_decomposed", decide)
-        assert Matcher(scenario, MatchOptions(), Fixed(NoAnswer("timeout"))).match(label).correspondence["other"] == "b"
-        lone = Matcher(scenario, MatchOptions(), Fixed(NoAnswer("timeout"))).match(frame(label.objects[0]))
+        assert (
+            Matcher(scenario, MatchOptions(tolerance=EXACT), Fixed(NoAnswer("timeout")))
+            .match(label)
+            .correspondence["other"]
+            == "b"
+        )
+        lone = Matcher(scenario, MatchOptions(tolerance=EXACT), Fixed(NoAnswer("timeout"))).match(
+            frame(label.objects[0])
+        )
         assert isinstance(lone, Unknown)
         assert lone.correspondence == {"ego": "ego", "other": "a"}
         assert lone.cause.what == "other.position"
-        refuted = Matcher(scenario, MatchOptions(), Fixed(Unsat())).match(frame(label.objects[0]))
+        refuted = Matcher(scenario, MatchOptions(tolerance=EXACT), Fixed(Unsat())).match(frame(label.objects[0]))
         assert isinstance(refuted, NoMatch)
 
 
@@ -257,7 +266,7 @@ def test_a_linear_program_without_an_answer_is_no_proof(monkeypatch):
     monkeypatch.setattr(linear_program, "_solve", fails)
     scenario = compiled(HEADER + PROGRAMS["shared"])
     label = label_of(scenario, drawn(scenario, 1), random.Random(1))
-    assert isinstance(Matcher(scenario).match(label), Unknown)
+    assert isinstance(Matcher(scenario, MatchOptions(tolerance=EXACT)).match(label), Unknown)
 
 
 def test_the_budget_leaves_a_frame_unknown():
@@ -283,7 +292,7 @@ def test_a_solver_that_misbehaves_harms_its_own_frames_only(kind, reason, monkey
     scenario = compiled(HEADER + NONLINEAR)
     plain = frame(car("a", 40.0, 57.0))
     with WorkerSolver(f"bad_checks:{kind}") as solver:
-        matcher = Matcher(scenario, MatchOptions(timeout_s=0.5), solver)
+        matcher = Matcher(scenario, MatchOptions(tolerance=EXACT, timeout_s=0.5), solver)
         verdicts = [matcher.match(label) for label in (frame(THERE), plain, frame(THERE), plain)]
     assert [type(each) for each in verdicts] == [Unknown, NoMatch, Unknown, NoMatch]
     assert {each.reason for each in verdicts if isinstance(each, Unknown)} == {reason}
@@ -293,11 +302,11 @@ def test_a_worker_that_is_killed_is_replaced(monkeypatch):
     monkeypatch.syspath_prepend(HERE)
     scenario = compiled(HEADER + NONLINEAR)
     with WorkerSolver("bad_checks:killed") as solver:
-        found = Matcher(scenario, MatchOptions(timeout_s=5.0), solver).match(frame(THERE))
+        found = Matcher(scenario, MatchOptions(tolerance=EXACT, timeout_s=5.0), solver).match(frame(THERE))
         assert isinstance(found, Unknown)
         assert found.reason == "crash"
     with WorkerSolver() as solver:
-        assert isinstance(Matcher(scenario, MatchOptions(), solver).match(frame(THERE)), Match)
+        assert isinstance(Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(frame(THERE)), Match)
 
 
 # --- necessary conditions
@@ -306,7 +315,7 @@ def test_a_worker_that_is_killed_is_replaced(monkeypatch):
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_thinning_never_removes_a_right_candidate(name):
     scenario = compiled(HEADER + PROGRAMS[name])
-    matcher = Matcher(scenario)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
     removed = 0
     for seed in range(8):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=4)

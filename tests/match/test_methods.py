@@ -144,5 +144,5 @@ def test_interchangeable_objects_are_listed_once():
     )
     label = label_of(scenario, drawn(scenario, 1), random.Random(1))
     four = (*label.objects, replace(label.objects[0], id="fourth"))
-    found = list(Matcher(scenario).matches(replace(label, objects=four)))
+    found = list(Matcher(scenario, MatchOptions(tolerance=EXACT)).matches(replace(label, objects=four)))
     assert len(found) == 4

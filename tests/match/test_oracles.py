@@ -11,6 +11,7 @@ from scenes import compiled, drawn, label_of
 
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.solver import open_solver
 
@@ -26,7 +27,7 @@ def solver():
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_drawn_scene_matches_among_distractors(name, solver):
     scenario = compiled(HEADER + PROGRAMS[name])
-    matcher = Matcher(scenario, MatchOptions(), solver)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
     for seed in SEEDS:
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=3)
         verdict = matcher.match(label)
@@ -47,7 +48,7 @@ def test_every_method_gives_the_same_verdict(name, solver):
             moved[victim] = replace(moved[victim], x=moved[victim].x + off, heading=moved[victim].heading + off / 4)
         for each in (label, replace(label, objects=tuple(moved))):
             verdicts = {
-                method: type(Matcher(scenario, MatchOptions(method=method), solver).match(each))
+                method: type(Matcher(scenario, MatchOptions(tolerance=EXACT, method=method), solver).match(each))
                 for method in ("auto", "smt", "monolithic")
             }
             decided = {verdict for verdict in verdicts.values() if verdict is not Unknown}
@@ -95,5 +96,5 @@ def test_a_scene_pushed_out_of_the_support_does_not_match(name, solver):
         values[index, "position"] = (x + right * c - ahead * s, y + right * s + ahead * c)
         values[index, "heading"] = heading + (far if what == "heading" else 0.0)
         label = label_of(scenario, replace(scene, values=values), random.Random(seed))
-        verdict = Matcher(scenario, MatchOptions(), solver).match(label)
+        verdict = Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(label)
         assert isinstance(verdict, NoMatch), (seed, verdict)

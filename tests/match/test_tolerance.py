@@ -73,7 +73,7 @@ def test_what_is_no_tolerance_is_refused(text):
 
 
 def test_the_most_specific_scope_holds(people):
-    text = "position=1,heading=2deg,Vehicle.position=2,Car.heading=7deg,lead.position=3,Object.heading=9deg"
+    text = "position=1,speed=4,wind=5,Vehicle.position=2,Car.heading=7deg,lead.position=3,Object.heading=9deg"
     tolerance = parse_tolerance(text).for_scenario(people)
     ego, lead, person = (
         next(each.index for each in people.objects if each.name == name) for name in ("ego", "lead", "person")

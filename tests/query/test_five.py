@@ -10,6 +10,7 @@ from scenicq.errors import ScenarioError
 from scenicq.importers.ingest import ingest
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.query.explain.frame_explanation import explain, show_explanation
@@ -40,7 +41,7 @@ def lacking(error: ScenarioError, dataset: Dataset) -> None:
 
 def test_every_scenario_has_an_answer(dataset: Dataset) -> None:
     labels = list(dataset.labels())
-    options = MatchOptions(ego="label" if labels[0].has_ego else "any")
+    options = MatchOptions(tolerance=EXACT, ego="label" if labels[0].has_ego else "any")
     counts: list[int | None] = []
     for path in SCENARIOS:
         query = Query(dataset, read_program(path), QueryOptions(options, every=True))

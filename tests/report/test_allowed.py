@@ -13,6 +13,8 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.exporters.sample import sample_labels
 from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import Shot, draw
@@ -59,7 +61,7 @@ def _scenes(world, program, seed=7):
     """A matcher, and labels that scenes of the program give."""
     network, _ = world
     scenario = compile_scenario(Source("allowed.scenic", HEADER + program + "\n"), network)
-    return Matcher(scenario), list(sample_labels(scenario, SCENES, seed))
+    return Matcher(scenario, MatchOptions(tolerance=EXACT)), list(sample_labels(scenario, SCENES, seed))
 
 
 def _drawn(world, matcher, label):

@@ -6,7 +6,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.query.execution.result_files import read_results
-from scenicq.report.changes import changes, changes_page, changes_text
+from scenicq.report.changes import changes, changes_page, changes_text, check_datasets
 
 
 def _line(frame, verdict="match", recording="r", time=0, **more):
@@ -109,3 +109,27 @@ def test_missing_files_are_told(tmp_path):
     (tmp_path / "b.jsonl").write_bytes(b"\xff\xfe")
     with pytest.raises(DataError, match=r"UTF-8"):
         read_results(tmp_path / "b.jsonl")
+
+
+def test_results_of_different_datasets_are_refused():
+    def of(*records):
+        return {each["frame"]: each for each in records}
+
+    mine = of(_line("a", time=1), _line("b", time=2))
+    assert check_datasets(mine, of(_line("a", time=1))) is None
+    assert check_datasets(mine, {}) is None
+    for other in (_line("a", time=5), _line("a", time=1, recording="q")):
+        with pytest.raises(DataError, match="of different datasets"):
+            check_datasets(mine, of(other))
+    doubt = check_datasets(mine, of(_line("z", recording="q")))
+    assert doubt is not None
+    assert doubt.severity == "warning"
+
+
+def test_the_command_refuses_them(run, tmp_path):
+    paths = (tmp_path / "a.jsonl", tmp_path / "b.jsonl")
+    for time, path in enumerate(paths):
+        path.write_text(json.dumps(_line("f", time=time)) + "\n")
+    done = run("report", *paths)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "different datasets" in done.stderr

@@ -1,4 +1,4 @@
-"""Groups put to a solver, and its answer checked: the last step of the decision ladder."""
+"""Groups put to a solver, and its answer checked: the last step of the cascade."""
 
 from __future__ import annotations
 

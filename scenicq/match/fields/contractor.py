@@ -15,6 +15,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import look
 from scenicq.forest.bounds import Interval, scalar_bounds, vector_bounds
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import (
@@ -115,6 +116,7 @@ class BoxSet:
 
     def take(self, cases: NDArray[np.intp]) -> BoxSet:
         """Some of the cases, possibly several times."""
+        look()
         return BoxSet(
             self.tape,
             len(cases),

@@ -42,7 +42,7 @@ _CLOSE = 0.05
 
 
 def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance) -> Outcome:
-    """Decide a group with fields at hidden points, without a solver; `Maybe` where one is needed.
+    """Decide a group with fields at hidden points, without a solver; `Undecided` where one is needed.
 
     Args:
         parts: The constraints, conditioned, in parts that share no random variable but one.

@@ -44,7 +44,7 @@ def find_shared_value(
     tolerance: Tolerance,
     divided: Callable[[HeadingAssignment], list[HeadingAssignment] | None],
 ) -> Outcome:
-    """Decide parts that share a random number; `Maybe` where that takes too long or cannot be told.
+    """Decide parts that share a random number; `Undecided` where that takes too long or cannot be told.
 
     Args:
         parts: Of each part the ways.

@@ -1,4 +1,4 @@
-"""Single affine features: inverted in closed form, the cheap second step of the decision ladder.
+"""Single affine features: inverted in closed form, the cheap second step of the cascade.
 
 A feature whose random variables occur nowhere else is reachable exactly if the label's value, grown by its tolerance,
 meets the set of values that its expression takes: an interval for a number, an arc for a heading, a polygon or a region

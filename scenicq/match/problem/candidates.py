@@ -16,24 +16,24 @@ from scenicq.match.verdict import Cause
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label
 
-__all__ = ["Candidates", "Cast", "candidates_of", "egos", "find_candidates"]
+__all__ = ["Candidates", "LabelProblem", "candidates_of", "egos", "find_candidates"]
 
 Candidates = Mapping[int, tuple[int, ...]]
-"""For objects of the scenario, the numbers of the things that may play them: all others are known to be excluded."""
+"""For objects of the scenario, the numbers of the label objects that may play them: all others are excluded."""
 
 _MOST_SIGNATURES = 1024
 
 
 @dataclass(frozen=True, slots=True)
-class Cast:
-    """A label made ready: its things by number (0 is the label's ego) and who may play whom.
+class LabelProblem:
+    """A label made ready: its label objects by number (0 is the label's ego) and who may play whom.
 
     Attributes:
-        things: The ego and the objects of the label.
-        ego: Number of the thing that plays the scenario's ego.
-        seen: What is observed of each thing.
+        label: The label.
+        ego: Number of the label object that plays the scenario's ego.
+        seen: What is observed of each label object.
         params: What is observed of the frame.
-        candidates: For each object of the scenario but the ego, the numbers of the things of its class.
+        candidates: For each object of the scenario but the ego, the numbers of the label objects of its class.
         disc: The area that is looked at, if it is limited: centre and radius.
     """
 
@@ -76,7 +76,7 @@ def _completeness(entry: tuple[frozenset[str], list[int]]) -> tuple[int, list[st
 
 
 def egos(scenario: Scenario, label: Label, options: MatchOptions) -> list[int]:
-    """Numbers of the things that may play the ego: the label's own, or any of its class; none where there is none."""
+    """Numbers of the label objects that may play the ego: the label's own, or any of its class, if there are any."""
     own = [0] if label.has_ego else []
     if options.ego == "label":
         return own
@@ -93,13 +93,13 @@ def find_candidates(
     options: MatchOptions,
     given: Mapping[str, str],
     among: Candidates | None = None,
-) -> Cast | Cause:
+) -> LabelProblem | Cause:
     """The cast for one choice of ego, or what is lacking.
 
     Args:
         scenario: The scenario.
         label: The label.
-        ego: Number of the thing that plays the ego.
+        ego: Number of the label object that plays the ego.
         options: The options.
         given: Ids of label objects that are known to play objects, by the objects' names.
         among: What is known of who may play whom, for the label's own ego.
@@ -107,16 +107,16 @@ def find_candidates(
     candidates = candidates_of(scenario, label, ego, options, given, among)
     short = _short(candidates)
     if short is not None:
-        thing, count = scenario.objects[short], len(candidates[short])
-        detail = f"only {count} {thing.category}" if count else f"no {thing.category}"
-        return Cause(f"{thing.name}.class", detail, thing.span, (short,))
+        owner, count = scenario.objects[short], len(candidates[short])
+        detail = f"only {count} {owner.category}" if count else f"no {owner.category}"
+        return Cause(f"{owner.name}.class", detail, owner.span, (short,))
     if options.exact:
         spare = len(_free(label, ego, options)) - len(candidates)
         if spare:
             return Cause("--exact", f"{spare} label objects are left over")
-    things = (label.ego, *label.objects)
-    disc = None if options.radius is None else ((things[ego].x, things[ego].y), options.radius)
-    return Cast(label, ego, tuple(map(observe, things)), observe_params(label), candidates, disc)
+    label_objects = (label.ego, *label.objects)
+    disc = None if options.radius is None else ((label_objects[ego].x, label_objects[ego].y), options.radius)
+    return LabelProblem(label, ego, tuple(map(observe, label_objects)), observe_params(label), candidates, disc)
 
 
 def candidates_of(
@@ -131,31 +131,31 @@ def candidates_of(
     free = _free(label, ego, options)
     of_class: dict[str, tuple[int, ...]] = {}
     candidates: dict[int, tuple[int, ...]] = {}
-    for thing in scenario.objects:
-        if thing.index == scenario.ego:
+    for owner in scenario.objects:
+        if owner.index == scenario.ego:
             continue
-        found = of_class.get(thing.category)
+        found = of_class.get(owner.category)
         if found is None:
-            found = tuple([number for number, kind in free if class_matches(thing.category, kind, options.classes)])
-            of_class[thing.category] = found
-        if thing.name in given:
-            wanted = given[thing.name]
+            found = tuple([number for number, kind in free if class_matches(owner.category, kind, options.classes)])
+            of_class[owner.category] = found
+        if owner.name in given:
+            wanted = given[owner.name]
             found = tuple([number for number in found if number and label.objects[number - 1].id == wanted])
-        if among is not None and thing.index in among:
-            found = tuple([number for number in among[thing.index] if number in found])
-        candidates[thing.index] = found
+        if among is not None and owner.index in among:
+            found = tuple([number for number in among[owner.index] if number in found])
+        candidates[owner.index] = found
     return candidates
 
 
 def _free(label: Label, ego: int, options: MatchOptions) -> list[tuple[int, str]]:
-    """The numbers and classes of the things within the radius that may play others than the ego."""
-    things = (label.ego, *label.objects)
+    """The numbers and classes of the label objects within the radius that may play others than the ego."""
+    label_objects = (label.ego, *label.objects)
     first = 1 if options.ego == "label" or not label.has_ego else 0
-    numbers = [number for number in range(first, len(things)) if number != ego]
+    numbers = [number for number in range(first, len(label_objects)) if number != ego]
     if options.radius is not None:
-        x, y, reach = things[ego].x, things[ego].y, options.radius
-        numbers = [n for n in numbers if (things[n].x - x) ** 2 + (things[n].y - y) ** 2 <= reach * reach]
-    return [(number, things[number].category) for number in numbers]
+        x, y, reach = label_objects[ego].x, label_objects[ego].y, options.radius
+        numbers = [n for n in numbers if (label_objects[n].x - x) ** 2 + (label_objects[n].y - y) ** 2 <= reach * reach]
+    return [(number, label_objects[number].category) for number in numbers]
 
 
 def _short(candidates: Mapping[int, tuple[int, ...]]) -> int | None:

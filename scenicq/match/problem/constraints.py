@@ -24,18 +24,18 @@ _ALWAYS = ("position", "heading")
 
 def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, noisy: bool = False) -> Node | None:
     """The expression of a feature that is not observed (or, unless `noisy`, whose observed value has noise added)."""
-    thing = scenario.objects[feature.object]
-    hidden = feature.property in thing.mutated and not noisy
+    owner = scenario.objects[feature.object]
+    hidden = feature.property in owner.mutated and not noisy
     if feature.property in signature[feature.object] and not hidden:
         return None
-    return thing.properties[feature.property].value
+    return owner.properties[feature.property].value
 
 
-def compared(thing: ScenarioObject, seen: frozenset[str]) -> list[str]:
+def compared(owner: ScenarioObject, seen: frozenset[str]) -> list[str]:
     """The properties of an object that are compared with the label, in the order in which they are checked."""
-    always = [name for name in _ALWAYS if name in seen and name not in thing.mutated]
+    always = [name for name in _ALWAYS if name in seen and name not in owner.mutated]
     others = sorted(
-        name for name, given in thing.properties.items() if name in seen and name not in _ALWAYS and given.explicit
+        name for name, given in owner.properties.items() if name in seen and name not in _ALWAYS and given.explicit
     )
     return always + others
 
@@ -61,10 +61,10 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
         given = scenario.params[name]
         if given.explicit:
             found.append(Comparison(PARAMS, name, observed(given.value), given.span))
-    for thing in scenario.objects:
-        for name in compared(thing, signature[thing.index]):
-            given = thing.properties[name]
-            found.append(Comparison(thing.index, name, observed(given.value), given.span))
+    for owner in scenario.objects:
+        for name in compared(owner, signature[owner.index]):
+            given = owner.properties[name]
+            found.append(Comparison(owner.index, name, observed(given.value), given.span))
     for requirement in scenario.requirements:
         if requirement.built_in is None:
             found.append(Condition(requirement, observed(requirement.condition)))

@@ -1,4 +1,4 @@
-"""Comparing known values: the exact first step of the decision ladder, and the replay of witnesses."""
+"""Comparing known values: the exact first step of the cascade, and the replay of witnesses."""
 
 from __future__ import annotations
 

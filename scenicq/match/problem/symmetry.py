@@ -98,15 +98,15 @@ def interchangeable(scenario: Scenario, shapes: Sequence[Shape]) -> Mapping[int,
             involved.setdefault(index, []).append(shape)
     last: dict[Hashable, int] = {}
     found: dict[int, int] = {}
-    for thing in scenario.objects:
-        if thing.index == scenario.ego:
+    for owner in scenario.objects:
+        if owner.index == scenario.ego:
             continue
-        own = involved.get(thing.index, [])
-        key = (thing.category, frozenset(shape.key for shape in own), len(own))
+        own = involved.get(owner.index, [])
+        key = (owner.category, frozenset(shape.key for shape in own), len(own))
         earlier = last.get(key)
-        if earlier is not None and _swappable(thing.index, earlier, [*own, *involved.get(earlier, [])]):
-            found[thing.index] = earlier
-        last[key] = thing.index
+        if earlier is not None and _swappable(owner.index, earlier, [*own, *involved.get(earlier, [])]):
+            found[owner.index] = earlier
+        last[key] = owner.index
     return found
 
 

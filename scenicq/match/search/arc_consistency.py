@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Value
-from scenicq.match.problem.candidates import Cast
+from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.match.search.interval_relaxation import possible
 from scenicq.match.tolerance import Tolerance
@@ -21,14 +21,14 @@ _MOST_ROLES = 2
 
 
 def thinned(
-    plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]], cast: Cast, ego: int, tolerance: Tolerance
+    plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]], problem: LabelProblem, ego: int, tolerance: Tolerance
 ) -> tuple[dict[int, tuple[int, ...]], tuple[int, GroupPlan] | None]:
     """Candidates that no group about one or two objects excludes by intervals alone (arc consistency).
 
     Args:
         plan: The groups.
-        candidates: For each object but the ego, the things that it may be.
-        cast: The label.
+        candidates: For each object but the ego, the label objects that it may be.
+        problem: The label.
         ego: Index of the ego in the scenario.
         tolerance: Per feature.
 
@@ -36,7 +36,7 @@ def thinned(
         The candidates that are left, and an object that has none with the group that took the last one, if there is
         one.
     """
-    columns = _Columns(cast, plan, ego)
+    columns = _Columns(problem, plan, ego)
     alive = {index: np.ones(len(numbers), dtype=bool) for index, numbers in candidates.items()}
     pairs: list[tuple[GroupPlan, NDArray[np.bool_]]] = []
     known: dict[tuple[int, tuple[tuple[int, ...], ...]], Any] = {}
@@ -90,8 +90,8 @@ def _propagate(
 class _Columns:
     """Observed values as arrays over the candidates of a group's roles."""
 
-    def __init__(self, cast: Cast, plan: MatchPlan, ego: int) -> None:
-        self.cast = cast
+    def __init__(self, problem: LabelProblem, plan: MatchPlan, ego: int) -> None:
+        self.problem = problem
         self.plan = plan
         self.ego = ego
         self.columns: dict[tuple[tuple[int, ...], str], Any] = {}
@@ -102,7 +102,7 @@ class _Columns:
     def column(self, numbers: tuple[int, ...], name: str) -> Any:
         """Values of one property: an array, a pair of arrays, or None if they are no numbers."""
         if (numbers, name) not in self.columns:
-            self.columns[numbers, name] = _stacked([self.cast.seen[number][name] for number in numbers])
+            self.columns[numbers, name] = _stacked([self.problem.seen[number][name] for number in numbers])
         return self.columns[numbers, name]
 
 
@@ -116,11 +116,11 @@ class _Lookup:
 
     def __call__(self, index: int, name: str) -> Any:
         if index == PARAMS:
-            return _number(self.columns.cast.params.get(name))
+            return _number(self.columns.problem.params.get(name))
         if name not in self.columns.plan.signature[index]:
             return None
         if index == self.columns.ego:
-            return _number(self.columns.cast.seen[self.columns.cast.ego][name])
+            return _number(self.columns.problem.seen[self.columns.problem.ego][name])
         role = self.group.roles.index(index)
         found = self.columns.column(self.options[role], name)
         if found is None or len(self.options) == 1:

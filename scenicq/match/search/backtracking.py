@@ -17,10 +17,10 @@ from scenicq.budget import look
 from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import BipartiteMatching, Slot
 
-__all__ = ["Answer", "Reporter", "SilentReporter", "find_assignments"]
+__all__ = ["Consistency", "Reporter", "SilentReporter", "find_assignments"]
 
 
-class Answer(Enum):
+class Consistency(Enum):
     """What is known of a partial assignment."""
 
     YES = "yes"
@@ -57,7 +57,7 @@ class SilentReporter:
         """Nothing."""
 
 
-Check = Callable[[int, Mapping[int, int]], tuple[Answer, frozenset[int]]]
+Check = Callable[[int, Mapping[int, int]], tuple[Consistency, frozenset[int]]]
 """Judges an assignment after its newest slot got a candidate: the answer and the slots it rests on."""
 
 
@@ -134,11 +134,13 @@ def find_assignments(
                 raise Exhausted
             assignment[slot] = candidate
             answer, blamed = check(slot, assignment)
-            if answer is not Answer.NO:
+            if answer is not Consistency.NO:
                 blocked = matching.pin(slot, candidate)
                 # the open slots that are left without a candidate are so because of the assigned ones alone
-                answer, blamed = (Answer.NO, frozenset(blocked & assignment.keys())) if blocked else (answer, blamed)
-            if answer is Answer.NO:
+                answer, blamed = (
+                    (Consistency.NO, frozenset(blocked & assignment.keys())) if blocked else (answer, blamed)
+                )
+            if answer is Consistency.NO:
                 del assignment[slot]
                 frame.blamed |= (blamed - {slot}) & names
                 watch.rejected(slot, candidate, blamed)

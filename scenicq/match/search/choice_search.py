@@ -32,7 +32,7 @@ from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact
 from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
-from scenicq.match.search.backtracking import Answer, find_assignments
+from scenicq.match.search.backtracking import Consistency, find_assignments
 from scenicq.match.search.choice_problem import ChoiceProblem, Lookup, Part, conjuncts
 from scenicq.match.search.outcome_bounds import possible_outcomes
 from scenicq.match.search.outcome_tables import TooManyOutcomesError
@@ -52,7 +52,10 @@ Ask = Callable[[Sequence[Sequence[Item]]], Outcome]
 
 
 def decide_with_choices(
-    items: Sequence[Item], tolerance: Tolerance, decide: Decide, ask: Ask | None = None
+    items: Sequence[Item],
+    tolerance: Tolerance,
+    decide: Decide,
+    ask: Ask | None = None,
 ) -> Outcome | None:
     """Decide a group that random choices are part of; None if there are none.
 
@@ -61,6 +64,9 @@ def decide_with_choices(
         tolerance: Per feature.
         decide: Decides what is left when all choices have come out.
         ask: The same by a solver, where nothing else decides it.
+
+    Raises:
+        TimeIsUp: See `scenicq.budget`.
     """
     parts = [part for item in items for part in conjuncts(item)]
     try:
@@ -82,7 +88,12 @@ class _ChoiceSearch:
     """The search for one group and one label."""
 
     def __init__(
-        self, items: list[Item], parts: list[Part], tolerance: Tolerance, decide: Decide, ask: Ask | None
+        self,
+        items: list[Item],
+        parts: list[Part],
+        tolerance: Tolerance,
+        decide: Decide,
+        ask: Ask | None,
     ) -> None:
         self.items = items
         self.constraints = [constraint for constraint, _, _ in items]
@@ -182,7 +193,7 @@ class _ChoiceSearch:
                 links.setdefault(slot, set()).update(group - {slot})
         return find_assignments(slots, self._check, links=links, budget=_MOST_TRIES)
 
-    def _check(self, slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+    def _check(self, slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
         domain = self.domains[slot]
         picks = domain.outcomes.picks[assignment[slot] - domain.first]
         for variable, pick in zip(domain.outcomes.variables, picks.tolist(), strict=True):
@@ -193,8 +204,8 @@ class _ChoiceSearch:
                     theirs = self.domains[other]
                     own = theirs.outcomes.picks[assignment[other] - theirs.first, column]
                     if own >= 0 and own != pick:
-                        return Answer.NO, frozenset((slot, other))
-        answer = Answer.YES
+                        return Consistency.NO, frozenset((slot, other))
+        answer = Consistency.YES
         assigned = assignment.keys()
         for number, part in enumerate(self.parts):
             if slot in part.slots and part.slots <= assigned:
@@ -212,7 +223,7 @@ class _ChoiceSearch:
                     return self._refuted(outcome, frozenset(component.slots), assignment)
                 if isinstance(outcome, Undecided):
                     self.doubt = self.doubt or outcome
-                    answer = Answer.NO
+                    answer = Consistency.NO
                 continue
             # what already hangs on nothing open may be unsatisfiable together
             ready = [part for part in component.parts if part.slots <= assigned]
@@ -225,10 +236,10 @@ class _ChoiceSearch:
 
     def _refuted(
         self, outcome: Refuted, slots: frozenset[int], assignment: Mapping[int, int]
-    ) -> tuple[Answer, frozenset[int]]:
+    ) -> tuple[Consistency, frozenset[int]]:
         if self.blamed is None or len(assignment) > self.blamed[0]:
             self.blamed = (len(assignment), outcome)
-        return Answer.NO, slots
+        return Consistency.NO, slots
 
     def _of(
         self,

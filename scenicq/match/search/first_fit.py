@@ -110,6 +110,9 @@ class FirstFit:
             rows: Labels of the plan.
             options: Tolerance and radius.
             lookups: What is known of the map.
+
+        Raises:
+            TimeIsUp: The time is used up.
         """
         todo = [_Batch(self, rows, [(0,)] * len(rows))]
         while todo:

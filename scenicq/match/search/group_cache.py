@@ -16,7 +16,7 @@ from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Value
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import Cast
+from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, condition_group
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
@@ -41,13 +41,13 @@ class GroupCache:
 
     Attributes:
         options: The options.
-        cast: The label and who may play whom.
+        problem: The label and who may play whom.
         ask: The solver.
         lookups: What is known of the map.
     """
 
     options: MatchOptions
-    cast: Cast
+    problem: LabelProblem
     ask: Asker
     lookups: MapLookups
     _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
@@ -61,11 +61,13 @@ class GroupCache:
             CannotEvaluate: Geometry cannot tell the value of an expression.
         """
         observed: dict[tuple[int, str], Value] = {
-            (index, name): value for index in group.objects for name, value in self.cast.seen[assignment[index]].items()
+            (index, name): value
+            for index in group.objects
+            for name, value in self.problem.seen[assignment[index]].items()
         }
-        observed.update({(PARAMS, name): value for name, value in self.cast.params.items()})
+        observed.update({(PARAMS, name): value for name, value in self.problem.params.items()})
         items = condition_group(group, observed)
-        return items if self.cast.disc is None else within_radius(items, *self.cast.disc)
+        return items if self.problem.disc is None else within_radius(items, *self.problem.disc)
 
     def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
         """What is decided for the label objects in a group's roles, said of a group of its shape (see `translated`)."""
@@ -80,7 +82,7 @@ class GroupCache:
         """What a closed form says, if it is clear."""
         if plan.closed_form is None or self.options.method != "auto":
             return None
-        seen = self.cast.seen
+        seen = self.problem.seen
         return plan.closed_form.decide(lambda index, name: seen[assignment[index]][name], self.options, self.lookups)
 
     def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> Outcome:

@@ -6,6 +6,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
 from scenicq.forest.groups import Condition, Group
+from scenicq.forest.interpret import Steps, steps_of
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario
 from scenicq.forest.walk import features
 from scenicq.match.decide.closed_form import ClosedForm, closed_form_of
@@ -13,7 +14,6 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import Signature, build_groups
 from scenicq.match.problem.subgroups import parts_of
 from scenicq.match.problem.symmetry import Shape, interchangeable, shape_of
-from scenicq.match.search.interval_relaxation import Steps, steps_of
 
 __all__ = ["GroupPlan", "MatchPlan", "make_plan", "relevant_properties"]
 
@@ -64,17 +64,17 @@ class MatchPlan:
 
 def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[frozenset[str], ...]:
     """For each object, the properties for which it matters whether a label observes them."""
-    used: dict[int, set[str]] = {thing.index: {"position", "heading"} for thing in scenario.objects}
-    roots = [given.value for thing in scenario.objects for given in thing.properties.values()]
+    used: dict[int, set[str]] = {owner.index: {"position", "heading"} for owner in scenario.objects}
+    roots = [given.value for owner in scenario.objects for given in owner.properties.values()]
     roots += [requirement.condition for requirement in scenario.requirements]
     roots += [given.value for given in scenario.params.values()]
     for index, name in features(*roots):
         used[index].add(name)
-    for thing in scenario.objects:
-        used[thing.index].update(name for name, given in thing.properties.items() if given.explicit)
+    for owner in scenario.objects:
+        used[owner.index].update(name for name, given in owner.properties.items() if given.explicit)
         if BuiltIn.COLLISION in options.enforce:
-            used[thing.index].update(("width", "length"))
-    return tuple(frozenset(used[thing.index]) for thing in scenario.objects)
+            used[owner.index].update(("width", "length"))
+    return tuple(frozenset(used[owner.index]) for owner in scenario.objects)
 
 
 def _over_time(scenario: Scenario, options: MatchOptions) -> list[Shape]:
@@ -107,7 +107,8 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
             parts.append(GroupPlan(part, number, small.roles, closed_form_of(part, scenario.ego)))
         number = kinds.setdefault(shape.key, len(kinds))
         form = closed_form_of(group, scenario.ego)
-        groups.append(GroupPlan(group, number, shape.roles, form, tuple(parts), steps_of(group)))
+        steps = steps_of(*(item.expression for item in group.constraints))
+        groups.append(GroupPlan(group, number, shape.roles, form, tuple(parts), steps))
         paired = [part.roles for part in parts if len(part.roles) > 1]
         # of a chain, the next one is what can be checked next
         chained = set(shape.roles) == {index for roles in paired for index in roles}

@@ -3,8 +3,8 @@
 A span is a pair of lower and upper bounds, floats or arrays that broadcast. Where both ends are the same object the
 value is known, and stays known through what is done with it.
 
-For `necessary`, which evaluates only upwards and mostly with what labels observe. Where fields are chosen case by case
-and bounds go down to the random variables again, see `enclosures`.
+For `outcome_bounds`, where the options of a choice are columns. Where fields are chosen case by case and bounds go down
+to the random variables again, see `interval_domain`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One label with one of its things as the ego: the body of algorithm 1.
+"""One label with one of its label objects as the ego: the body of algorithm 1.
 
 Conditions about one object and the ego leave each object its candidates; necessary conditions of pairs thin them out;
 the search then finds correspondences that satisfy the groups about several objects. Where there is little to try, it is
@@ -18,12 +18,12 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.options import Exhausted, MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot
-from scenicq.match.problem.candidates import Cast
+from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.arc_consistency import thinned
-from scenicq.match.search.backtracking import Answer, Reporter, find_assignments
+from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
 from scenicq.match.search.group_cache import Asker, GroupCache, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
@@ -73,7 +73,7 @@ class LabelSearch:
     Attributes:
         scenario: The scenario.
         options: The options.
-        cast: The label and who may play whom.
+        problem: The label and who may play whom.
         ask: The solver.
         reporter: Watches the search.
         lookups: What is known of the map.
@@ -83,7 +83,7 @@ class LabelSearch:
 
     scenario: Scenario
     options: MatchOptions
-    cast: Cast
+    problem: LabelProblem
     ask: Asker
     reporter: Reporter | None = None
     lookups: MapLookups = field(default_factory=MapLookups)
@@ -93,14 +93,14 @@ class LabelSearch:
 
     def __post_init__(self) -> None:
         """Begin with nothing decided."""
-        self._decisions = GroupCache(self.options, self.cast, self.ask, self.lookups)
+        self._decisions = GroupCache(self.options, self.problem, self.ask, self.lookups)
 
     def solutions(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
         """Every correspondence that matches, interchangeable objects in one order; what is left open is noted.
 
         Args:
             plan: The scenario's groups for what is observed of the candidates.
-            candidates: For each object, the things that it may be.
+            candidates: For each object, the label objects that it may be.
 
         Raises:
             Exhausted: The search takes more steps than it may.
@@ -121,21 +121,21 @@ class LabelSearch:
         return self._decisions.items(group, assignment)
 
     def decide(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome:
-        """Decide a group for the things in its roles, or remember what was decided for them."""
+        """Decide a group for the label objects in its roles, or remember what was decided for them."""
         return translated(self._decisions.of(plan, assignment), plan.group)
 
-    def _judge(self, plan: GroupPlan, assignment: Mapping[int, int], depth: int) -> Answer:
+    def _judge(self, plan: GroupPlan, assignment: Mapping[int, int], depth: int) -> Consistency:
         """Decide a group, and remember what failed furthest."""
         decided = self._decisions.of(plan, assignment)
         if isinstance(decided[1], Satisfied):
-            return Answer.YES
+            return Consistency.YES
         if isinstance(decided[1], Undecided):
-            return Answer.UNKNOWN
+            return Consistency.UNKNOWN
         if self.failure is None or depth > self.failure.depth:
             self.failure = Failure(
                 depth, plan.group, cast("Refuted", translated(decided, plan.group)), dict(assignment)
             )
-        return Answer.NO
+        return Consistency.NO
 
     def _fail(self, failure: Failure) -> None:
         if self.failure is None or failure.depth > self.failure.depth:
@@ -151,12 +151,12 @@ class LabelSearch:
     # --- the query paper's algorithm 1
 
     def _modular(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
-        ego = {self.scenario.ego: self.cast.ego}
+        ego = {self.scenario.ego: self.problem.ego}
         answers = [self._judge(group, ego, 1) for group in plan.ego_only]
-        if Answer.NO in answers:
+        if Consistency.NO in answers:
             return
         wanted = {index: numbers for index, numbers in candidates.items() if index != self.scenario.ego}
-        firm = Answer.UNKNOWN not in answers
+        firm = Consistency.UNKNOWN not in answers
         given: list[dict[int, int]] = []
         if firm and self.options.method == "auto" and _little(plan, wanted):
             failure = self.failure
@@ -199,7 +199,7 @@ class LabelSearch:
         """Candidates that pass the groups about them and the ego alone, and which of them are doubtful."""
         left = wanted
         if self.options.method == "auto" and not _easy(plan, wanted):
-            left, failed = thinned(plan, wanted, self.cast, self.scenario.ego, self.options.tolerance)
+            left, failed = thinned(plan, wanted, self.problem, self.scenario.ego, self.options.tolerance)
             if failed is not None:
                 self._blame_thinning(*failed, wanted, ego)
                 return None
@@ -219,8 +219,8 @@ class LabelSearch:
             if key not in known:
                 answers = [(number, self._passes(groups, {**ego, index: number})) for number in numbers]
                 known[key] = (
-                    tuple([number for number, answer in answers if answer is not Answer.NO]),
-                    tuple([number for number, answer in answers if answer is Answer.UNKNOWN]),
+                    tuple([number for number, answer in answers if answer is not Consistency.NO]),
+                    tuple([number for number, answer in answers if answer is Consistency.UNKNOWN]),
                 )
             kept, open_ones = known[key]
             if not kept:
@@ -245,13 +245,13 @@ class LabelSearch:
         outcome = found if isinstance(found, Refuted) else Refuted(blamed.group.constraints[0])
         self._fail(Failure(2, blamed.group, outcome, assignment))
 
-    def _passes(self, groups: Sequence[GroupPlan], assignment: Mapping[int, int]) -> Answer:
-        answer = Answer.YES
+    def _passes(self, groups: Sequence[GroupPlan], assignment: Mapping[int, int]) -> Consistency:
+        answer = Consistency.YES
         for depth, group in enumerate(groups):
             one = self._judge(group, assignment, 2 + depth)
-            if one is Answer.NO:
+            if one is Consistency.NO:
                 return one
-            answer = one if one is Answer.UNKNOWN else answer
+            answer = one if one is Consistency.UNKNOWN else answer
         return answer
 
     def _firm(self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int]) -> Iterator[dict[int, int]]:
@@ -295,21 +295,21 @@ class LabelSearch:
                 due.setdefault(index, []).append((group, frozenset(group.roles)))
         options = {slot.name: slot.candidates for slot in slots}
 
-        def check(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
+        def check(slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
             for whole, part, roles in parts.get(slot, ()):
                 ready = whole in wary and roles <= assignment.keys()
-                if ready and self._judge(part, assignment, 10 + len(assignment)) is Answer.NO:
-                    return Answer.NO, roles
+                if ready and self._judge(part, assignment, 10 + len(assignment)) is Consistency.NO:
+                    return Consistency.NO, roles
             for group, roles in due.get(slot, ()):
                 if roles <= assignment.keys():
                     answer = self._judge(group, assignment, 10 + len(assignment))
-                    if answer is Answer.NO:
+                    if answer is Consistency.NO:
                         # from now on its parts are looked at first
                         wary.add(group.kind)
                         return answer, self._blamed(group, assignment) if parts else roles
-                    if answer is Answer.UNKNOWN and not accept_unknown:
-                        return Answer.NO, roles
-            return Answer.YES, frozenset()
+                    if answer is Consistency.UNKNOWN and not accept_unknown:
+                        return Consistency.NO, roles
+            return Consistency.YES, frozenset()
 
         return find_assignments(
             slots,
@@ -336,7 +336,7 @@ class LabelSearch:
     # --- the query paper's baseline (section 5.1): one formula for all features of each correspondence
 
     def _monolithic(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
-        ego = {self.scenario.ego: self.cast.ego}
+        ego = {self.scenario.ego: self.problem.ego}
         slots = [Slot(index, options) for index, options in candidates.items() if index != self.scenario.ego]
         for assignment in find_assignments(slots, _accept, fixed=ego, budget=self.options.budget):
             outcome = self._together(plan, assignment)
@@ -387,5 +387,5 @@ def _without(slots: list[Slot], doubtful: set[tuple[int, int]]) -> list[Slot]:
     return [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in doubtful)) for s in slots]
 
 
-def _accept(slot: int, assignment: Mapping[int, int]) -> tuple[Answer, frozenset[int]]:
-    return Answer.YES, frozenset()
+def _accept(slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
+    return Consistency.YES, frozenset()

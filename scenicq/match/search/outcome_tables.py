@@ -128,7 +128,7 @@ def _shared(variables: tuple[Variable, ...], picks: bytes, count: int) -> Outcom
     return Outcomes(variables, table)
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=256)
 def tree_of(root: Select) -> ChoiceTree:
     """The outcomes of a choice and of all choices nested in it.
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
+from scenicq.budget import TimeIsUp
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Leaf, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.match.options import MatchOptions
+from scenicq.match.options import Exhausted, MatchOptions
 from scenicq.match.problem.constraints import describe_constraint
 from scenicq.match.problem.outcome import Refuted
 from scenicq.match.search.first_fit import FilledBatch, FirstFit
@@ -17,10 +17,7 @@ from scenicq.match.search.label_search import Failure, LabelSearch, Solution
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.store.labels import Label
 
-__all__ = ["Ended", "VerdictBuilder"]
-
-Ended = Literal["budget", "timeout"]
-"""What may end a search early: its steps, or the clock."""
+__all__ = ["VerdictBuilder"]
 
 _UNDECIDED, _EXHAUSTED = 2_000_000, 1_000_000
 """Weights of verdicts that are unknown: above every depth that a search comes to."""
@@ -57,25 +54,24 @@ class VerdictBuilder:
             names = self.names(row.label, dict(zip(fit.order, numbers, strict=True)))
             yield row.place, Match(names, _witness(keys, values))
 
-    def without_match(self, label: Label, search: LabelSearch, ended: Ended | None) -> tuple[int, Verdict]:
-        """The verdict of a search without a match, and its weight: an unknown outweighs every no.
-
-        Args:
-            label: The label.
-            search: Its search.
-            ended: What ended the search before all candidates were tried.
-        """
-        ego, failure = {self.scenario.ego: search.cast.ego}, search.failure
+    def without_match(
+        self, label: Label, search: LabelSearch, exhausted: Exhausted | TimeIsUp | None
+    ) -> tuple[int, Verdict]:
+        """The verdict of a search without a match, and its weight: an unknown outweighs every no."""
+        ego, failure = {self.scenario.ego: search.problem.ego}, search.failure
         if search.undecided is not None:
             found = search.undecided
             reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
             return _UNDECIDED, Unknown(reason, self._cause(found), self.names(label, ego | dict(found.assignment)))
-        if ended is not None:
-            limit = f"{self.options.budget:,} steps" if ended == "budget" else f"{self.options.timeout_s:g} s"
-            return _EXHAUSTED, Unknown(ended, Cause("correspondence search", f"more than {limit}"))
+        if isinstance(exhausted, TimeIsUp):
+            cause = Cause("correspondence search", f"more than {self.options.timeout_s:g} s")
+            return _EXHAUSTED, Unknown("timeout", cause)
+        if exhausted is not None:
+            cause = Cause("correspondence search", f"more than {self.options.budget:,} steps")
+            return _EXHAUSTED, Unknown("budget", cause)
         if failure is None:
             return 0, self.excluded(
-                label, search.cast.ego, Cause("correspondence", "no distinct label objects for all objects")
+                label, search.problem.ego, Cause("correspondence", "no distinct label objects for all objects")
             )
         return failure.depth, NoMatch(self._cause(failure), self.names(label, ego | dict(failure.assignment)))
 

@@ -196,7 +196,7 @@ def starts_of(scenario: Scenario, label: Label, sample: int, findings: Iterable[
             continue
         chosen = dict(finding.assignment)
         if isinstance(verdict, Match) and finding.search is not None and finding.plan is not None:
-            chosen[scenario.ego] = finding.search.cast.ego
+            chosen[scenario.ego] = finding.search.problem.ego
             tracks = {index: track_of(label, things[number]) for index, number in chosen.items()}
             for members in _classes(finding.plan.twins):
                 ordered = sorted(tracks[index] for index in members)

@@ -19,7 +19,7 @@ from typing import Any, cast
 
 import pyarrow as pa
 
-__all__ = ["read_row", "result_schema", "result_table", "roles_of"]
+__all__ = ["DENSITY_COLUMNS", "read_row", "result_schema", "result_table", "roles_of"]
 
 _CAUSE = ("what", "detail", "place", "reason")
 
@@ -29,14 +29,21 @@ def roles_of(records: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(("ego", *(role for each in records for role in each["correspondence"]))))
 
 
-def result_schema(roles: Sequence[str], *, over_time: bool = False) -> pa.Schema:
+DENSITY_COLUMNS = ("log_density", "log_density_error", "no_density")
+"""Columns of results that are ranked: numbers, and why there is none."""
+
+
+def result_schema(roles: Sequence[str], *, ranked: bool = False, over_time: bool = False) -> pa.Schema:
     """The columns of results.
 
     Args:
         roles: Names of the scenario's objects, in its order.
+        ranked: Whether results have a density.
         over_time: Whether the results are intervals.
     """
     text = pa.string()
+    kinds = (pa.float64(), pa.float64(), text)
+    more = list(zip(DENSITY_COLUMNS, kinds, strict=True)) if ranked else []
     time, frame, frames = (
         pa.int64(),
         ("frame", text),
@@ -51,6 +58,7 @@ def result_schema(roles: Sequence[str], *, over_time: bool = False) -> pa.Schema
             ("witness", pa.map_(text, pa.list_(pa.float64()))),
             ("cause", pa.struct([(name, text) for name in _CAUSE])),
             ("open_ended", pa.bool_()) if over_time else ("sensors", pa.map_(text, text)),
+            *more,
         ]
     )
 

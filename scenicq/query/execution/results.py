@@ -10,7 +10,7 @@ from typing import Any
 from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
 
-__all__ = ["Funnel", "IntervalSpan", "Result", "record"]
+__all__ = ["Funnel", "IntervalSpan", "LogDensity", "Result", "record"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +31,24 @@ class IntervalSpan:
 
 
 @dataclass(frozen=True, slots=True)
+class LogDensity:
+    """How typical a label is of the program.
+
+    Attributes:
+        log: Natural logarithm of the density with which the program generates what the label observes, in units of
+            1 / (metres and radians), up to a constant of program and map; None where it is not known.
+        error: Standard error of it.
+        fixed: Features that the program fixes by an equality, which have no density and count nothing.
+        reason: Why it is not known.
+    """
+
+    log: float | None
+    error: float = 0.0
+    fixed: tuple[str, ...] = ()
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Result:
     """The verdict on one frame, or on an interval of a recording.
 
@@ -39,6 +57,7 @@ class Result:
         verdict: The verdict. That on an interval names tracks.
         sensors: Path of the sensor file of each channel; empty for frames that the prefilter excluded.
         interval: How far the interval goes on; None for a frame.
+        density: How typical it is, where that was asked for.
     """
 
     frame: str
@@ -47,9 +66,10 @@ class Result:
     verdict: Verdict
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
     interval: IntervalSpan | None = None
+    density: LogDensity | None = None
 
     def __reduce__(self) -> tuple[type[Result], tuple[Any, ...]]:
-        """Pickled as a call, which takes half the time."""
+        """Pickled as a call, which takes half the time; densities are computed where results arrive."""
         return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
 
 
@@ -78,6 +98,12 @@ def record(result: Result) -> dict[str, Any]:
         found["sensors"] = dict(result.sensors)
     else:
         found["open_ended"] = result.interval.open_ended
+    density = result.density
+    if density is not None:
+        found["log_density"] = density.log
+        found["log_density_error"] = None if density.log is None else density.error
+        if density.reason:
+            found["no_density"] = density.reason
     return found
 
 

@@ -122,7 +122,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
 def _again(matcher: Matcher, finding: Finding) -> LabelSearch | None:
     """The search of a finding with the matcher's own options."""
     old = finding.search
-    return None if old is None else LabelSearch(matcher.scenario, matcher.options, old.cast, matcher.ask)
+    return None if old is None else LabelSearch(matcher.scenario, matcher.options, old.problem, matcher.ask)
 
 
 def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas: bool) -> Explanation:

@@ -27,7 +27,7 @@ from scenicq.match.decide.solver_step import ask
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.smt.solver import open_solver
 
 small = st.floats(-20, 20).map(lambda x: round(x, 2))
@@ -160,7 +160,7 @@ def test_a_point_in_a_region_by_every_step(kind, shared, solver):
                 assert kind == "disc"
             else:
                 assert isinstance(outcome, expected), (x, y, outcome)
-            assert isinstance(ask([items], MatchOptions(), solver), expected), (x, y)
+            assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), expected), (x, y)
 
 
 def test_two_positions_of_one_spot_must_agree():
@@ -233,7 +233,11 @@ def test_distance_to_a_region_and_boxes_in_the_solver(solver):
 
     def verdict(condition):
         return type(
-            ask([[at, (Condition(Requirement(condition, None), condition), condition, None)]], MatchOptions(), solver)
+            ask(
+                [[at, (Condition(Requirement(condition, None), condition), condition, None)]],
+                MatchOptions(tolerance=EXACT),
+                solver,
+            )
         )
 
     region = c(PolygonSet((Polygon([(4, -5), (9, -5), (9, 5), (4, 5)]),), "wall"))
@@ -254,8 +258,8 @@ def test_a_choice_of_words_in_the_solver(solver):
     weather = Select(Index((1.0, 2.0)), (Constant("sun"), Constant("rain")))
     for observed, expected in (("rain", Satisfied), ("sun", Satisfied), ("snow", Refuted)):
         items = [compared("weather", weather, observed)]
-        assert isinstance(ask([items], MatchOptions(), solver), expected)
-        assert isinstance(decide(items, Tolerance()), expected)
+        assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), expected)
+        assert isinstance(decide(items, EXACT), expected)
     for observed in (True, False):
         items = [compared("lit", Select(Index((1.0, 1.0)), (c(True), c(True))), observed)]
-        assert isinstance(ask([items], MatchOptions(), solver), Satisfied if observed else Refuted)
+        assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), Satisfied if observed else Refuted)

@@ -20,11 +20,11 @@ from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Refuted, Satisfied
 from scenicq.match.search import label_search
 from scenicq.match.search.label_search import LabelSearch
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch
 
 OPTIONS = (
-    MatchOptions(),
+    MatchOptions(tolerance=EXACT),
     MatchOptions(tolerance=Tolerance(x=0.5, y=0.2, heading=0.1), radius=30.0),
     MatchOptions(tolerance=Tolerance(position=1.0, heading=0.3)),
 )
@@ -115,7 +115,7 @@ require {condition}
 def test_what_grows_beyond_bounds_is_left_to_the_ladder(start, condition):
     scenario = compiled(HEADER + DOUBLED.format(start=start, condition=condition), STREET)
     label = label_of(scenario, drawn(scenario, 0), random.Random(0))
-    assert isinstance(Matcher(scenario).match(label), Match)
+    assert isinstance(Matcher(scenario, MatchOptions(tolerance=EXACT)).match(label), Match)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -13,6 +13,7 @@ from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import EXACT
 
 ROW = """
 shift = Range(-0.5, 0.5)
@@ -33,7 +34,7 @@ TEXTS = {**PROGRAMS, "a row with one shift": ROW, "following": FOLLOWING}
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_parts_lose_no_solution(name):
-    tolerance = MatchOptions().tolerance
+    tolerance = MatchOptions(tolerance=EXACT).tolerance
     for seed in range(3):
         for items, true in groups(TEXTS[name], seed):
             outcome = decide_decomposed(items, tolerance)
@@ -49,5 +50,9 @@ def test_parts_lose_no_solution(name):
 
 def test_a_row_with_one_shift_is_decided_without_a_solver():
     for seed in range(3):
-        outcomes = [decide_decomposed(items, MatchOptions().tolerance) for items, true in groups(ROW, seed) if true]
+        outcomes = [
+            decide_decomposed(items, MatchOptions(tolerance=EXACT).tolerance)
+            for items, true in groups(ROW, seed)
+            if true
+        ]
         assert all(isinstance(outcome, Satisfied) for outcome in outcomes)

@@ -15,6 +15,8 @@ from shapely import Point
 
 from scenicq.match.fields import heading_propagation
 from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 
 FEW = 5000
@@ -38,7 +40,7 @@ def cases(monkeypatch):
 @pytest.mark.parametrize("name", BENDS)
 def test_a_bend_is_followed_without_a_solver_and_without_all_combinations(name, cases):
     scenario = compiled(ON_BEND + BENDS[name], BEND)
-    matcher = Matcher(scenario)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
     for seed in range(2):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed))
         (car,) = label.objects
@@ -53,7 +55,7 @@ def test_a_bend_is_followed_without_a_solver_and_without_all_combinations(name, 
 
 def test_a_place_matches_where_walking_back_leads_to_a_spot_on_the_road():
     scenario = compiled(ON_BEND + BENDS["a known way"], BEND)
-    matcher, field = Matcher(scenario), BEND.roadDirection
+    matcher, field = Matcher(scenario, MatchOptions(tolerance=EXACT)), BEND.roadDirection
     base = label_of(scenario, drawn(scenario, 0), random.Random(0))
     rng, seen = np.random.default_rng(4), Counter()
     for _ in range(40):

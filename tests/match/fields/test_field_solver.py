@@ -21,6 +21,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Satisfied
+from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
 
 CASES = 400
@@ -75,7 +76,7 @@ def test_enclosures_of_points_are_points():
 @pytest.mark.parametrize(("cars", "labels"), [(1, 3), pytest.param(3, 6, marks=pytest.mark.slow)])
 def test_chains_through_an_intersection_are_decided_without_a_solver(cars, labels):
     scenario = compiled("model scenic.domains.driving.model\n" + CHAIN.format(cars=cars), STREET)
-    matcher = Matcher(scenario, MatchOptions(enforce=frozenset()))
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT, enforce=frozenset()))
     for seed in range(labels):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=1)
         assert isinstance(matcher.match(label), Match)
@@ -86,7 +87,7 @@ def test_chains_through_an_intersection_are_decided_without_a_solver(cars, label
 
 
 def test_what_misses_a_solution_by_little_is_repaired():
-    rng, tolerance, count = random.Random(5), MatchOptions().tolerance, 0
+    rng, tolerance, count = random.Random(5), MatchOptions(tolerance=EXACT).tolerance, 0
     for seed in range(4):
         for items, true in groups(CHAIN.format(cars=1), seed):
             found = decide_decomposed(items, tolerance) if true and leaves(*(node for _, node, _ in items)) else None

@@ -15,7 +15,7 @@ from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
@@ -70,7 +70,7 @@ def solver(request):
 @pytest.mark.parametrize("method", ["auto", "smt"])
 def test_the_wrong_side_of_a_border_is_excluded_and_the_right_side_is_not(method, solver):
     # along the spot's line of sight the border can be crossed: the expected answer is found by walking it
-    matcher = Matcher(compiled(PROGRAM, HAIRPIN), MatchOptions(method=method, timeout_s=20.0), solver)
+    matcher = Matcher(compiled(PROGRAM, HAIRPIN), MatchOptions(tolerance=EXACT, method=method, timeout_s=20.0), solver)
     seen = set()
     for x, y, wrong, right in beyond_borders(6):
         for heading in (wrong, right):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import Slot, matchable
-from scenicq.match.search.backtracking import Answer, find_assignments
+from scenicq.match.search.backtracking import Consistency, find_assignments
 
 
 class Recorder:
@@ -64,8 +64,8 @@ def checker(forbidden, doubtful=()):
             if slot not in scope or not assignment.keys() >= set(scope):
                 continue
             if tuple(assignment[name] for name in scope) in bad:
-                return Answer.NO, frozenset(scope)
-        return (Answer.UNKNOWN if slot in doubtful else Answer.YES), frozenset()
+                return Consistency.NO, frozenset(scope)
+        return (Consistency.UNKNOWN if slot in doubtful else Consistency.YES), frozenset()
 
     return check
 

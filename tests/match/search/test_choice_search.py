@@ -16,7 +16,7 @@ from scenicq.importers.report import Report
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.match.verdict import Match, NoMatch
+from scenicq.match.verdict import Match, NoMatch, Unknown
 
 from .nested_choices import REACH, Composer, clear, label_for, small_map
 
@@ -59,6 +59,18 @@ def check(seed: int) -> list[bool]:
 def test_verdicts_are_those_of_all_combinations() -> None:
     found = [each for seed in range(40) for each in check(seed)]
     assert 0.2 < sum(found) / len(found) < 0.9
+
+
+def test_a_search_that_takes_too_long_ends_as_unknown() -> None:
+    rng = random.Random(3)
+    program = Composer(network(), rng).compose()
+    text = "\n".join([*program.lines, ""])
+    scenario = compile_scenario(Source("nested.scenic", text), network())
+    options = MatchOptions(tolerance=parse_tolerance(f"position={REACH},heading=180deg"), timeout_s=-1.0)
+    labels = (label_for(program, rng) for _ in range(20))
+    verdicts = [Matcher(scenario, options).match(label) for label in labels]
+    assert any(isinstance(verdict, Unknown) and verdict.reason == "timeout" for verdict in verdicts)
+    assert not any(isinstance(verdict, Match) for verdict in verdicts)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import parse_tolerance
+from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions, read_program
@@ -86,7 +86,7 @@ def test_a_truncated_piece_is_refused(dataset, tmp_path):
 def test_pieces_of_two_questions_do_not_mix(dataset, tmp_path):
     (piece,) = partitions(dataset, 1)
     run_shard(dataset, tmp_path, piece)
-    run_shard(dataset, tmp_path, piece, replace(OPTIONS, match=MatchOptions()))
+    run_shard(dataset, tmp_path, piece, replace(OPTIONS, match=MatchOptions(tolerance=EXACT)))
     with pytest.raises(DataError, match="2 different questions"):
         gather(tmp_path)
     assert gather(tmp_path, fingerprint(dataset, read_program(PROGRAM).text, OPTIONS)).funnel.matches

@@ -20,7 +20,7 @@ import pytest
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import parse_tolerance
+from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Unknown
 from scenicq.query.execution import dask_engine as dask
 from scenicq.query.execution.partitions import partitions
@@ -96,7 +96,7 @@ def test_matching_processes_that_are_killed(dataset: Dataset, undisturbed: Found
 @pytest.mark.slow
 def test_a_frame_that_kills_is_unknown_and_no_other(dataset: Dataset, scenarios: Path) -> None:
     program = read_program(scenarios / "02_crossing_cars.scenic")
-    options = QueryOptions(MatchOptions(method="smt"), solver="sh -c 'kill -9 $PPID'", limit=None)
+    options = QueryOptions(MatchOptions(tolerance=EXACT, method="smt"), solver="sh -c 'kill -9 $PPID'", limit=None)
     alone = list(Query(dataset, program, replace(options, solver="portable")).results())
     found = list(Query(dataset, program, replace(options, jobs=2)).results())
     assert [result.frame for result in found] == [result.frame for result in alone] != []

@@ -20,7 +20,7 @@ from scenicq.forest.improvise import draw_scene
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions
@@ -39,7 +39,7 @@ from scenes import label_of
 
 STREET = street()
 OPTIONS = {
-    "default": MatchOptions(),
+    "default": MatchOptions(tolerance=EXACT),
     "wide box": MatchOptions(tolerance=Tolerance(x=0.5, y=0.25, heading=math.radians(10)), classes="coarse"),
     "wide disc": MatchOptions(tolerance=Tolerance(position=3.0, heading=math.radians(60))),
     "radius": MatchOptions(tolerance=Tolerance(position=0.5), radius=25.0),
@@ -121,6 +121,21 @@ def found(dataset: Dataset, text: str, options: MatchOptions, *, prefilter: bool
     }, query
 
 
+@pytest.mark.parametrize("name", ["ahead", "offset", "figure 3", "facing field", "shared heading", "crowd"])
+def test_the_prefilter_keeps_to_scopes(dataset, name):
+    scenario = compile_scenario(Source("test.scenic", HEADER + PROGRAMS[name]), STREET)
+    rng = random.Random(name)
+    scopes = ["Object", "Vehicle", *(each.name for each in scenario.objects), *(o.category for o in scenario.objects)]
+    for _ in range(3):
+        rules = {
+            (rng.choice(scopes), rng.choice(["position", "heading"])): rng.choice([0.001, 0.1, 1.0]) for _ in range(3)
+        }
+        scoped = replace(EXACT, rules=tuple((*key, size) for key, size in sorted(rules.items())))
+        options = MatchOptions(tolerance=scoped)
+        with_it, without = (found(dataset, PROGRAMS[name], options, prefilter=each)[0] for each in (True, False))
+        assert with_it == without, scoped
+
+
 def cases():
     """Every program under every option; those that keep a solver busy only by request."""
     for options in OPTIONS:
@@ -159,7 +174,7 @@ def test_nothing_is_lost_between_objects_and_in_unions(tied, name, options):
     "name", ["ahead of another", "beside another", "near another", "facing another", "either side"]
 )
 def test_pairs_and_unions_are_worth_having(tied, name):
-    _, query = found(tied, TIED[name], MatchOptions(), prefilter=True)
+    _, query = found(tied, TIED[name], MatchOptions(tolerance=EXACT), prefilter=True)
     idle = query.funnel.candidates - query.funnel.matches
     assert query.funnel.matches > 0
     assert idle <= max(3, query.funnel.matches / 2)
@@ -167,7 +182,7 @@ def test_pairs_and_unions_are_worth_having(tied, name):
 
 @pytest.mark.parametrize("name", ["ahead", "offset", "facing field", "requirement", "visible road", "picked lane"])
 def test_the_prefilter_is_worth_having(dataset, name):
-    _, query = found(dataset, PROGRAMS[name], MatchOptions(), prefilter=True)
+    _, query = found(dataset, PROGRAMS[name], MatchOptions(tolerance=EXACT), prefilter=True)
     idle = query.funnel.candidates - query.funnel.matches
     assert idle < (dataset.manifest.total.frames - query.funnel.matches) / 2
 
@@ -175,7 +190,7 @@ def test_the_prefilter_is_worth_having(dataset, name):
 def test_every_step_is_named_after_the_program(dataset):
     text = "ego = new Car\nother = new Car ahead of ego by Range(4, 10)\nrequire (distance to other) < 9"
     scenario = compile_scenario(Source("test.scenic", HEADER + text), STREET)
-    plan = make_plan(scenario, STREET, MatchOptions())
+    plan = make_plan(scenario, STREET, MatchOptions(tolerance=EXACT))
     names = [step.what for step in plan.steps]
     assert "other.class" in names
     assert "require (distance to other) < 9" in names
@@ -190,7 +205,7 @@ def sifted(dataset: Dataset, plan: Plan) -> list[int]:
 
 def test_a_hostile_map_name_stays_a_string(dataset):
     scenario = compile_scenario(Source("test.scenic", HEADER + "ego = new Car"), STREET)
-    plan = make_plan(scenario, STREET, MatchOptions())
+    plan = make_plan(scenario, STREET, MatchOptions(tolerance=EXACT))
     hostile = replace(plan, map="street'; DROP VIEW labels; --")
     with closing(dataset.connect()) as connection:
         whole = blocks(extents(dataset, connection), "street")
@@ -271,6 +286,8 @@ def test_a_field_that_is_not_the_direction_of_roads_is_not_taken_for_it(tmp_path
     recording = Recording("recording", "street", tuple(labels))
     write_dataset(tmp_path / "dataset", iter([recording]), {"street": features}, name="t")
     dataset = open_dataset(tmp_path / "dataset")
-    with_it, without = (found(dataset, text, MatchOptions(), prefilter=each)[0] for each in (True, False))
+    with_it, without = (
+        found(dataset, text, MatchOptions(tolerance=EXACT), prefilter=each)[0] for each in (True, False)
+    )
     assert with_it == without
     assert len(with_it) == 5

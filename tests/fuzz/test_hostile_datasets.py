@@ -3,14 +3,11 @@
 import json
 import random
 import shutil
-import sys
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-from datasets import damages, enter, make_hostile, nested, rewrite
+from hostile_datasets import damages, enter, make_hostile, nested, rewrite
 
 from scenicq.errors import DataError
 from scenicq.store.dataset import open_dataset

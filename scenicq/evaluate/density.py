@@ -1,0 +1,402 @@
+"""How typical labels are of a program: the density with which it would generate what they observe.
+
+The density of a label is the product over groups of jointly dependent features (given the label's values of other
+features, as in algorithm 1 of the query paper). In a group, variables in which its features are affine are solved for;
+the others are drawn, alike for all labels, and the density of the solved ones is averaged over the draws:
+
+    p(features) = E over the others of p(solved variables) / |det of the features by them| * 1[requirements hold]
+
+What is left out is a constant of a program and map: the probability that its requirements hold.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.evaluate.expression_arrays import Array, ArrayValue, Pair, UncomputedError, evaluate_arrays
+from scenicq.evaluate.variables import Draws, density_of, point_density
+from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Constant,
+    Identity,
+    Index,
+    Leaf,
+    Node,
+    Normal,
+    PointIn,
+    Range,
+    Select,
+    TruncatedNormal,
+    Value,
+)
+from scenicq.forest.walk import children, leaves, postorder, rebuild
+
+__all__ = ["GroupDensity", "Observed", "about"]
+
+Reals = NDArray[np.float64]
+Observed = Mapping[tuple[int, str], Value]
+"""What a label observes: values by object (`PARAMS` for parameters) and property."""
+
+_CHUNK = 200
+_AFFINE = 1e-6
+_Draw = Callable[[Leaf, tuple[ArrayValue, ...]], ArrayValue]
+
+_ANGLES = frozenset({"heading"})
+_SLACK = 1e-3
+
+
+@dataclass(eq=False)
+class GroupDensity:
+    """One group, ready for labels.
+
+    Attributes:
+        group: The group, over the scenario as it is written.
+        draws: Of hidden variables.
+        tolerances: Within which features must be that hang on finite choices alone, by property.
+        fixed: Features without any random variable.
+        reason: Why there is no density, if there is none.
+    """
+
+    group: Group
+    draws: Draws
+    fixed: tuple[Comparison, ...] = ()
+    reason: str = ""
+    _continuous: tuple[Comparison, ...] = ()
+    _finite: tuple[Comparison, ...] = ()
+    _conditions: tuple[Condition, ...] = ()
+    _pivots: tuple[Leaf, ...] = ()
+    _roots: dict[int, Node] = field(default_factory=dict[int, Node])
+
+    def __post_init__(self) -> None:
+        """Sort the group's constraints by what their expressions hang on."""
+        compared = [each for each in self.group.constraints if isinstance(each, Comparison)]
+        self._roots = {
+            id(each): _turned(each.expression) if each.property in _ANGLES else each.expression for each in compared
+        }
+        self.fixed = tuple(each for each in compared if not leaves(each.expression))
+        self._continuous = tuple(each for each in compared if any(map(_is_continuous, leaves(each.expression))))
+        known = {id(each) for each in (*self.fixed, *self._continuous)}
+        self._finite = tuple(each for each in compared if id(each) not in known)
+        conditions = [each for each in self.group.constraints if isinstance(each, Condition)]
+        self._conditions = tuple(each for each in conditions if leaves(each.expression))
+
+    @property
+    def trivial(self) -> bool:
+        """Whether the group counts nothing."""
+        return not self._continuous and not self._finite
+
+    def log_densities(self, labels: Sequence[Observed]) -> tuple[Reals, Reals]:
+        """Logarithms of the densities and their standard errors, shape (labels,); -inf outside of the support.
+
+        Raises:
+            UncomputedError: There is no density, or none that can be computed.
+        """
+        parts = [self._of_some(labels[start : start + _CHUNK]) for start in range(0, len(labels), _CHUNK)]
+        return np.concatenate([first for first, _ in parts]), np.concatenate([second for _, second in parts])
+
+    def _of_some(self, labels: Sequence[Observed]) -> tuple[Reals, Reals]:
+        columns = _Columns(labels)
+        if not self._pivots and self._continuous:
+            self._pivots = self._choose(columns)
+        dimension = sum(2 if isinstance(leaf, PointIn) else 1 for leaf in self._pivots)
+        total = np.zeros((1, 1))
+        for turns in itertools.product((-math.tau, 0.0, math.tau), repeat=self._angles()):
+            total = total + self._weights(columns, dimension, turns)
+        total = np.broadcast_to(total, (len(labels), total.shape[1]))
+        means = total.mean(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            errors = total.std(axis=1) / math.sqrt(total.shape[1]) / means
+            return np.log(means), np.where(means > 0, errors, 0.0)
+
+    def _angles(self) -> int:
+        return sum(each.property in _ANGLES for each in self._continuous)
+
+    def _weights(self, columns: _Columns, dimension: int, turns: tuple[float, ...]) -> Array:
+        """What is averaged, for headings that are whole turns off: shape broadcastable to (labels, draws)."""
+        solved: dict[Identity, ArrayValue] = {}
+        density: Array = np.ones((1, 1))
+        if self._continuous:
+            base, matrix = self._affine(columns, dimension)
+            off = columns.targets(self._continuous)
+            angle = iter(turns)
+            rows: list[Array] = []
+            for number, (target, is_angle) in enumerate(off):
+                rest = target - base[number]
+                if is_angle:
+                    rest = np.mod(rest + math.pi, math.tau) - math.pi + next(angle)
+                rows.append(rest)
+            values, size = _solve(matrix, rows)
+            solved = self._assign(values)
+            with np.errstate(all="ignore"):
+                density = np.where(size > 0, 1 / size, 0.0)
+        return density * self._chances(columns, solved)
+
+    def _assign(self, values: Sequence[Array]) -> dict[Identity, ArrayValue]:
+        found: dict[Identity, ArrayValue] = {}
+        left = iter(values)
+        for leaf in self._pivots:
+            found[leaf.identity] = (next(left), next(left)) if isinstance(leaf, PointIn) else next(left)
+        return found
+
+    def _chances(self, columns: _Columns, solved: Mapping[Identity, ArrayValue]) -> Array:
+        """Densities of the solved variables at their values, where all that must hold does."""
+        density: list[Array] = [np.ones((1, 1))]
+        whole = {leaf.identity: self._whole(leaf) for leaf in self._pivots}
+
+        def draw(leaf: Leaf, args: tuple[ArrayValue, ...]) -> ArrayValue:
+            if leaf.identity not in solved:
+                return self.draws.draw(leaf, args)
+            value = solved[leaf.identity]
+            choices = whole[leaf.identity]
+            if choices is not None:
+                density.append(_mixture(choices, cast(Pair, value)))
+            elif isinstance(leaf, PointIn):
+                density.append(point_density(args[0], cast(Pair, value)))
+            else:
+                density.append(density_of(leaf, args, cast(Array, value)))
+            return value
+
+        # all variables are met, also those that only distributions of others hang on
+        plain = (*(self._roots[id(each)] for each in self._finite), *(each.expression for each in self._conditions))
+        pivots: tuple[Node, ...] = tuple(leaf for leaf in self._pivots if whole[leaf.identity] is None)
+        mixed = [leaf for leaf in self._pivots if whole[leaf.identity] is not None]
+        for leaf in mixed:
+            draw(leaf, ())
+        roots = _without_regions(plain, {leaf.identity: solved[leaf.identity] for leaf in mixed})
+        found = evaluate_arrays((*roots, *pivots), _once(draw, mixed, solved), columns.values, self.draws.count)
+        weight = density[0]
+        for each in density[1:]:
+            weight = weight * each
+        for each, value in zip(self._finite, found, strict=False):
+            weight = weight * columns.holds(each, value)
+        for value in found[len(self._finite) : len(roots)]:
+            weight = weight * cast(Array, value).astype(bool)
+        return weight
+
+    def _whole(self, leaf: Leaf) -> tuple[tuple[float, Node], ...] | None:
+        """The regions that a point may be of, with their probabilities, where nothing else hangs on the choice."""
+        if not isinstance(leaf, PointIn) or not isinstance(leaf.region, Select):
+            return None
+        choice, index = leaf.region, leaf.region.index
+        if not isinstance(index, Index) or not all(isinstance(each, Constant) for each in choice.options):
+            return None
+        every = [self._roots.get(id(each), each.expression) for each in self.group.constraints]
+        parents = [node for node in postorder(every) if any(child is index for child in children(node))]
+        if parents != [choice] or [n for n in postorder(every) if choice in children(n)] != [leaf]:
+            raise UncomputedError("a region that other features hang on, too")
+        total = sum(index.weights)
+        return tuple((weight / total, option) for weight, option in zip(index.weights, choice.options, strict=True))
+
+    def _affine(self, columns: _Columns, dimension: int) -> tuple[list[Array], list[list[Array]]]:
+        """The features where all solved variables are 0, and by how much they change with each."""
+        base = self._at(columns, [np.zeros((1, 1))] * dimension)
+        matrix: list[list[Array]] = []
+        for place in range(dimension):
+            unit = [np.full((1, 1), float(place == other)) for other in range(dimension)]
+            moved = self._at(columns, unit)
+            matrix.append([high - low for high, low in zip(moved, base, strict=True)])
+        return base, matrix
+
+    def _at(self, columns: _Columns, values: Sequence[Array], pivots: Sequence[Leaf] | None = None) -> list[Array]:
+        """The coordinates of the features where solved variables have some values."""
+        known = self._assign(values) if pivots is None else _assigned(pivots, values)
+
+        def draw(leaf: Leaf, args: tuple[ArrayValue, ...]) -> ArrayValue:
+            return known[leaf.identity] if leaf.identity in known else self.draws.draw(leaf, args)
+
+        roots = tuple(self._roots[id(each)] for each in self._continuous)
+        return _coordinates(evaluate_arrays(_without_regions(roots, known), draw, columns.values, self.draws.count))
+
+    def _choose(self, columns: _Columns) -> tuple[Leaf, ...]:
+        """Variables to solve for: as many as the features have coordinates, which must be affine in them."""
+        sizes = [2 if columns.is_pair(each) else 1 for each in self._continuous]
+        wanted = sum(sizes)
+        candidates = [leaf for leaf in leaves(*self._roots_of_continuous()) if _is_continuous(leaf)]
+        for count in range(1, min(len(candidates), wanted) + 1):
+            for chosen in itertools.islice(itertools.combinations(candidates, count), 400):
+                if sum(2 if isinstance(leaf, PointIn) else 1 for leaf in chosen) == wanted:
+                    try:
+                        if self._is_affine(columns, chosen, wanted):
+                            return chosen
+                    except UncomputedError as error:
+                        self.reason = str(error)
+        names = ", ".join(f"`{each.property}`" for each in self._continuous)
+        more = f" ({self.reason})" if self.reason else ""
+        raise UncomputedError(f"{names} of a group cannot be solved for its variables{more}")
+
+    def _roots_of_continuous(self) -> tuple[Node, ...]:
+        return tuple(self._roots[id(each)] for each in self._continuous)
+
+    def _is_affine(self, columns: _Columns, chosen: Sequence[Leaf], wanted: int) -> bool:
+        few = columns.first(8)
+        rng = np.random.default_rng(1)
+        one, other = ([np.full((1, 1), value) for value in rng.uniform(-1, 1, wanted)] for _ in range(2))
+        middle = [(a + b) / 2 for a, b in zip(one, other, strict=True)]
+        low, high, between = (self._at(few, values, chosen) for values in (one, other, middle))
+        for a, b, c in zip(low, high, between, strict=True):
+            gap = np.abs((a + b) / 2 - c)
+            if not np.all(gap[np.isfinite(gap)] < _AFFINE * (1 + np.abs(c).max(initial=0, where=np.isfinite(c)))):
+                return False
+        zero = [np.zeros((1, 1))] * wanted
+        base = self._at(few, zero, chosen)
+        columns_: list[list[Array]] = []
+        for place in range(wanted):
+            unit = [np.full((1, 1), float(place == number)) for number in range(wanted)]
+            columns_.append([x - y for x, y in zip(self._at(few, unit, chosen), base, strict=True)])
+        _, size = _solve(columns_, [np.zeros((1, 1))] * wanted)
+        return bool(np.any(size > _AFFINE))
+
+
+def _is_continuous(leaf: Leaf) -> bool:
+    return isinstance(leaf, Range | Normal | TruncatedNormal | PointIn)
+
+
+def _assigned(pivots: Sequence[Leaf], values: Sequence[Array]) -> dict[Identity, ArrayValue]:
+    left = iter(values)
+    return {leaf.identity: (next(left), next(left)) if isinstance(leaf, PointIn) else next(left) for leaf in pivots}
+
+
+def _turned(node: Node) -> Node:
+    """A heading without what only brings it into one turn, which headings are compared without."""
+    if isinstance(node, Arithmetic):
+        if node.op is ArithmeticOp.WRAP:
+            return _turned(node.args[0])
+        if node.op in (ArithmeticOp.ADD, ArithmeticOp.SUB, ArithmeticOp.NEG):
+            return rebuild(node, tuple(map(_turned, node.args)))
+    return node
+
+
+def _without_regions(roots: tuple[Node, ...], known: Mapping[Identity, ArrayValue]) -> tuple[Node, ...]:
+    """The roots with points whose value is known no longer over their regions, which need not be computed."""
+    memo: dict[int, Node] = {}
+    for node in postorder(roots):
+        if isinstance(node, PointIn) and node.identity in known:
+            memo[id(node)] = PointIn(Constant(None), identity=node.identity, span=node.span)
+        else:
+            parts = tuple(memo[id(child)] for child in children(node))
+            memo[id(node)] = rebuild(node, parts)
+    return tuple(memo[id(root)] for root in roots)
+
+
+def _once(draw: _Draw, mixed: Sequence[Leaf], solved: Mapping[Identity, ArrayValue]) -> _Draw:
+    """As `draw`, but for points whose density has been counted already."""
+    done = {leaf.identity for leaf in mixed}
+
+    def drawn(leaf: Leaf, args: tuple[ArrayValue, ...]) -> ArrayValue:
+        return solved[leaf.identity] if leaf.identity in done else draw(leaf, args)
+
+    return drawn
+
+
+def _mixture(choices: Sequence[tuple[float, Node]], point: Pair) -> Array:
+    total: Array = np.zeros((1, 1))
+    for weight, option in choices:
+        total = total + weight * point_density(cast(Any, cast(Constant, option).value), point)
+    return total
+
+
+def _coordinates(values: Sequence[ArrayValue]) -> list[Array]:
+    found: list[Array] = []
+    for value in values:
+        if isinstance(value, tuple):
+            found += value
+        elif isinstance(value, np.ndarray):
+            found.append(value)
+        else:
+            raise UncomputedError("a feature that is no number")
+    return found
+
+
+def _solve(matrix: Sequence[Sequence[Array]], rest: Sequence[Array]) -> tuple[list[Array], Array]:
+    """The solutions of linear equations, and the sizes of their determinants, element by element.
+
+    Args:
+        matrix: For each variable the coefficient in each equation.
+        rest: The right-hand sides.
+    """
+    count = len(rest)
+    shape = np.broadcast_shapes(*(each.shape for column in matrix for each in column), *(each.shape for each in rest))
+    if count == 1:
+        only = matrix[0][0]
+        with np.errstate(all="ignore"):
+            return [np.where(np.abs(only) > 0, rest[0] / only, np.nan)], np.abs(only)
+    full = np.empty((*shape, count, count))
+    right = np.empty((*shape, count, 1))
+    for number in range(count):
+        right[..., number, 0] = rest[number]
+        for place in range(count):
+            full[..., number, place] = matrix[place][number]
+    sound = np.isfinite(full).all(axis=(-1, -2))
+    full[~sound] = 0.0
+    size = np.abs(np.linalg.det(full))
+    full[size <= 1e-12] = np.eye(count)
+    found = np.linalg.solve(full, np.nan_to_num(right))[..., 0]
+    return [found[..., number] for number in range(count)], np.where(size > 1e-12, size, 0.0)
+
+
+class _Columns:
+    """What labels observe, as arrays of shape (labels, 1)."""
+
+    def __init__(self, labels: Sequence[Observed]) -> None:
+        self._labels = labels
+        self.values: dict[tuple[int, str], ArrayValue] = {}
+        for key in labels[0] if labels else ():
+            self.values[key] = _column([label[key] for label in labels])
+
+    def first(self, count: int) -> _Columns:
+        """The first labels."""
+        return _Columns(self._labels[:count])
+
+    def is_pair(self, each: Comparison) -> bool:
+        """Whether a feature is a vector."""
+        return isinstance(self.values[each.object, each.property], tuple)
+
+    def targets(self, compared: Sequence[Comparison]) -> Iterator[tuple[Array, bool]]:
+        """The coordinates of features, and whether each is an angle."""
+        for each in compared:
+            value = self.values[each.object, each.property]
+            if isinstance(value, tuple):
+                yield from ((axis, False) for axis in value)
+            elif isinstance(value, np.ndarray) and value.dtype != object:
+                yield value, each.property in _ANGLES
+            else:
+                raise UncomputedError(f"`{each.property}` is no number")
+
+    def holds(self, each: Comparison, value: ArrayValue) -> Array:
+        """Where a feature that hangs on finite choices has the label's value."""
+        own = self.values[each.object, each.property]
+        if isinstance(own, tuple) and isinstance(value, tuple):
+            return np.hypot(own[0] - value[0], own[1] - value[1]) <= _SLACK
+        if isinstance(own, np.ndarray) and isinstance(value, np.ndarray):
+            if own.dtype == object or value.dtype == object:
+                return own == value
+            off = np.abs(own - value)
+            if each.property in _ANGLES:
+                off = np.abs(np.mod(own - value + math.pi, math.tau) - math.pi)
+            return off <= _SLACK
+        raise UncomputedError(f"`{each.property}` is no number")
+
+
+def _column(values: list[Value]) -> ArrayValue:
+    if all(isinstance(value, tuple) for value in values):
+        pairs = np.array(values, dtype=np.float64)
+        return pairs[:, :1], pairs[:, 1:]
+    if all(isinstance(value, bool | int | float) for value in values):
+        return np.array(values, dtype=np.float64)[:, None]
+    return np.array(values, dtype=object)[:, None]
+
+
+def about(compared: Comparison, names: Sequence[str]) -> str:
+    """A feature in the words of the program."""
+    if compared.object == PARAMS:
+        return f"param {compared.property}"
+    return f"{names[compared.object]}.{compared.property}"

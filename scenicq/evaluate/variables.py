@@ -1,0 +1,213 @@
+"""Random variables in arrays: draws of them, and their densities."""
+
+from __future__ import annotations
+
+import math
+import random
+from statistics import NormalDist
+from typing import Any, assert_never, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.evaluate.expression_arrays import (
+    Array,
+    ArrayValue,
+    Pair,
+    RegionChoice,
+    RegionOf,
+    UncomputedError,
+    points_of,
+)
+from scenicq.forest.draws import draw_point
+from scenicq.forest.nodes import (
+    DiscAt,
+    DiscreteRange,
+    Identity,
+    Index,
+    Leaf,
+    Normal,
+    PointIn,
+    Range,
+    RectangleAt,
+    SectorAt,
+    TruncatedNormal,
+    Undefined,
+)
+from scenicq.geometry.areas import area
+from scenicq.geometry.membership import contains_many
+from scenicq.geometry.regions import Region
+
+__all__ = ["Draws", "density_of", "point_density"]
+
+_NORMAL = NormalDist()
+
+
+class Draws:
+    """The same draws for all labels, the same in every run.
+
+    Attributes:
+        count: How many.
+    """
+
+    def __init__(self, count: int, seed: int = 0) -> None:
+        """Take how many draws, and what they begin with."""
+        self.count = count
+        self._rng = np.random.default_rng(seed)
+        self._shares: dict[Identity, NDArray[np.float64]] = {}
+        self._points: dict[Identity, Pair] = {}
+        self._seed = seed
+
+    def _share(self, leaf: Leaf) -> NDArray[np.float64]:
+        """Uniform numbers for a variable, two rows of shape (1, draws)."""
+        if leaf.identity not in self._shares:
+            # one in each part of like size, so that few draws tell much
+            parts = np.stack([self._rng.permutation(self.count) for _ in range(2)])
+            self._shares[leaf.identity] = (parts + self._rng.random((2, self.count))) / self.count
+        return self._shares[leaf.identity][:, None, :]
+
+    def draw(self, leaf: Leaf, args: tuple[ArrayValue, ...]) -> ArrayValue:
+        """Values of a variable.
+
+        Args:
+            leaf: The variable.
+            args: Values of its distribution's parameters.
+
+        Raises:
+            UncomputedError: It cannot be drawn in arrays.
+        """
+        given: tuple[Any, ...] = args
+        match leaf:
+            case Range():
+                return given[0] + (given[1] - given[0]) * self._share(leaf)[0]
+            case Normal():
+                return given[0] + given[1] * _normal_quantile(self._share(leaf)[0])
+            case TruncatedNormal():
+                mean, deviation, low, high = (_single(arg) for arg in given)
+                below, above = (_NORMAL.cdf((end - mean) / deviation) for end in (low, high))
+                shares = below + (above - below) * self._share(leaf)[0]
+                return np.clip(mean + deviation * _normal_quantile(np.clip(shares, 1e-300, 1 - 1e-16)), low, high)
+            case DiscreteRange():
+                low, high = np.ceil(given[0]), np.floor(given[1])
+                return np.minimum(low + np.floor((high - low + 1) * self._share(leaf)[0]), high)
+            case Index():
+                sums = np.cumsum(np.array(leaf.weights, dtype=np.float64))
+                found = cast(Array, np.searchsorted(sums, self._share(leaf)[0] * sums[-1], side="right"))
+                return np.minimum(found, len(sums) - 1).astype(np.float64)
+            case PointIn():
+                return self._point(leaf, given[0])
+            case _:
+                assert_never(leaf)
+
+    def _point(self, leaf: PointIn, region: Any) -> ArrayValue:
+        first, second = self._share(leaf)
+        if not isinstance(region, RegionOf):
+            if leaf.identity not in self._points:
+                chosen = isinstance(region, RegionChoice)
+                self._points[leaf.identity] = self._points_of(region) if chosen else self._points_in(region, self.count)
+            return self._points[leaf.identity]
+        args: tuple[Any, ...] = region.args
+        match region.node:
+            case DiscAt():
+                away, turn = args[1] * np.sqrt(first), math.tau * second
+            case SectorAt():
+                away, turn = args[1] * np.sqrt(first), args[2] + args[3] * (second - 0.5)
+            case RectangleAt():
+                right, ahead = args[2] * (first - 0.5), args[3] * (second - 0.5)
+                sine, cosine = np.sin(args[1]), np.cos(args[1])
+                return args[0][0] + cosine * right - sine * ahead, args[0][1] + sine * right + cosine * ahead
+            case _:
+                raise UncomputedError("a point of a region that hangs on what is hidden")
+        return args[0][0] - away * np.sin(turn), args[0][1] + away * np.cos(turn)
+
+    def _points_of(self, region: RegionChoice) -> Pair:
+        """Points of whichever region each draw has chosen."""
+        if region.which.shape != (1, self.count):
+            raise UncomputedError("a point of a region that hangs on the label")
+        x, y = np.empty((1, self.count)), np.empty((1, self.count))
+        for number in cast("list[int]", np.unique(region.which).astype(np.int64).tolist()):
+            mine = region.which == number
+            found: Pair = self._points_in(region.options[number], int(mine.sum()))
+            x[mine], y[mine] = found[0][0], found[1][0]
+        return x, y
+
+    def _points_in(self, region: Region, count: int) -> Pair:
+        rng = random.Random(self._seed)
+        draw = draw_point(region)
+        points = [draw(rng) for _ in range(count)]
+        if any(isinstance(point, Undefined) for point in points):
+            raise UncomputedError("a point of an empty region")
+        xy = np.array(points, dtype=np.float64).T
+        return xy[0][None], xy[1][None]
+
+
+def _single(values: Array) -> float:
+    if values.size != 1:
+        raise UncomputedError("a truncated normal with random parameters")
+    return float(values.ravel()[0])
+
+
+def _normal_quantile(shares: Array) -> Array:
+    return np.array([_NORMAL.inv_cdf(share) for share in shares.ravel().tolist()]).reshape(shares.shape)
+
+
+def density_of(leaf: Leaf, args: tuple[ArrayValue, ...], value: Array) -> Array:
+    """The density of a random number at some values.
+
+    Args:
+        leaf: A variable with a density over numbers.
+        args: Values of its distribution's parameters.
+        value: Where.
+    """
+    given: tuple[Any, ...] = args
+    with np.errstate(all="ignore"):
+        match leaf:
+            case Range():
+                low, high = np.minimum(given[0], given[1]), np.maximum(given[0], given[1])
+                return np.where((low <= value) & (value <= high), 1 / (high - low), 0.0)
+            case Normal():
+                return np.exp(-(((value - given[0]) / given[1]) ** 2) / 2) / (given[1] * math.sqrt(math.tau))
+            case TruncatedNormal():
+                mean, deviation, low, high = (_single(arg) for arg in given)
+                mass = _NORMAL.cdf((high - mean) / deviation) - _NORMAL.cdf((low - mean) / deviation)
+                bell = np.exp(-(((value - mean) / deviation) ** 2) / 2) / (deviation * math.sqrt(math.tau) * mass)
+                return np.where((low <= value) & (value <= high), bell, 0.0)
+            case _:
+                raise UncomputedError("a variable without a density")
+
+
+def point_density(region: ArrayValue, point: Pair) -> Array:
+    """The density of a uniform point of a region at some places.
+
+    Raises:
+        UncomputedError: The region has no area of its own, such as a line, or hangs on what is hidden.
+    """
+    if isinstance(region, RegionOf):
+        return _density_in(region, point)
+    if region is None or isinstance(region, str | np.ndarray | tuple | RegionChoice):
+        raise UncomputedError("a point of what is no region")
+    measured = area(cast(Region, region))
+    if not measured:
+        raise UncomputedError("a point of a region without an area")
+    xy, shape = points_of(point)
+    return contains_many(cast(Region, region), xy).reshape(shape) / measured
+
+
+def _density_in(region: RegionOf, point: Pair) -> Array:
+    args: tuple[Any, ...] = region.args
+    dx, dy = point[0] - args[0][0], point[1] - args[0][1]
+    with np.errstate(all="ignore"):
+        match region.node:
+            case DiscAt():
+                return np.where(np.hypot(dx, dy) <= args[1], 1 / (math.pi * args[1] ** 2), 0.0)
+            case SectorAt():
+                aside = np.abs(np.mod(np.arctan2(-dx, dy) - args[2] + math.pi, math.tau) - math.pi)
+                inside = (np.hypot(dx, dy) <= args[1]) & (aside <= args[3] / 2)
+                return np.where(inside, 2 / (np.minimum(args[3], math.tau) * args[1] ** 2), 0.0)
+            case RectangleAt():
+                sine, cosine = np.sin(args[1]), np.cos(args[1])
+                right, ahead = cosine * dx + sine * dy, -sine * dx + cosine * dy
+                inside = (np.abs(right) <= args[2] / 2) & (np.abs(ahead) <= args[3] / 2)
+                return np.where(inside, 1 / (args[2] * args[3]), 0.0)
+            case _:
+                raise UncomputedError("a point of a region that hangs on what is hidden")

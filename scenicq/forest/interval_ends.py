@@ -1,0 +1,244 @@
+"""The arithmetic of an interval's ends: floats, or NumPy arrays that broadcast with one another and with floats."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, cast
+
+import numpy as np
+
+__all__ = ["ARRAYS", "FLOATS", "Array", "Ends", "Interval"]
+
+E = TypeVar("E")
+Array: TypeAlias = Any
+"""A float or an array of floats; as a truth value, a bool or an array of them."""
+
+
+class Interval(NamedTuple, Generic[E]):
+    """A number between two ends.
+
+    Attributes:
+        low, high: The ends; infinite where nothing is known.
+        exact: Whether both ends are the number itself.
+    """
+
+    low: E
+    high: E
+    exact: bool = False
+
+
+class Ends(Protocol[E]):
+    """What can be done with ends; truth values are of the kind that `at_most` gives."""
+
+    def number(self, value: float) -> E:
+        """An end that is a plain number."""
+        ...
+
+    def between(self, low: E, high: E) -> Interval[E]:
+        """The interval between two ends; exact where they show to be one number."""
+        ...
+
+    def known(self, value: E) -> Interval[E]:
+        """The interval of one number; everything where it is none."""
+        ...
+
+    def plus(self, a: E, b: E) -> E:
+        """The sum."""
+        ...
+
+    def negative(self, a: E) -> E:
+        """The negative."""
+        ...
+
+    def times(self, a: E, b: E) -> E:
+        """The product; nothing times an infinite end is nothing."""
+        ...
+
+    def divided(self, a: E, b: E) -> E:
+        """The quotient; nothing where the divisor is infinite, no number where it is zero."""
+        ...
+
+    def least(self, parts: Sequence[E]) -> E:
+        """The least."""
+        ...
+
+    def most(self, parts: Sequence[E]) -> E:
+        """The greatest."""
+        ...
+
+    def hypot(self, a: E, b: E) -> E:
+        """The length of a vector."""
+        ...
+
+    def root(self, a: E) -> E:
+        """The square root; no number of what is negative."""
+        ...
+
+    def sine(self, a: E) -> E:
+        """The sine of an angle in radians."""
+        ...
+
+    def cosine(self, a: E) -> E:
+        """The cosine of an angle in radians."""
+        ...
+
+    def remainder(self, a: E, divisor: float) -> E:
+        """What is left after whole divisors, in [0, divisor)."""
+        ...
+
+    def at_most(self, a: E, b: E) -> Array:
+        """Whether an end is at most another."""
+        ...
+
+    def both(self, a: Array, b: Array) -> Array:
+        """Whether both hold."""
+        ...
+
+    def either(self, a: Array, b: Array) -> Array:
+        """Whether one of two holds."""
+        ...
+
+    def negation(self, a: Array) -> Array:
+        """Whether something does not hold."""
+        ...
+
+    def where(self, condition: Array, a: E, b: E) -> E:
+        """The first where a condition holds, else the second."""
+        ...
+
+
+class _Floats:
+    """Ends that are floats."""
+
+    def number(self, value: float) -> float:
+        return value
+
+    def between(self, low: float, high: float) -> Interval[float]:
+        return Interval(low, high, low == high and math.isfinite(low))
+
+    def known(self, value: float) -> Interval[float]:
+        return Interval(value, value, True) if math.isfinite(value) else Interval(-math.inf, math.inf)
+
+    def plus(self, a: float, b: float) -> float:
+        return a + b
+
+    def negative(self, a: float) -> float:
+        return -a
+
+    def times(self, a: float, b: float) -> float:
+        return 0.0 if a == 0 or b == 0 else a * b
+
+    def divided(self, a: float, b: float) -> float:
+        return 0.0 if math.isinf(b) else math.nan if b == 0 else a / b
+
+    def least(self, parts: Sequence[float]) -> float:
+        return min(parts)
+
+    def most(self, parts: Sequence[float]) -> float:
+        return max(parts)
+
+    def hypot(self, a: float, b: float) -> float:
+        return math.hypot(a, b)
+
+    def root(self, a: float) -> float:
+        return math.sqrt(a) if a >= 0 else math.nan
+
+    def sine(self, a: float) -> float:
+        return math.sin(a)
+
+    def cosine(self, a: float) -> float:
+        return math.cos(a)
+
+    def remainder(self, a: float, divisor: float) -> float:
+        return a % divisor
+
+    def at_most(self, a: float, b: float) -> bool:
+        return a <= b
+
+    def both(self, a: bool, b: bool) -> bool:
+        return a and b
+
+    def either(self, a: bool, b: bool) -> bool:
+        return a or b
+
+    def negation(self, a: bool) -> bool:
+        return not a
+
+    def where(self, condition: bool, a: float, b: float) -> float:
+        return a if condition else b
+
+
+class _Arrays:
+    """Ends that are arrays or floats; what is no number is dealt with by the caller's `np.errstate`."""
+
+    def number(self, value: float) -> Array:
+        return value
+
+    def between(self, low: Array, high: Array) -> Interval[Array]:
+        return Interval(low, high)
+
+    def known(self, value: Array) -> Interval[Array]:
+        defined = np.isfinite(value)
+        if np.all(defined):
+            return Interval(value, value, True)
+        return Interval(np.where(defined, value, -np.inf), np.where(defined, value, np.inf))
+
+    def plus(self, a: Array, b: Array) -> Array:
+        return a + b
+
+    def negative(self, a: Array) -> Array:
+        return -a
+
+    def times(self, a: Array, b: Array) -> Array:
+        product = a * b
+        return np.where(np.isnan(product), 0.0, product)
+
+    def divided(self, a: Array, b: Array) -> Array:
+        return np.where(np.isinf(b), 0.0, np.divide(a, b))
+
+    def least(self, parts: Sequence[Array]) -> Array:
+        found = parts[0]
+        for part in parts[1:]:
+            found = np.minimum(found, part)
+        return found
+
+    def most(self, parts: Sequence[Array]) -> Array:
+        found = parts[0]
+        for part in parts[1:]:
+            found = np.maximum(found, part)
+        return found
+
+    def hypot(self, a: Array, b: Array) -> Array:
+        return np.hypot(a, b)
+
+    def root(self, a: Array) -> Array:
+        return np.sqrt(a)
+
+    def sine(self, a: Array) -> Array:
+        return np.sin(a)
+
+    def cosine(self, a: Array) -> Array:
+        return np.cos(a)
+
+    def remainder(self, a: Array, divisor: float) -> Array:
+        return np.remainder(a, divisor)
+
+    def at_most(self, a: Array, b: Array) -> Array:
+        return np.less_equal(a, b)
+
+    def both(self, a: Array, b: Array) -> Array:
+        return np.logical_and(a, b)
+
+    def either(self, a: Array, b: Array) -> Array:
+        return np.logical_or(a, b)
+
+    def negation(self, a: Array) -> Array:
+        return np.logical_not(a)
+
+    def where(self, condition: Array, a: Array, b: Array) -> Array:
+        return cast("Array", np.where(condition, a, b))
+
+
+FLOATS: Ends[float] = _Floats()
+ARRAYS: Ends[Array] = _Arrays()
