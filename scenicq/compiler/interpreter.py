@@ -305,12 +305,10 @@ class Interpreter:
                 self.dynamic("simulator", node.span)
             case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor() if self.timed is not None:
                 timed_statement(self, self.timed, node, scope)
-            case ast.DynamicStatement() | ast.DynamicDefinition():
-                self.dynamic(node.kind, node.span)
+            case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor():
+                self.dynamic("require monitor" if isinstance(node, ast.RequireMonitor) else node.kind, node.span)
                 if isinstance(node, ast.DynamicDefinition) and node.name:
                     scope.set(node.name, None)
-            case ast.RequireMonitor():
-                self.dynamic("require monitor", node.span)
             case ast.Delete() | ast.Raise() | ast.Try() | ast.WithStatement() | ast.UnsupportedStatement():
                 word = node.span.text.split()[0].rstrip(":")
                 raise fail("unsupported-construct", f"`{word}` is not supported", node.span, "not needed for a scene",
@@ -335,8 +333,7 @@ class Interpreter:
             ScenarioError: unsupported-construct, unless dynamic parts are to be ignored.
         """
         if self.timed is not None:
-            leave_out(self.timed, self.ignored, kind, span)
-            return
+            return leave_out(self.timed, self.ignored, kind, span)
         found = Diagnostic(
             "unsupported-construct",
             f"`{kind}` is not supported",
