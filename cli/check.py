@@ -131,7 +131,9 @@ def _found(
     for network in networks:
         try:
             loader = beside(Path(source.name))
-            scenario = compile_scenario(source, network, version=version, initial=initial, loader=loader)
+            scenario = compile_scenario(
+                source, network, version=version, initial=initial, behaviors="ignore", loader=loader
+            )
         except ScenarioError as error:
             codes = {diagnostic.code for diagnostic in error.diagnostics}
             (lacking if codes == {"map-lacks"} else errors).extend(error.diagnostics)

@@ -78,7 +78,14 @@ def _deliver(
     close: list[Result] | None = None if report is None else []
     with destination(file, wanted.work) as sink, bar, contextlib.closing(results):
         with writing(file):
-            writer = make_writer(wanted.form, sink, query.roles, query.dataset.short_frames, ranked=wanted.ranked)
+            writer = make_writer(
+                wanted.form,
+                sink,
+                query.roles,
+                query.dataset.short_frames,
+                ranked=wanted.ranked,
+                over_time=query.is_over_time(),
+            )
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
                 writer.write(record(result))

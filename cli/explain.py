@@ -14,6 +14,7 @@ from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
+from scenicq.query.explain.interval_explanation import explain_recording
 
 from .datasets import open_checked
 from .main import NOTHING
@@ -27,18 +28,30 @@ from .report import plain
 __all__ = ["explain"]
 
 
+def _recording(query: Query, named: str) -> tuple[str, int | None] | None:
+    """The recording and time that are named, if it is not a frame."""
+    recordings = query.dataset.manifest.by_recording
+    name, at, time = named.rpartition("@")
+    if at and name in recordings and time.isdecimal():
+        return name, int(time)
+    return (named, None) if named in recordings else None
+
+
 @click.command(
     cls=Manual,
     arguments={
         "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a "
+        "program about what happens over time that of a recording, and after `@` the timestamp at which the interval "
+        "begins.",
     },
-    exits={0: "the frame matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
+    exits={0: "the frame or recording matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
     topics={"What counts as a match": SHARED},
     epilog="\b\nExamples:\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c\n"
-    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.5,heading=5deg --smt2 formulas",
+    "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.5,heading=5deg --smt2 formulas\n"
+    "  scenicq explain cut_in.scenic dataset scene-0061@1532402928147847",
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.argument("dataset", type=click.Path())
@@ -50,11 +63,18 @@ __all__ = ["explain"]
 def explain(
     ctx: click.Context, scenario: Path, dataset: str, frame: str, *, smt2: Path | None, exit_zero: bool, **given: Any
 ) -> None:
-    """Say why one frame matches, or what keeps it from it and which tolerance would do.
+    """Say why a frame or recording matches, or what keeps it from it and what would do.
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
     query = Query(open_checked(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
+    if query.is_over_time() and (named := _recording(query, frame)) is not None:
+        with LazySolver(query.options.solver) as solver:
+            told = explain_recording(query, solver, *named)
+        click.echo(plain(told.text()))
+        if not told.matches and not exit_zero:
+            ctx.exit(NOTHING)
+        return
     label = query.dataset.label(frame)
     show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:

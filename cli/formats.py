@@ -40,6 +40,19 @@ _COLUMNS: tuple[str, ...] = (
 )
 
 
+_INTERVAL_COLUMNS: tuple[str, ...] = (
+    "recording",
+    "start_us",
+    "end_us",
+    "frames",
+    "verdict",
+    "correspondence",
+    "witness",
+    "cause",
+    "open_ended",
+)
+
+
 class Writer(Protocol):
     """Writes results one by one."""
 
@@ -53,7 +66,7 @@ class Writer(Protocol):
 
 
 class _Lines:
-    """One line a result: JSON, or the name of a frame that matches."""
+    """One line a result: JSON, or the name of a frame, or the recording and start of an interval, that matches."""
 
     def __init__(self, text: Text, line: Callable[[Mapping[str, Any]], str | None]) -> None:
         self._text, self._line = text, line
@@ -68,14 +81,17 @@ class _Lines:
         self._text.flush()
 
 
-def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
-    """A row of plain cells; nested values become JSON text."""
-    cells = {name: record.get(name, {}) for name in _COLUMNS}
-    return {name: _json(cell) if isinstance(cell, Mapping) else cell for name, cell in cells.items()}
+def _flat(record: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    """A row of plain cells; nested values and truth values become JSON text."""
+    cells = {name: record.get(name, {}) for name in names}
+    return {name: _json(cell) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()}
 
 
 def _name(record: Mapping[str, Any]) -> str | None:
-    return plain(record["frame"]).replace("\n", "\\n") if record["verdict"] == "match" else None
+    if record["verdict"] != "match":
+        return None
+    name = record["frame"] if "frame" in record else f"{record['recording']}@{record['start_us']}"
+    return plain(name).replace("\n", "\\n")
 
 
 def _escaped(record: Mapping[str, Any]) -> str:
@@ -92,13 +108,13 @@ def safe_cell(value: Any) -> Any:
 
 
 class _Csv:
-    def __init__(self, text: Text, more: tuple[str, ...]) -> None:
-        self._text, self._more = text, more
-        self._rows = csv.DictWriter(text, (*_COLUMNS, *more), lineterminator="\n")
+    def __init__(self, text: Text, names: tuple[str, ...]) -> None:
+        self._text, self._names = text, names
+        self._rows = csv.DictWriter(text, names, lineterminator="\n")
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        row = _flat(record) | {name: record.get(name) for name in self._more}
+        row = _flat(record, self._names) | {name: record.get(name) for name in DENSITY_COLUMNS if name in self._names}
         self._rows.writerow({name: safe_cell(value) for name, value in row.items()})
         self._text.flush()
 
@@ -107,8 +123,8 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, roles: Sequence[str], *, ranked: bool) -> None:
-        self._schema = result_schema(roles, ranked=ranked)
+    def __init__(self, sink: BinaryIO, roles: Sequence[str], *, ranked: bool, over_time: bool) -> None:
+        self._schema = result_schema(roles, ranked=ranked, over_time=over_time)
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Mapping[str, Any]] = []
 
@@ -133,6 +149,7 @@ def make_writer(
     shorten: Callable[[], Callable[[str], str]] | None = None,
     *,
     ranked: bool = False,
+    over_time: bool = False,
 ) -> Writer:
     """The writer of a format.
 
@@ -142,15 +159,17 @@ def make_writer(
         roles: Gives the roles that results may name; asked where they are columns.
         shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
         ranked: Whether results have a density.
+        over_time: Whether the results are intervals.
     """
+    names = _INTERVAL_COLUMNS if over_time else _COLUMNS
     if name == "parquet":
-        return _Parquet(sink, roles(), ranked=ranked)
+        return _Parquet(sink, roles(), ranked=ranked, over_time=over_time)
     text = Text(sink)
     match name:
         case "table":
-            return Table(text, shorten)
+            return Table(text, shorten, over_time=over_time)
         case "csv":
-            return _Csv(text, DENSITY_COLUMNS if ranked else ())
+            return _Csv(text, (*names, *(DENSITY_COLUMNS if ranked else ())))
         case "ids":
             return _Lines(text, _name)
         case _:

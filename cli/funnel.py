@@ -22,10 +22,20 @@ def _steps(query: Query) -> list[tuple[str, str]]:
     return [
         (f"{funnel.frames:,}", f"frames{stopped}"),
         (f"{funnel.candidates:,}", filtered),
-        (f"{funnel.cast:,}", "with a label object for every role"),
+        *(_over_time(funnel) or [(f"{funnel.cast:,}", "with a label object for every role")]),
         (f"{funnel.matches:,}", "matches"),
         (f"{funnel.unknowns:,}", f"unknown{f': {reasons}' if reasons else ''}"),
     ]
+
+
+def _over_time(funnel: Funnel) -> list[tuple[str, str]]:
+    """The steps of a query over time; none for one about frames."""
+    told = {
+        "starts": "that match the initial scene", "recordings": "recordings looked at",
+        "bindings": "ways to give the objects tracks",
+        "cut off": "of these cut off: the recording or a track ends before the program",
+    }  # fmt: skip
+    return [(f"{funnel.over_time[name]:,}", text) for name, text in told.items()] if funnel.over_time else []
 
 
 def _failures(funnel: Funnel) -> list[str]:
@@ -34,6 +44,12 @@ def _failures(funnel: Funnel) -> list[str]:
     counted = sorted(funnel.excluded.items(), key=lambda item: (-item[1], item[0]))
     rows = [(what, f"{number:,}", f"{number / funnel.frames:.0%}") for what, number in counted]
     return columns([("first failed at", "frames", "share"), *rows], right=frozenset({1, 2}))
+
+
+def _broken(funnel: Funnel) -> list[str]:
+    counted = sorted(funnel.broken.items(), key=lambda item: (-item[1], item[0]))
+    rows = [(what, f"{number:,}") for what, number in counted]
+    return columns([("then failed at", "bindings"), *rows], right=frozenset({1})) if rows else []
 
 
 def show_funnel(query: Query, elapsed_s: float) -> None:
@@ -46,7 +62,7 @@ def show_funnel(query: Query, elapsed_s: float) -> None:
     # what is never compared was said before the results
     show(each for each in query.funnel.warnings if each.code != "never-compared")
     lines = columns(_steps(query), right=frozenset({0}))
-    lines += _failures(query.funnel)
+    lines += [*_failures(query.funnel), *_broken(query.funnel)]
     for what, frames in sorted(query.funnel.missing.items()):
         lines.append(f"  `{what}` is missing in {count(frames, 'frame')} of the dataset, and not compared there")
     waived = [requirement.value for requirement in BuiltIn if requirement not in query.options.match.enforce]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -63,7 +64,8 @@ def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Pat
 
 def _write(gathered: Gathered, file: Path | None, form: str) -> None:
     with destination(file) as sink, writing(file):
-        writer = make_writer(form, sink, lambda: roles_of(gathered.records()))
+        over_time = "frames" in next(gathered.records(), dict[str, Any]())
+        writer = make_writer(form, sink, lambda: roles_of(gathered.records()), over_time=over_time)
         for each in gathered.records():
             writer.write(each)
         writer.finish()

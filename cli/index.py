@@ -25,10 +25,10 @@ __all__ = ["index"]
 def index(dataset: str, *, quiet: bool) -> None:
     """Compute anew what a dataset holds beside the labels.
 
-    Lanes, road directions, memberships, positions relative to the ego and counts are replaced, all at once. Labels,
-    objects, sensor paths and maps stay as they are.
+    Lanes, road directions, memberships, positions relative to the ego, observed motion and counts are replaced, all at
+    once. Labels, objects, sensor paths and maps stay as they are. A dataset of an older version is brought up to date.
     """
-    opened = open_dataset(dataset, check=False)
+    opened = open_dataset(dataset, older=True, check=False)
     source = recorded(opened)
     with ProgressBar(opened.manifest.total.frames, quiet=quiet) as bar:
         manifest = rebuild(opened, bar.advance)

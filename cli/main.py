@@ -28,11 +28,11 @@ __all__ = ["COMMANDS", "NOTHING", "cli", "main"]
 
 COMMANDS = {
     "ingest": "Make a dataset from a source, such as a nuScenes folder.",
-    "match": "Find the frames of a dataset that match a scenario.",
+    "match": "Find the frames or intervals of a dataset that match a scenario.",
     "gather": "Put the shards of a query together, in the order of the dataset.",
     "check": "Say whether a scenario is sound, and how it is read.",
     "sample": "Draw scenes from a scenario, as labels.",
-    "explain": "Say why one frame matches, or what keeps it from it and which tolerance would do.",
+    "explain": "Say why a frame or recording matches, or what keeps it from it and what would do.",
     "show": "Draw one frame from above: map, boxes, and what a scenario says of it.",
     "evaluate": "Say whether a model fails on the frames that match.",
     "report": "Say which matches came, went and stayed between two result files.",

@@ -22,6 +22,7 @@ from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.store.atomic_files import sole_writer
+from scenicq.temporal.intervals import DEFAULT_GAP_S
 
 from .advise import advise, is_nearly_empty
 from .datasets import open_checked
@@ -129,6 +130,14 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @SENSORS
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
+@click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of "
+              "a dynamic program over time.")
+@click.option("--min-duration", metavar="S", type=click.FloatRange(0), help="Find intervals of at least S seconds: of "
+              "a program about one instant, those in which every frame matches with the same objects.")
+@click.option("--intervals", type=click.Choice(["longest", "all"]), default="longest",
+              help="Of intervals that overlap the longest, or one for each frame that one can start at.")
+@click.option("--gap", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULT_GAP_S,
+              help="An object that has no label for longer than this is another one afterwards.")
 @click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")
 @click.option("--strict", is_flag=True, help="What the program sets and no label has is an error, not a warning; so is "
               "all that `scenicq check` warns of.")
@@ -142,7 +151,7 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
           explain: bool, advised: bool, rank: bool, sample: int | None, diverse: bool, exit_zero: bool, summary: bool,
           quiet: bool, **given: Any) -> None:
     # fmt: on
-    """Find the frames of a dataset that match a scenario.
+    """Find the frames or intervals of a dataset that match a scenario.
 
     Results go to standard output, one a line; progress and summary to standard error. Each match comes with the label
     object of every role and with values of the random variables that prove it.
@@ -159,6 +168,9 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     if deadline is not None:
         options = replace(options, until=time.time() + deadline)
     query = Query(open_checked(target), source, options)
+    if (near is not None or advised) and query.is_over_time():
+        option = "--advise" if advised else "--near"
+        raise click.UsageError(f"{option} is about frames: it cannot be had with intervals", ctx)
     if explain:
         show_plan(query)
         return
@@ -197,7 +209,7 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
             shutil.rmtree(pieces, ignore_errors=True)
     if query.funnel.cut:
         _tell_cut(query, resume=resume)
-    whole = query.options.limit is None and not query.funnel.cut
+    whole = query.options.limit is None and not query.funnel.cut and not query.funnel.over_time
     if advised or (not quiet and whole and is_nearly_empty(query)):
         advise(query, asked=advised)
     _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)

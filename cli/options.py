@@ -10,6 +10,7 @@ from scenicq.errors import Diagnostic, SolverError
 from scenicq.match.options import MatchOptions
 from scenicq.query.execution.option_texts import OptionTexts, read_options
 from scenicq.query.execution.run import QueryOptions
+from scenicq.temporal.intervals import DEFAULT_GAP_S
 
 __all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "query_options"]
 
@@ -18,11 +19,12 @@ DEFAULTS = MatchOptions()
 _SOLVERS = ("auto", "dreal", "portable")
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "ignore_params", "strict",
+    "initial", "behaviors", "ignore_params", "strict",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
 TOPICS = {
-    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict"},
+    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict", "behaviors"},
+    "Over time": {"behaviors", "min_duration", "intervals", "gap"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
         "limit", "every", "all_matches", "near", "rank", "sample", "diverse", "advised",
@@ -32,7 +34,10 @@ TOPICS = {
     "Messages and exit code": {"strict", "exit_zero", "summary", "quiet", "help"},
 }  # fmt: skip
 """The options of `match` as its help lists them."""
-ONE_FRAME = {"prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False}
+ONE_FRAME = {
+    "prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False,
+    "min_duration": None, "intervals": "longest", "gap": DEFAULT_GAP_S,
+}  # fmt: skip
 """The rest of the options of a query about one frame."""
 
 

@@ -13,6 +13,7 @@ from .report import columns, moment, plain
 
 __all__ = ["Table", "Text", "fitted"]
 
+_INTERVAL_HEAD = ("RECORDING", "START", "SECONDS", "VERDICT", "OBJECTS", "FRAMES")
 _HEAD = ("FRAME", "RECORDING", "TIME", "VERDICT", "OBJECTS", "SENSOR")
 _FRAME, _RECORDING, _TIME, _VERDICT, _OBJECTS, _SENSOR = range(6)
 _BLOCK = 100
@@ -48,14 +49,17 @@ class Text:
 class Table:
     """Aligned columns for a terminal; a block of rows at a time."""
 
-    def __init__(self, text: Text, shorten: Callable[[], Callable[[str], str]] | None = None) -> None:
+    def __init__(
+        self, text: Text, shorten: Callable[[], Callable[[str], str]] | None = None, *, over_time: bool = False
+    ) -> None:
         """Take where to write.
 
         Args:
             text: The stream; on a terminal the table fits its width.
             shorten: Gives what cuts names of frames short; asked only where the table does not fit.
+            over_time: Whether the results are intervals, whose table is as wide as it is.
         """
-        self._text = text
+        self._text, self._over_time = text, over_time
         self._width = shutil.get_terminal_size().columns if text.isatty() else None
         self._shorten = shorten
         self._short: Callable[[str], str] | None = None
@@ -71,8 +75,8 @@ class Table:
         """Write the rows that are held back."""
         if not self._rows:
             return
-        lines = columns([_HEAD, *self._rows], indent="")
-        if self._width is not None and max(map(len, lines)) > self._width:
+        lines = columns([_INTERVAL_HEAD if self._over_time else _HEAD, *self._rows], indent="")
+        if not self._over_time and self._width is not None and max(map(len, lines)) > self._width:
             if self._short is None:
                 self._short = self._shorten() if self._shorten is not None else str
             lines = fitted(self._rows, self._width, self._short)
@@ -184,12 +188,23 @@ def _cells(record: Mapping[str, Any]) -> Row:
         f"{density:.2f}" if density is not None else cause.get("reason") or cause.get("detail" if near else "what", "")
     )
     objects = [f"{role}={label}" for role, label in record["correspondence"].items() if (role, label) != ("ego", "ego")]
+    verdict = f"{record['verdict']}: {why}" if why else record["verdict"]
+    if "frames" in record:
+        frames = record["frames"]
+        return (
+            record["recording"],
+            moment(record["start_us"]),
+            f"{(record['end_us'] - record['start_us']) / 1e6:.1f}",
+            verdict,
+            " ".join(objects) or "-",
+            f"{frames['count']} from {frames['first']}",
+        )
     sensors = sorted(record["sensors"].items(), key=lambda item: (not item[0].startswith("CAM_FRONT"), item))
     return (
         record["frame"],
         record["recording"],
         moment(record["timestamp_us"]),
-        f"{record['verdict']}: {why}" if why else record["verdict"],
+        verdict,
         " ".join(objects) or "-",
         sensors[0][1] if sensors else "-",
     )

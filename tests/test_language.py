@@ -3,7 +3,7 @@
 In a block `# warning: [code]` marks a line of which `scenicq check` warns, exactly these on the page of warnings, and
 `# error: [code]` marks the line that is wrong, and `# value: name.property == value` states a property of
 an object of which nothing is random. The fence may go on with `scenic=2` (read as that version), `initial` (dynamic
-parts are left out) and `coarse` (classes are folded).
+parts are left out), `ignore` (behaviors are left out, the rest is matched over time) and `coarse` (classes are folded).
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ class Block:
     def compiled(self) -> Scenario:
         """The scenario over the made-up street."""
         source = Source(f"{self.page}:{self.line}", self.text)
-        return compile_scenario(source, street(), version=self.version, initial="initial" in self.options)
+        initial, behaviors = "initial" in self.options, "ignore" if "ignore" in self.options else "refuse"
+        return compile_scenario(source, street(), version=self.version, initial=initial, behaviors=behaviors)
 
 
 def blocks() -> list[Block]:

@@ -41,6 +41,8 @@ OBSERVABLE: dict[str, Kind] = {
     "height": "scalar",
     "speed": "scalar",
     "velocity": "vector",
+    "angularSpeed": "scalar",
+    "acceleration": "scalar",
 }
 """Properties that a label can observe, by kind: references to them are conditioned on the label."""
 

@@ -27,10 +27,13 @@ from scenicq.compiler.imports import import_into
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import decided
 from scenicq.compiler.logic import condition
+from scenicq.compiler.monitors import MonitorCall, MonitorDefinition
 from scenicq.compiler.placing import Surroundings, bind
 from scenicq.compiler.requirements import Requirement, requirement
 from scenicq.compiler.scoping import own_names
 from scenicq.compiler.specifiers import construct
+from scenicq.compiler.temporal import TimedStatements
+from scenicq.compiler.timed_statements import leave_out, timed_statement
 from scenicq.compiler.values import (
     Choice,
     Delayed,
@@ -81,6 +84,7 @@ class Interpreter:
         initial: Whether dynamic parts are ignored rather than refused.
         load: Resolves an import or model: its dotted name and place to a module.
         network: The road network.
+        timed: Takes what is said about time; None for a program that is matched at one instant.
     """
 
     version: int
@@ -93,6 +97,7 @@ class Interpreter:
     params: dict[str, tuple[ModelValue, Span, bool]] = field(default_factory=dict[str, Any])
     excluded: Exclusions = field(default_factory=Exclusions)
     lookups: Lookups = field(default_factory=Lookups)
+    timed: TimedStatements | None = None
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
     workspace: Node = field(default_factory=lambda: build.constant(Everywhere()))
@@ -150,6 +155,8 @@ class Interpreter:
     ) -> ModelValue:
         """Call a function; see `Runner`."""
         given = bind_arguments(function, args, named, span)
+        if isinstance(function, MonitorDefinition):
+            return MonitorCall(function, given)
         scope = Environment(given, cast(Environment, function.environment), own=self._own_names(function))
         self.budget.enter(span)
         try:
@@ -296,12 +303,12 @@ class Interpreter:
                 self._share(node, scope)
             case ast.Simulator():
                 self.dynamic("simulator", node.span)
-            case ast.DynamicStatement() | ast.DynamicDefinition():
-                self.dynamic(node.kind, node.span)
+            case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor() if self.timed is not None:
+                timed_statement(self, self.timed, node, scope)
+            case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor():
+                self.dynamic("require monitor" if isinstance(node, ast.RequireMonitor) else node.kind, node.span)
                 if isinstance(node, ast.DynamicDefinition) and node.name:
                     scope.set(node.name, None)
-            case ast.RequireMonitor():
-                self.dynamic("require monitor", node.span)
             case ast.Delete() | ast.Raise() | ast.Try() | ast.WithStatement() | ast.UnsupportedStatement():
                 word = node.span.text.split()[0].rstrip(":")
                 raise fail("unsupported-construct", f"`{word}` is not supported", node.span, "not needed for a scene",
@@ -325,6 +332,8 @@ class Interpreter:
         Raises:
             ScenarioError: unsupported-construct, unless dynamic parts are to be ignored.
         """
+        if self.timed is not None:
+            return leave_out(self.timed, self.ignored, kind, span)
         found = Diagnostic(
             "unsupported-construct",
             f"`{kind}` is not supported",

@@ -27,6 +27,7 @@ from scenicq.compiler.models import (
 )
 from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
+from scenicq.compiler.temporal import Behaviors, TimedStatements
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, fail, is_node
 from scenicq.compiler.version_detection import decide_version
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
@@ -55,6 +56,7 @@ def compile_scenario(
     *,
     version: int | None = None,
     initial: bool = False,
+    behaviors: Behaviors | None = None,
     loader: Loader | None = None,
     model: str | None = None,
 ) -> Scenario:
@@ -65,6 +67,8 @@ def compile_scenario(
         network: The road network of the map.
         version: 1, 2 or 3; inferred from the spelling if not given.
         initial: Ignore dynamic parts instead of refusing them.
+        behaviors: What becomes of behaviors, where the scenario is to be matched over time; None where it is about one
+            instant, and all dynamic parts are refused or ignored.
         loader: Reads files that the program imports.
         model: The world model of a program that imports none, as Scenic's `--model`.
 
@@ -73,7 +77,8 @@ def compile_scenario(
     """
     try:
         with limited(MOST_SECONDS):
-            return _compiled(source, network, version, initial=initial, loader=loader, model=model)
+            timed = None if initial or behaviors is None else TimedStatements(behaviors)
+            return _compiled(source, network, version, initial=initial, timed=timed, loader=loader, model=model)
     except TimeIsUp:
         raise fail("budget-exceeded", f"evaluating the program takes more than {MOST_SECONDS:g} s", _start(source), "",
                    ("make loops shorter, and ask less of the map in them",)) from None  # fmt: skip
@@ -85,6 +90,7 @@ def _compiled(
     version: int | None,
     *,
     initial: bool,
+    timed: TimedStatements | None,
     loader: Loader | None,
     model: str | None,
 ) -> Scenario:
@@ -92,6 +98,7 @@ def _compiled(
     chosen = decide_version(module)
     world = _World(network, chosen, initial, loader)
     run = world.interpreter
+    run.timed = timed
     try:
         given = None if model is None or _imports(module) else model
         library = given or _left_out(module, chosen)
@@ -247,7 +254,8 @@ def _scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
         tuple(Requirement(each.condition(), each.span, probability=each.probability) for each in soft),
-        tuple(run.ignored), warnings,
+        tuple(run.ignored), (*warnings, *(run.timed.remarks() if run.timed is not None else ())),
+        dynamics=run.timed.dynamics() if run.timed is not None else None,
     )  # fmt: skip
 
 
@@ -263,10 +271,15 @@ def _names(objects: list[Instance]) -> list[str]:
     return names
 
 
+_SCALARS = frozenset(
+    ("heading", "width", "length", "height", "speed", "angularSpeed", "acceleration", "visibleDistance", "viewAngle")
+)
+
+
 def _property(name: str, value: ModelValue, span: Span | None) -> Node | None:
     if name in ("position", "velocity"):
         return to_vector(value, span)
-    if name in ("heading", "width", "length", "height", "speed", "visibleDistance", "viewAngle"):
+    if name in _SCALARS:
         return to_scalar(value, span)
     if name == "regionContainedIn" and value is not None:
         return to_region(value, span)

@@ -9,12 +9,13 @@ from typing import Protocol
 from scenicq.compiler.coerce import to_boolean
 from scenicq.compiler.environment import Environment, Runner
 from scenicq.compiler.logic import condition
+from scenicq.compiler.temporal import TimedStatements, is_temporal
 from scenicq.compiler.values import Delayed, Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Node
 from scenicq.syntax import ast
 
-__all__ = ["Requirement", "requirement"]
+__all__ = ["Requirement", "Requirer", "deferred", "requirement"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,13 +27,14 @@ class Requirement:
     probability: float = 1.0
 
 
-class _Requirer(Runner, Protocol):
+class Requirer(Runner, Protocol):
     """What a requirement asks of the interpreter."""
 
     current_ego: Instance | None
+    timed: TimedStatements | None
 
 
-def requirement(run: _Requirer, node: ast.Require, scope: Environment) -> Requirement | None:
+def requirement(run: Requirer, node: ast.Require, scope: Environment) -> Requirement | None:
     """The requirement that a statement makes; None where it is about time and ignored.
 
     Raises:
@@ -40,17 +42,27 @@ def requirement(run: _Requirer, node: ast.Require, scope: Environment) -> Requir
     """
     probability = 1.0 if node.probability is None else _probability(run, node.probability, scope)
     wanted = node.condition
+    if run.timed is not None and is_temporal(wanted):
+        run.timed.require(
+            lambda expression: deferred(run, expression, scope, node.span), wanted, node.span, probability
+        )
+        return None
     if isinstance(wanted, ast.Temporal | ast.Until):
         run.dynamic(f"require {wanted.operator if isinstance(wanted, ast.Temporal) else 'until'}", wanted.span)
         if not (isinstance(wanted, ast.Temporal) and wanted.operator == "always"):
             return None
         wanted = wanted.operand
+    return Requirement(deferred(run, wanted, scope, node.span), node.span, probability)
+
+
+def deferred(run: Requirer, wanted: ast.Expression, scope: Environment, span: Span) -> Callable[[], Node]:
+    """What computes a condition, once the ego is known, over the names that the program has now."""
     names: dict[str, ModelValue] = {}
     current = scope
     while current.parent is not None:
         names = current.names | names
         current = current.parent
-    run.budget.step(node.span, 20 + len(names))
+    run.budget.step(span, 20 + len(names))
     frozen, ego = Environment(names, current), run.current_ego
     module = scope.module
     then = dict(module.names)
@@ -68,7 +80,7 @@ def requirement(run: _Requirer, node: ast.Require, scope: Environment) -> Requir
                        ("write `F at V`",))  # fmt: skip
         return to_boolean(value, wanted.span)
 
-    return Requirement(held, node.span, probability)
+    return held
 
 
 def _probability(run: Runner, node: ast.Expression, scope: Environment) -> float:

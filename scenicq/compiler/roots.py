@@ -63,6 +63,7 @@ def _object(base: ScenicClass, require_visible: bool) -> ScenicClass:
         cameraOffset=build.constant((0.0, 0.0)),
         speed=0.0,
         angularSpeed=0.0,
+        acceleration=0.0,
         behavior=None,
     )
     own["velocity"] = _property("velocity", _velocity, "speed", "heading")

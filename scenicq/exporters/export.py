@@ -25,6 +25,7 @@ from scenicq.exporters.export_record import Matched
 from scenicq.exporters.interchange import write_interchange
 from scenicq.exporters.openlabel import write_openlabel
 from scenicq.match.verdict import Match, Unknown
+from scenicq.query.execution.interval_frames import frames_of
 from scenicq.query.execution.results import Result
 from scenicq.store.dataset import Dataset
 
@@ -86,8 +87,15 @@ class Exporter:
             raise DataError(Diagnostic("target-unwritable", f"{self.target} is not the name of a new folder"))
 
     def add(self, result: Result) -> None:
-        """Take a result; those that are no match are passed over, of several of one frame the first counts."""
-        if isinstance(result.verdict, Match):
+        """Take a result; those that are no match are passed over, of several of one frame the first counts.
+
+        Of an interval all frames are taken, with the label objects that have the tracks of the roles there.
+        """
+        if isinstance(result.verdict, Match) and result.interval is not None:
+            for label, roles in frames_of(self.dataset, result):
+                self._further += label.frame in self._matched
+                self._matched.setdefault(label.frame, Matched(label.frame, label.recording, roles, dict(label.sensors)))
+        elif isinstance(result.verdict, Match):
             roles = dict(result.verdict.correspondence)
             self._further += result.frame in self._matched
             self._matched.setdefault(result.frame, Matched(result.frame, result.recording, roles, dict(result.sensors)))

@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from scenicq.errors import Diagnostic, Source, Span
 from scenicq.forest.nodes import Node
+from scenicq.forest.temporal import Dynamics
 
 __all__ = ["BuiltIn", "Property", "Requirement", "Scenario", "ScenarioObject"]
 
@@ -94,6 +95,7 @@ class Scenario:
         soft: Requirements with a probability below 1, which exclude nothing.
         ignored: Dynamic parts that were left out.
         warnings: What the author should know.
+        dynamics: What it says about time; None for a static program, and where that is left out.
         as_written: Where expressions were rewritten to be matched, which keeps outcomes but not their probabilities:
             the scenario as the program has it, from which scenes are drawn.
     """
@@ -109,4 +111,5 @@ class Scenario:
     soft: tuple[Requirement, ...] = ()
     ignored: tuple[Diagnostic, ...] = ()
     warnings: tuple[Diagnostic, ...] = field(default=())
+    dynamics: Dynamics | None = None
     as_written: Scenario | None = field(default=None, repr=False)

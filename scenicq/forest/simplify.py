@@ -25,6 +25,7 @@ def roots_of(scenario: Scenario) -> list[Node]:
     """All expressions of a scenario."""
     found = [given.value for thing in scenario.objects for given in thing.properties.values()]
     found += [each.condition for each in (*scenario.requirements, *scenario.soft)]
+    found += scenario.dynamics.conditions if scenario.dynamics is not None else ()
     return [*found, *(p.value for p in scenario.params.values())]
 
 
@@ -89,4 +90,7 @@ def rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
         for conditions in (scenario.requirements, scenario.soft)
     )
     params = {name: replace(p, value=change(p.value)) for name, p in scenario.params.items()}
-    return replace(scenario, objects=objects, requirements=requirements, soft=soft, params=params)
+    dynamics = scenario.dynamics
+    if dynamics is not None:
+        dynamics = replace(dynamics, conditions=tuple(map(change, dynamics.conditions)))
+    return replace(scenario, objects=objects, requirements=requirements, soft=soft, params=params, dynamics=dynamics)

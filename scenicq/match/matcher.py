@@ -32,7 +32,7 @@ from scenicq.match.search.first_fit import FirstFit, Row, first_fit_of, signatur
 from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.search.verdict_builder import Ended, VerdictBuilder
-from scenicq.match.verdict import Cause, Match, Verdict
+from scenicq.match.verdict import Cause, Match, Unknown, Verdict
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 
@@ -108,6 +108,24 @@ class Matcher:
                 return
             if isinstance(finding.verdict, Match):
                 yield finding.verdict
+
+    def findings(self, label: Label, *, among: Candidates | None = None) -> Iterator[Finding]:
+        """Every correspondence by which a label matches; of interchangeable objects, one order only.
+
+        Then, or where there is none, what is not a match: one finding for each choice of the ego that leaves something
+        undecided, and where nothing matches the one finding of `examine`.
+
+        Args:
+            label: The label.
+            among: As of `match`.
+        """
+        found = self._findings(label, MapLookups(), None, {}, among, rest_too=True)
+        while True:
+            with limited(self.options.timeout_s):
+                finding = next(found, None)
+            if finding is None:
+                return
+            yield finding
 
     def examine(self, label: Label) -> Finding:
         """Decide one label and keep what the verdict rests on."""
@@ -186,8 +204,10 @@ class Matcher:
         reporter: Reporter | None,
         given: Mapping[str, str],
         among: Candidates | None,
+        *,
+        rest_too: bool = False,
     ) -> Iterator[Finding]:
-        """Matches, or else the one verdict that there is (algorithm 1)."""
+        """Matches, or else the one verdict that there is (algorithm 1); what else is undecided, if that is wanted."""
         matched = False
         rest: list[tuple[int, Finding]] = []
         for ego in egos(self.scenario, label, self.options):
@@ -212,3 +232,5 @@ class Matcher:
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest
             yield max(rest, key=lambda each: each[0], default=(0, Finding(self._verdicts.without_ego())))[1]
+        elif rest_too:
+            yield from (finding for _, finding in rest if isinstance(finding.verdict, Unknown))

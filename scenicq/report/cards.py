@@ -139,7 +139,10 @@ def draw_card(card: Card) -> str:
         for number, (shot, sensors) in enumerate(zip(card.shots, card.sensors, strict=True))
     ]
     body = element(
-        "div", element("div", picture, _slider(card), class_="view-pane"), element("div", *facts), class_="run-body"
+        "div",
+        element("div", picture, _slider(card), run.timeline, class_="view-pane"),
+        element("div", *facts),
+        class_="run-body",
     )
     return element(
         "article",

@@ -22,12 +22,14 @@ class Run:
         results: Their results in order of time, at least one.
         first: Number of the first frame in its recording, from 1.
         of: Frames of the recording.
+        timeline: Of an interval, a picture of what held when.
     """
 
     recording: str
     results: tuple[Result, ...]
     first: int
     of: int
+    timeline: str = ""
 
     @property
     def kind(self) -> str:

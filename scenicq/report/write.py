@@ -27,6 +27,7 @@ from scenicq.report.runs import Run, find_runs, frame_numbers
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.report.shares import program_lines
 from scenicq.report.svg import element, escape
+from scenicq.report.timelines import interval_runs
 
 __all__ = ["INLINE", "MOST", "check_target", "write_report"]
 
@@ -130,6 +131,17 @@ def _replace(work: Path, folder: Path) -> None:
                 old.unlink()
 
 
+def _fitting(results: Sequence[Result], most: int) -> list[Result]:
+    """The first results that have so many frames together at most, and at least one of them."""
+    kept: list[Result] = []
+    for each in results:
+        most -= 1 if each.interval is None else each.interval.count
+        if most < 0 and (kept or each.interval is None):
+            break
+        kept.append(each)
+    return kept
+
+
 @dataclass(eq=False)
 class _World:
     scenario: Scenario
@@ -159,22 +171,25 @@ class _Report:
     def text(self, results: Sequence[Result], near: Sequence[Result], command: str, elapsed_s: float) -> str:
         """The page."""
         funnel, dataset = self.query.funnel, self.query.dataset
-        # of a frame that matches in several ways the first is shown
-        first: dict[str, Result] = {}
+        # of a frame that matches in several ways the first is shown, but every interval
+        first: dict[object, Result] = {}
         for each in results:
             if isinstance(each.verdict, Match | Unknown):
-                first.setdefault(each.frame, each)
+                first.setdefault(each.frame if each.interval is None else len(first), each)
         results = list(first.values())
-        shown = results[: max(0, MOST - len(near))]
-        frames = len(shown) + len(near)
+        shown = _fitting(results, max(0, MOST - len(near)))
+        frames = sum(1 if each.interval is None else each.interval.count for each in shown) + len(near)
         inline = self.files.inside = frames <= INLINE
         self.files.most = max(1, THUMBNAILS // max(frames, 1))
         numbers = frame_numbers(dataset, {result.recording for result in (*shown, *near)})
-        runs = [*find_runs(shown, numbers), *(Run(r.recording, (r,), *numbers[r.frame]) for r in near)]
+        over_time = any(each.interval is not None for each in shown)
+        found = interval_runs(self.query, shown, numbers) if over_time else find_runs(shown, numbers)
+        runs = [*found, *(Run(r.recording, (r,), *numbers[r.frame]) for r in near)]
         cards = list(self.cards(runs, inline=inline))
         recordings = list(dict.fromkeys(run.recording for run in runs))
         left = len(results) - len(shown)
-        note = f"{left:,} more frames are not shown: `--limit` or a narrower scenario shows others." if left else ""
+        what = "intervals" if over_time else "frames"
+        note = f"{left:,} more {what} are not shown: `--limit` or a narrower scenario shows others." if left else ""
         world = next((found for name in dataset.maps if (found := self.world(name))), None)
         lines, rest = program_lines(world.scenario, funnel.excluded) if world else ([], dict(funnel.excluded))
         name = Path(self.query.source.name).name

@@ -30,12 +30,14 @@ FEW = 200_000
 
 
 def number_array(values: NDArray[Any], kind: Any) -> ArrowArray:
-    """Numbers of shape (n,) as an array of a numeric type; nan becomes null.
+    """Numbers or truth values of shape (n,) as an array of a type that can hold them; nan becomes null.
 
     Args:
         values: Which the type can hold.
-        kind: A `pyarrow` type of numbers.
+        kind: A `pyarrow` type of numbers or truth values.
     """
+    if values.dtype == np.bool_:
+        return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.packbits(values, bitorder="little"))])
     values = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
     there = ~np.isnan(values) if values.dtype.kind == "f" else None
     valid = None if there is None or there.all() else pa.py_buffer(np.packbits(there, bitorder="little"))

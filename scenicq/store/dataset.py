@@ -174,17 +174,18 @@ class Dataset:
         with closing(self.connect()) as connection, self.blamed():
             return shortened(connection)
 
-    def labels_at(self, part: int, first: int, end: int) -> Iterator[Label]:
+    def labels_at(self, part: int, first: int, end: int, *, motion: bool = True) -> Iterator[Label]:
         """Labels of one part, in order.
 
         Args:
             part: Number of the part.
             first: Row of its labels to begin with.
             end: Row to end before.
+            motion: Whether what is computed of motion is read, too.
         """
         labels, objects, sensors = (self.files(table)[part] for table in ("labels", "objects", "sensors"))
         with self.blamed():
-            yield from read_labels([(labels, objects, sensors)], np.arange(first, end), None)
+            yield from read_labels([(labels, objects, sensors)], np.arange(first, end), None, motion=motion)
 
     def verify(self) -> None:
         """Compare every file with its checksum.
@@ -202,11 +203,12 @@ class Dataset:
             raise DataError(problems)
 
 
-def open_dataset(address: str | Path, *, check: bool = True) -> Dataset:
+def open_dataset(address: str | Path, *, older: bool = False, check: bool = True) -> Dataset:
     """Open a dataset.
 
     Args:
         address: A folder, or what fsspec understands, such as `s3://bucket/dataset`.
+        older: Whether one of an older version will do, which can only be brought up to date (`rebuild`).
         check: Whether to read all of it and refuse one that is not sound. Only who knows that it is may do without:
             what readers do with an unsound one is not defined.
 
@@ -216,7 +218,7 @@ def open_dataset(address: str | Path, *, check: bool = True) -> Dataset:
             `option-invalid` where a package for the address is not installed.
     """
     place = find_place(address)
-    manifest = read_manifest(place.name, place.manifest())
+    manifest = read_manifest(place.name, place.manifest(), older=older)
     problems = place.problems(part for parts in manifest.tables.values() for part in parts)
     if problems:
         raise DataError(problems)

@@ -8,7 +8,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-__all__ = ["Label", "LabelObject", "Recording"]
+__all__ = ["Label", "LabelObject", "Motion", "Recording"]
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What the store knows of a label object's motion; None where nothing is observed.
+
+    Attributes:
+        velocity: (vx, vy) in metres per second, map frame: the label's own, else that of its track.
+        acceleration: Along the heading, metres per second squared; of the track.
+        yaw_rate: Radians per second, counter-clockwise; of the track.
+        derived: Whether the velocity is the track's.
+    """
+
+    velocity: tuple[float, float] | None
+    acceleration: float | None
+    yaw_rate: float | None
+    derived: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +44,8 @@ class LabelObject:
         velocity: (vx, vy) in metres per second, map frame.
         track: Identifier of the same physical object along the recording.
         attributes: Everything else that the source says of the object.
+        motion: What the store has computed of its track; None for what was not read from a store. It is no part of the
+            label, and does not count where labels are compared.
     """
 
     id: str
@@ -41,6 +60,7 @@ class LabelObject:
     velocity: tuple[float, float] | None = None
     track: str | None = None
     attributes: Mapping[str, str | float | bool] = field(default_factory=dict[str, str | float | bool])
+    motion: Motion | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

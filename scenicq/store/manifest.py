@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS
+from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS, UPGRADABLE
 
 __all__ = ["MANIFEST", "Counts", "LeftOut", "Manifest", "Part", "is_dataset", "read_manifest"]
 
@@ -117,12 +117,13 @@ def is_dataset(folder: Path) -> bool:
     return isinstance(content, dict) and cast(dict[str, object], content).get("format") == _FORMAT
 
 
-def read_manifest(name: str, data: bytes) -> Manifest:
+def read_manifest(name: str, data: bytes, *, older: bool = False) -> Manifest:
     """Read a dataset's manifest.
 
     Args:
         name: Of the dataset, for messages.
         data: Content of its `dataset.json`.
+        older: Whether a version that `scenicq index` brings up to date will do.
 
     Raises:
         DataError: `store-missing`, `store-version` or `store-damaged`.
@@ -138,9 +139,11 @@ def read_manifest(name: str, data: bytes) -> Manifest:
         hint = "`scenicq ingest SOURCE DATASET` makes a dataset from a source"
         raise DataError(Diagnostic("store-missing", f"{name} is not a dataset of scenicq", hints=(hint,)))
     fields = cast(dict[str, Any], content)
-    if (found := fields.get("schema")) != SCHEMA_VERSION:
+    found = fields.get("schema")
+    if found != SCHEMA_VERSION and not (older and found in UPGRADABLE):
         message = f"{name} has tables of version {found}; this program reads version {SCHEMA_VERSION}"
-        raise DataError(Diagnostic("store-version", message, hints=("ingest the source again",)))
+        hint = f"`scenicq index {name}` brings it up to date" if found in UPGRADABLE else "ingest the source again"
+        raise DataError(Diagnostic("store-version", message, hints=(hint,)))
     try:
         return _manifest(fields)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:

@@ -11,22 +11,25 @@ reading needs no join, and of chosen frames only the row groups that hold them a
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from scenicq.store.labels import Label, LabelObject
+from scenicq.store.labels import Label, LabelObject, Motion
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import ArrowTable
 
-__all__ = ["EGO_COLUMNS", "LABEL_COLUMNS", "OBJECT_COLUMNS", "assemble", "read_labels"]
+__all__ = ["EGO_COLUMNS", "LABEL_COLUMNS", "MOTION_COLUMNS", "OBJECT_COLUMNS", "RowFile", "assemble", "read_labels"]
 
 _BATCH = 2048
 OBJECT_COLUMNS = ["id", "class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy"]
 OBJECT_COLUMNS.extend(("track", "attributes"))
+MOTION_COLUMNS = ["motion_vx", "motion_vy", "acceleration", "yaw_rate", "motion_derived"]
+"""What is computed of motion; a query that does not ask for it need not read it."""
 EGO_COLUMNS = [f"ego_{name}" for name in OBJECT_COLUMNS[1:]]
 _REPEATED = ("class", "track", "recording", "map", "channel", "attributes", "params")
 """Ends of the names of columns with few distinct texts in many rows: decoding each once is several times faster."""
@@ -38,6 +41,8 @@ def read_labels(
     parts: Sequence[tuple[StoreFile, StoreFile, StoreFile]],
     rows: NDArray[np.int64] | None,
     wanted: Collection[str] | None,
+    *,
+    motion: bool = True,
 ) -> Iterator[Label]:
     """Labels in the order of the store.
 
@@ -45,12 +50,15 @@ def read_labels(
         parts: Files of the tables `labels`, `objects` and `sensors`, part by part.
         rows: Rows of `labels` to look at, counted over all parts, in order; None for all.
         wanted: Frames to yield; None for all that are looked at.
+        motion: Whether what is computed of motion is read, too.
     """
+    more = MOTION_COLUMNS if motion else []
+    of_labels = [*LABEL_COLUMNS, *EGO_COLUMNS, *(f"ego_{name}" for name in more)]
     first = 0
     for labels, objects, sensors in parts:
         if rows is not None and not len(rows):
             return
-        with _Rows(labels, [*LABEL_COLUMNS, *EGO_COLUMNS]) as frame_rows:
+        with RowFile(labels, of_labels) as frame_rows:
             size = len(frame_rows)
             if rows is None:
                 chosen = np.arange(size)
@@ -59,7 +67,10 @@ def read_labels(
                 chosen, rows = rows[:inside] - first, rows[inside:]
             first += size
             if len(chosen):
-                with _Rows(objects, OBJECT_COLUMNS) as object_rows, _Rows(sensors, ["channel", "path"]) as sensor_rows:
+                with (
+                    RowFile(objects, [*OBJECT_COLUMNS, *more]) as object_rows,
+                    RowFile(sensors, ["channel", "path"]) as sensor_rows,
+                ):
                     for start in range(0, len(chosen), _BATCH):
                         table = frame_rows.take(chosen[start : start + _BATCH])
                         if wanted is not None:
@@ -72,7 +83,7 @@ def read_labels(
                         yield from assemble(table, others, channels)
 
 
-def _members(rows: _Rows, frames: ArrowTable, what: str) -> ArrowTable:
+def _members(rows: RowFile, frames: ArrowTable, what: str) -> ArrowTable:
     """The rows of another table that belong to some frames."""
     first = frames[f"first_{what}"].to_numpy().astype(np.int64)
     counts = frames[f"{what}_count"].to_numpy().astype(np.int64)
@@ -80,10 +91,11 @@ def _members(rows: _Rows, frames: ArrowTable, what: str) -> ArrowTable:
     return rows.take(np.repeat(first - (ends - counts), counts) + np.arange(counts.sum()))
 
 
-class _Rows:
+class RowFile:
     """The rows of a file as one range of numbers, decoded one row group at a time."""
 
     def __init__(self, file: StoreFile, columns: list[str]) -> None:
+        """Open a file, of which some columns are read."""
         self._columns = columns
         shared = [name for name in columns if name.endswith(_REPEATED)]
         self._file = open_parquet(file, read_dictionary=shared)
@@ -91,13 +103,20 @@ class _Rows:
         self._starts = np.cumsum([0, *sizes])
         self._decoded: tuple[int, ArrowTable] | None = None
 
-    def __enter__(self) -> _Rows:
+    def __enter__(self) -> RowFile:
+        """Nothing is read yet."""
         return self
 
     def __exit__(self, *error: object) -> None:
+        """Close the file."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
         self._file.close()
 
     def __len__(self) -> int:
+        """The number of rows."""
         return int(self._starts[-1])
 
     def take(self, rows: NDArray[np.int64]) -> ArrowTable:
@@ -123,11 +142,11 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
 
     Args:
         frames: `LABEL_COLUMNS` and `EGO_COLUMNS` of each label; its counts say how many rows of the others are its own.
-        objects: `OBJECT_COLUMNS`, label by label.
+        objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS`, too.
         sensors: Channels and paths, label by label.
     """
-    others = _objects([_values(objects, name) for name in OBJECT_COLUMNS])
-    egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)])
+    others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], _motions(objects, ""))
+    egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)], _motions(frames, "ego_"))
     channels = zip(_values(sensors, "channel"), _values(sensors, "path"), strict=True)
     first = 0
     columns = [_values(frames, name) for name in LABEL_COLUMNS]
@@ -140,7 +159,18 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
         yield Label(frame, recording, time, map_name, ego, mine, params, paths)
 
 
-def _objects(columns: list[list[Any]]) -> list[LabelObject]:
+def _motions(table: ArrowTable, prefix: str) -> Iterable[Motion | None]:
+    """The motion of each row, where the table has it."""
+    if f"{prefix}motion_vx" not in table.column_names:
+        return repeat(None)
+    rows = zip(*(_values(table, prefix + name) for name in MOTION_COLUMNS), strict=True)
+    return (
+        Motion(None if vx is None else (vx, vy), acceleration, yaw_rate, derived)
+        for vx, vy, acceleration, yaw_rate, derived in rows
+    )
+
+
+def _objects(columns: list[list[Any]], motions: Iterable[Motion | None]) -> list[LabelObject]:
     return [
         LabelObject(
             id,
@@ -155,10 +185,23 @@ def _objects(columns: list[list[Any]]) -> list[LabelObject]:
             None if vx is None else (vx, vy),
             track,
             attributes,
+            motion,
         )
-        for id, category, source_class, x, y, heading, width, length, height, vx, vy, track, attributes in zip(
-            *columns, strict=True
-        )
+        for (
+            id,
+            category,
+            source_class,
+            x,
+            y,
+            heading,
+            width,
+            length,
+            height,
+            vx,
+            vy,
+            track,
+            attributes,
+        ), motion in zip(zip(*columns, strict=True), motions, strict=False)
     ]
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scenicq.geometry.angles import normalize_array
 from scenicq.store.arrays import lists_at, number_array, repeated_texts
 from scenicq.store.columns import MemberColumns, Memberships, RecordingColumns
+from scenicq.store.motion import motion_of
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
 
 if TYPE_CHECKING:  # slow to load, and not every source has maps
@@ -47,6 +48,7 @@ def recording_rows(
     xy[object_at] = np.column_stack((objects.x, objects.y))
     placed = _placed(index, xy)
     times = np.array(columns.times_us, dtype=np.int64)
+    one_track = ["ego"] * len(counts)
     return {
         "labels": _table(
             "labels",
@@ -56,6 +58,7 @@ def recording_rows(
                 "timestamp_us": times,
                 "map": _everywhere(columns.map, len(counts)),
                 **{f"ego_{name}": values for name, values in _properties(egos).items()},
+                **_motion("ego_", times, egos, one_track),
                 "ego_road_directions": lists_at(placed.directions, placed.place[ego_at]),
                 "ego_lane": _names(index, placed.lane[ego_at]),
                 "params": columns.params,
@@ -75,6 +78,7 @@ def recording_rows(
                 "ordinal": np.arange(len(label_of)) - (ends - counts)[label_of],
                 "id": objects.id,
                 **_properties(objects),
+                **_motion("", times[label_of], objects, objects.track),
                 **_relative(egos, objects, label_of),
                 "road_directions": lists_at(placed.directions, placed.place[object_at]),
                 "lane": _names(index, placed.lane[object_at]),
@@ -179,6 +183,19 @@ def _properties(members: MemberColumns) -> dict[str, Any]:
     texts = {"class": members.category, "source_class": members.source_class}
     texts |= {"track": members.track, "attributes": members.attributes}
     return texts | {name: getattr(members, name) for name in reals}
+
+
+def _motion(
+    prefix: str, times_us: NDArray[np.int64], members: MemberColumns, tracks: Sequence[str | None]
+) -> dict[str, Any]:
+    motion = motion_of(times_us, members, tracks)
+    return {
+        f"{prefix}motion_vx": motion.vx,
+        f"{prefix}motion_vy": motion.vy,
+        f"{prefix}acceleration": motion.acceleration,
+        f"{prefix}yaw_rate": motion.yaw_rate,
+        f"{prefix}motion_derived": motion.derived,
+    }
 
 
 def _relative(egos: MemberColumns, objects: MemberColumns, ego: NDArray[np.int64]) -> dict[str, Any]:

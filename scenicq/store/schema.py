@@ -24,6 +24,7 @@ __all__ = [
     "SCHEMAS",
     "SCHEMA_VERSION",
     "SEGMENT_TABLES",
+    "UPGRADABLE",
     "ArrowArray",
     "ArrowTable",
 ]
@@ -34,8 +35,11 @@ ArrowTable: TypeAlias = Any
 ArrowArray: TypeAlias = Any
 """A `pyarrow.Array`."""
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Changes with every change of a table that a reader could notice."""
+
+UPGRADABLE = frozenset({2})
+"""Older versions whose labels, objects, sensors and maps are the same: `scenicq index` computes the rest anew."""
 
 MEMBERSHIP_RADIUS_M = 2.0
 """`memberships` lists the regions within this distance: a position tolerance up to it can be prefiltered."""
@@ -45,6 +49,16 @@ _TEXT, _REAL, _COUNT = pa.string(), pa.float64(), pa.int32()
 
 def _required(name: str, kind: Any) -> Any:
     return pa.field(name, kind, nullable=False)
+
+
+def _motion(prefix: str) -> list[Any]:
+    return [
+        pa.field(f"{prefix}motion_vx", _REAL),  # * the label's own velocity, else that of its track
+        pa.field(f"{prefix}motion_vy", _REAL),  # *
+        pa.field(f"{prefix}acceleration", _REAL),  # * along the heading
+        pa.field(f"{prefix}yaw_rate", _REAL),  # *
+        _required(f"{prefix}motion_derived", pa.bool_()),  # * whether the velocity is the track's
+    ]
 
 
 SEGMENT_TABLES = ("labels", "objects", "memberships", "sensors")
@@ -70,6 +84,7 @@ SCHEMAS: dict[str, Any] = {
             pa.field("ego_vy", _REAL),
             pa.field("ego_track", _TEXT),
             pa.field("ego_attributes", _TEXT),  # JSON; null where there is none
+            *_motion("ego_"),
             _required("ego_road_directions", pa.list_(_REAL)),  # * of every lane at the position; empty: undefined
             pa.field("ego_lane", _TEXT),  # * the lane at the position; of several the one with the nearest centreline
             pa.field("params", _TEXT),  # JSON; null where there is none
@@ -100,6 +115,7 @@ SCHEMAS: dict[str, Any] = {
             pa.field("vy", _REAL),
             pa.field("track", _TEXT),
             pa.field("attributes", _TEXT),
+            *_motion(""),
             pa.field("ego_right", _REAL),  # * position in the ego's frame; null where the ego has no heading
             pa.field("ego_ahead", _REAL),  # *
             _required("ego_distance", _REAL),  # *

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Self
 
+from scenicq.errors import Span
 from scenicq.syntax import ast
 from scenicq.syntax.literals import decode, string_parts
 from scenicq.syntax.precedence import POWER
@@ -122,9 +123,11 @@ class ProgramParser(StatementParser):
         return ast.Mutate(self.span(start), tuple(objects), scale)
 
     def definition(self, kind: str) -> ast.Statement:
-        """Read past a definition of what happens over time."""
+        """Read a monitor, or read past another definition of what happens over time."""
         start = self.advance().start
         name = self.advance().text if kind in _DEFINITIONS else ""
+        if kind == "monitor":
+            return self.monitor(start, name)
         if self.text == "(":
             self.move(self.closing(self.index))
             self.advance()
@@ -133,11 +136,37 @@ class ProgramParser(StatementParser):
         self.skip()
         return node
 
+    def monitor(self, start: int, name: str) -> ast.Statement:
+        """Read the parameters of a monitor, if it has any, and its body."""
+        parameters: tuple[ast.Parameter, ...] = ()
+        if self.accept("("):
+            parameters = self.parameters(")")
+            self.advance()
+        header = Span(self.source, start, self.token.end)
+        return ast.DynamicDefinition(header, "monitor", name, parameters, self.block("the header of the monitor"))
+
+    def terminate(self, kind: str) -> ast.Statement:
+        """Read `terminate when`, `terminate after` or `terminate simulation`."""
+        start = self.advance().start
+        self.advance()
+        if kind == "terminate simulation" and not self.accept("when"):
+            return ast.DynamicStatement(self.span(start), kind)
+        operand = self.expression()
+        unit = ""
+        if kind == "terminate after":
+            unit = self.text
+            if unit not in ("seconds", "steps"):
+                raise self.fail("`seconds` or `steps` is missing", label=self.found())
+            self.advance()
+        return ast.DynamicStatement(self.span(start), kind, operand, unit)
+
     def dynamic(self, word: str) -> ast.Statement | None:
         """Read past a statement about what happens over time, or nothing where none starts."""
         kind = self.dynamic_kind(word, self.peek().text)
         if not kind:
             return None
+        if kind.startswith("terminate "):
+            return self.terminate(kind)
         start = self.token.start
         while not self.at_line_end():
             self.advance()
@@ -163,7 +192,9 @@ class ProgramParser(StatementParser):
             case "override":
                 return word if self.takes_name() else ""
             case "wait":
-                return word if following in ("", ";", "for", "until") else ""
+                if following in ("for", "until"):
+                    return f"wait {following}"
+                return word if following in ("", ";") else ""
             case "abort":
                 return word if following in ("", ";") else ""
             case _:

@@ -19,9 +19,16 @@ def observe(thing: LabelObject) -> Mapping[str, Value]:
         value = getattr(thing, name)
         if value is not None:
             seen[name] = float(value)
-    if thing.velocity is not None:
-        seen["velocity"] = (float(thing.velocity[0]), float(thing.velocity[1]))
-        seen["speed"] = math.hypot(*thing.velocity)
+    motion = thing.motion
+    velocity = thing.velocity if thing.velocity is not None or motion is None else motion.velocity
+    if velocity is not None:
+        seen["velocity"] = (float(velocity[0]), float(velocity[1]))
+        seen["speed"] = math.hypot(*velocity)
+    if motion is not None:
+        if motion.acceleration is not None:
+            seen["acceleration"] = motion.acceleration
+        if motion.yaw_rate is not None:
+            seen["angularSpeed"] = motion.yaw_rate
     for name, value in thing.attributes.items():
         seen.setdefault(name, value if isinstance(value, str | bool) else float(value))
     return seen
@@ -29,7 +36,7 @@ def observe(thing: LabelObject) -> Mapping[str, Value]:
 
 def observed_names(thing: LabelObject) -> frozenset[str]:
     """The names of the properties that a label object has."""
-    if thing.attributes:
+    if thing.attributes or thing.motion is not None:
         return frozenset(observe(thing))
     present = (thing.heading, thing.width, thing.length, thing.height, thing.velocity)
     return _names(tuple([value is not None for value in present]))

@@ -12,6 +12,7 @@ import numpy as np
 from scenicq.match.verdict import Cause, Unknown
 from scenicq.processes import Lost, Work, Workers, as_many_as_pay
 from scenicq.query.execution.block_matcher import Decided, Decider, every_label
+from scenicq.query.execution.recording_matcher import lost_recording
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.executor import Block
 from scenicq.store.dataset import Dataset
@@ -80,10 +81,13 @@ class BlockExecutor:
             yield from self._halves(block) if isinstance(found, Lost) else (found,)
 
     def _halves(self, block: Block) -> Iterator[Decided]:
-        if block.end - block.first > 1:
+        if block.divisible:
             for half in block.halves():
-                # a half is lost at once: only what is left to blame, a frame, gets more chances
-                yield from self._elsewhere([half], tries=1 if half.end - half.first > 1 else _TRIES)
+                # a half is lost at once: only what is left to blame, a frame or recording, gets more chances
+                yield from self._elsewhere([half], tries=1 if half.divisible else _TRIES)
+            return
+        if block.runs:
+            yield Decided(np.full(block.end - block.first, -1, np.int16), [], [], lost_recording(self._dataset, block))
             return
         for label in every_label(self._dataset, block):
             lost = Unknown("crash", Cause("process", "every process that matched this frame died"))

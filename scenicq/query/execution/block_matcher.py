@@ -16,17 +16,22 @@ from scenicq.geometry.network import Network
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
+from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.verdict import Verdict
 from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.executor import Block, Candidate, candidates, names, run_prefilter
 from scenicq.query.prefilter.plan import Plan, make_plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
+from scenicq.temporal.intervals import IntervalMatcher, IntervalOptions
 
 _FIRST_BATCH, _BATCH = 16, 512
 """Labels whose places are looked up together: few until it is known what matters."""
+_MOTION = frozenset({"speed", "velocity", "angularSpeed", "acceleration"})
+"""Properties that the store computes of tracks."""
 
 __all__ = ["CompiledMap", "Decided", "Decider", "every_label"]
 
@@ -39,17 +44,20 @@ class CompiledMap:
         scenario: The scenario.
         network: The map.
         plan: The prefilter.
+        motion: Whether the scenario reads observed motion.
     """
 
     scenario: Scenario
     network: Network
     plan: Plan
+    motion: bool = True
 
     @classmethod
     def of(cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool) -> CompiledMap:
         """With its prefilter, or one that excludes nothing."""
         plan = make_plan(scenario, network, options) if prefilter else Plan(network.name, (), (), ())
-        return cls(scenario, network, plan)
+        motion = any(_MOTION & names for names in relevant_properties(scenario, options))
+        return cls(scenario, network, plan, motion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +68,13 @@ class Decided:
         missed: For each frame in order the number of the plan's step that excludes it, -1 for candidates.
         found: For each candidate in order its results, at least one.
         names: Frame, recording and timestamp of every frame, if asked for.
+        recordings: Of a query over time, what became of the recordings; then nothing is found of single candidates.
     """
 
     missed: NDArray[np.int16]
     found: Iterator[list[Result]] | list[list[Result]]
     names: list[tuple[str, str, int]]
+    recordings: DecidedRecordings | None = None
 
 
 @dataclass(slots=True)
@@ -79,6 +89,7 @@ class Decider:
         threads: Of the database.
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
+        time: Options of a query over time.
         until: When the time is over; see `check_deadline`.
     """
 
@@ -89,6 +100,7 @@ class Decider:
     threads: int | None
     all_matches: bool
     every: bool
+    time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
     _worlds: dict[str, tuple[CompiledMap, Matcher]] = field(default_factory=dict["str", "tuple[CompiledMap, Matcher]"])
     _open: ExitStack = field(default_factory=ExitStack)
@@ -119,13 +131,30 @@ class Decider:
             world = self.world(block.map)
             self._worlds[block.map] = world, Matcher(world.scenario, self.options, self._solver)
         world, matcher = self._worlds[block.map]
+        if block.runs:
+            return self._recordings(world, matcher, block)
         if not world.plan.stages:
-            labels = [Candidate(label, None) for label in every_label(self.dataset, block)]
+            labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=world.motion)]
             return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
         missed = run_prefilter(self.dataset, self._connection, world.plan, block)
         named = names(self.dataset, self._connection, block) if self.every else []
-        left = candidates(self._connection, world.plan) if (missed < 0).any() else iter(())
+        left = candidates(self._connection, world.plan, motion=world.motion) if (missed < 0).any() else iter(())
         return Decided(missed, self._matched(matcher, left), named)
+
+    def _recordings(self, world: CompiledMap, matcher: Matcher, block: Block) -> Decided:
+        """Decide a block of whole recordings over time."""
+        assert self._connection is not None
+        intervals = IntervalMatcher(world.scenario, self.options, self.time, self._solver)
+        recordings = RecordingMatcher(self.dataset, matcher, intervals)
+        if not world.plan.stages:
+            labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=world.motion)]
+            missed, left = np.full(len(labels), -1, np.int16), iter(labels)
+        else:
+            missed = run_prefilter(self.dataset, self._connection, world.plan, block)
+            left = iter(())
+            if (missed < 0).any():
+                left = candidates(self._connection, world.plan, motion=world.motion)
+        return Decided(missed, [], [], recordings.decide(block, left))
 
     def _matched(self, matcher: Matcher, left: Iterator[Candidate]) -> Iterator[list[Result]]:
         """The results of labels, whose places are looked up so many at a time."""
@@ -149,11 +178,11 @@ def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> li
     return matches or [matcher.match(label, among=among)]
 
 
-def every_label(dataset: Dataset, block: Block) -> Iterator[Label]:
+def every_label(dataset: Dataset, block: Block, *, motion: bool = False) -> Iterator[Label]:
     """The labels of a block, read without the database."""
     first, last = block.recordings or ("", None)
     return (
         label
-        for label in dataset.labels_at(block.part, block.first, block.end)
+        for label in dataset.labels_at(block.part, block.first, block.end, motion=motion)
         if label.map == block.map and label.recording >= first and (last is None or label.recording <= last)
     )

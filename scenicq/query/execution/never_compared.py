@@ -27,10 +27,11 @@ from scenicq.store.sql import sql_text
 __all__ = ["Coverage", "coverage"]
 
 _COLUMNS = {
-    "heading": "heading", "width": "width", "length": "length", "height": "height", "velocity": "vx", "speed": "vx",
+    "heading": "heading", "width": "width", "length": "length", "height": "height", "velocity": "motion_vx",
+    "speed": "motion_vx", "angularSpeed": "yaw_rate", "acceleration": "acceleration",
 }  # fmt: skip
 """Properties that have columns of their own; all others are attributes."""
-_READ = frozenset({"velocity", "speed"})
+_READ = frozenset({"velocity", "speed", "angularSpeed", "acceleration"})
 """Properties for which a library's default stands in where a requirement reads them, although it means nothing."""
 _NOT_SEEN = frozenset({
     "position", "behavior", "requireVisible", "allowCollisions", "regionContainedIn", "visibleDistance", "viewAngle",

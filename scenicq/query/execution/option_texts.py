@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any, Literal, TypedDict, Unpack
 
+from scenicq.compiler.temporal import Behaviors
 from scenicq.errors import DataError, Diagnostic
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.options import MatchOptions, Method
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import QueryOptions
 from scenicq.store.classes import Granularity
+from scenicq.temporal.intervals import DEFAULT_GAP_S, IntervalOptions
+from scenicq.temporal.selection import Intervals
 
 __all__ = ["VERSIONS", "OptionTexts", "read_built_ins", "read_options"]
 
@@ -44,6 +47,10 @@ class OptionTexts(TypedDict, total=False):
     scenic: str | None
     initial: bool
     ignore_params: str | None
+    behaviors: Behaviors | None
+    min_duration: float | None
+    intervals: Intervals
+    gap: float
     model: str | None
 
 
@@ -100,6 +107,11 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
         budget=given.get("budget", _DEFAULTS.budget),
         ignore_params=_DEFAULTS.ignore_params.union(_names(given.get("ignore_params"))),
     )
+    time = IntervalOptions(
+        given.get("intervals", "longest"), given.get("min_duration"), given.get("gap", DEFAULT_GAP_S)
+    )
     same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches", "strict", "model")
     values: dict[str, Any] = {name: value for name, value in given.items() if name in same}
-    return QueryOptions(match=options, version=None if scenic is None else VERSIONS[scenic], **values)
+    version = None if scenic is None else VERSIONS[scenic]
+    behaviors: Behaviors = given.get("behaviors") or "refuse"
+    return QueryOptions(match=options, version=version, behaviors=behaviors, time=time, **values)

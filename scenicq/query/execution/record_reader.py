@@ -14,10 +14,11 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.partitions import fingerprint
-from scenicq.query.execution.results import Result
+from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.dataset import open_dataset
+from scenicq.temporal.intervals import IntervalOptions
 
 __all__ = ["note_question", "noted_question", "read_record"]
 
@@ -29,9 +30,12 @@ def read_record(record: Mapping[str, Any], source: Source) -> Result:
         record: The record.
         source: The program, in which causes have their place.
     """
-    return Result(
-        record["frame"], record["recording"], record["timestamp_us"], _verdict(record, source), record["sensors"]
-    )
+    verdict = _verdict(record, source)
+    if "frames" not in record:
+        return Result(record["frame"], record["recording"], record["timestamp_us"], verdict, record["sensors"])
+    frames = record["frames"]
+    span = IntervalSpan(frames["last"], record["end_us"], frames["count"], record["open_ended"])
+    return Result(frames["first"], record["recording"], record["start_us"], verdict, interval=span)
 
 
 def _verdict(record: Mapping[str, Any], source: Source) -> Verdict:
@@ -121,4 +125,4 @@ def _options(fields: dict[str, Any]) -> QueryOptions:
         ignore_params=frozenset(ignored),
         **match,
     )
-    return QueryOptions(match=options, **fields)
+    return QueryOptions(match=options, time=IntervalOptions(**fields.pop("time")), **fields)

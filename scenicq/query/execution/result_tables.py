@@ -4,6 +4,8 @@ correspondence   struct   one text a role, null where nobody plays it
 witness          map      place of a random variable -> its numbers: one, or the two of a point
 cause            struct   what, detail, place, reason; null in a match
 sensors          map      channel -> path
+
+Of intervals, `frames` is a struct of the first and the last frame and how many there are.
 """
 
 # pyarrow has no type stubs.
@@ -31,26 +33,31 @@ DENSITY_COLUMNS = ("log_density", "log_density_error", "no_density")
 """Columns of results that are ranked: numbers, and why there is none."""
 
 
-def result_schema(roles: Sequence[str], *, ranked: bool = False) -> pa.Schema:
+def result_schema(roles: Sequence[str], *, ranked: bool = False, over_time: bool = False) -> pa.Schema:
     """The columns of results.
 
     Args:
         roles: Names of the scenario's objects, in its order.
         ranked: Whether results have a density.
+        over_time: Whether the results are intervals.
     """
     text = pa.string()
     kinds = (pa.float64(), pa.float64(), text)
     more = list(zip(DENSITY_COLUMNS, kinds, strict=True)) if ranked else []
+    time, frame, frames = (
+        pa.int64(),
+        ("frame", text),
+        pa.struct([("first", text), ("last", text), ("count", pa.int64())]),
+    )
+    of_interval = [("recording", text), ("start_us", time), ("end_us", time), ("frames", frames)]
     return pa.schema(
         [
-            ("frame", text),
-            ("recording", text),
-            ("timestamp_us", pa.int64()),
+            *(of_interval if over_time else [frame, ("recording", text), ("timestamp_us", time)]),
             ("verdict", text),
             ("correspondence", pa.struct([(role, text) for role in roles])),
             ("witness", pa.map_(text, pa.list_(pa.float64()))),
             ("cause", pa.struct([(name, text) for name in _CAUSE])),
-            ("sensors", pa.map_(text, text)),
+            ("open_ended", pa.bool_()) if over_time else ("sensors", pa.map_(text, text)),
             *more,
         ]
     )
@@ -71,7 +78,7 @@ def _row(record: Mapping[str, Any]) -> dict[str, Any]:
     return {
         **record,
         "witness": [(place, [value] if isinstance(value, int | float) else value) for place, value in witness.items()],
-        "sensors": list(record["sensors"].items()),
+        "sensors": list(record.get("sensors", {}).items()),
     }
 
 

@@ -10,7 +10,24 @@ from typing import Any
 from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
 
-__all__ = ["Funnel", "LogDensity", "Result", "record"]
+__all__ = ["Funnel", "IntervalSpan", "LogDensity", "Result", "record"]
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalSpan:
+    """How far an interval goes on from its first frame.
+
+    Attributes:
+        last: Its last frame.
+        end_us: The timestamp of that.
+        count: How many frames it has.
+        open_ended: Whether the program does not say when it ends.
+    """
+
+    last: str
+    end_us: int
+    count: int
+    open_ended: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +50,13 @@ class LogDensity:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """The verdict on one frame.
+    """The verdict on one frame, or on an interval of a recording.
 
     Attributes:
-        frame, recording, timestamp_us: Which frame.
-        verdict: The verdict.
+        frame, recording, timestamp_us: Which frame; the first of an interval.
+        verdict: The verdict. That on an interval names tracks.
         sensors: Path of the sensor file of each channel; empty for frames that the prefilter excluded.
+        interval: How far the interval goes on; None for a frame.
         density: How typical it is, where that was asked for.
     """
 
@@ -47,11 +65,12 @@ class Result:
     timestamp_us: int
     verdict: Verdict
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
+    interval: IntervalSpan | None = None
     density: LogDensity | None = None
 
-    def __reduce__(self) -> tuple[type[Result], tuple[str, str, int, Verdict, Mapping[str, str]]]:
+    def __reduce__(self) -> tuple[type[Result], tuple[Any, ...]]:
         """Pickled as a call, which takes half the time; densities are computed where results arrive."""
-        return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors)
+        return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
 
 
 def _cause(cause: Cause) -> dict[str, Any]:
@@ -63,14 +82,8 @@ def record(result: Result) -> dict[str, Any]:
     """A result as plain values with stable keys in a stable order, ready for JSON."""
     verdict = result.verdict
     name = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}[type(verdict)]
-    found: dict[str, Any] = {
-        "frame": result.frame,
-        "recording": result.recording,
-        "timestamp_us": result.timestamp_us,
-        "verdict": name,
-        "correspondence": {},
-        "witness": {},
-    }
+    found = _which(result)
+    found["verdict"], found["correspondence"], found["witness"] = name, {}, {}
     match verdict:
         case Match():
             found["correspondence"] = dict(verdict.correspondence)
@@ -81,7 +94,10 @@ def record(result: Result) -> dict[str, Any]:
         case NoMatch():
             found["correspondence"] = dict(verdict.partial)
             found["cause"] = _cause(verdict.cause)
-    found["sensors"] = dict(result.sensors)
+    if result.interval is None:
+        found["sensors"] = dict(result.sensors)
+    else:
+        found["open_ended"] = result.interval.open_ended
     density = result.density
     if density is not None:
         found["log_density"] = density.log
@@ -89,6 +105,18 @@ def record(result: Result) -> dict[str, Any]:
         if density.reason:
             found["no_density"] = density.reason
     return found
+
+
+def _which(result: Result) -> dict[str, Any]:
+    span = result.interval
+    if span is None:
+        return {"frame": result.frame, "recording": result.recording, "timestamp_us": result.timestamp_us}
+    return {
+        "recording": result.recording,
+        "start_us": result.timestamp_us,
+        "end_us": span.end_us,
+        "frames": {"first": result.frame, "last": span.last, "count": span.count},
+    }
 
 
 @dataclass(slots=True)
@@ -102,6 +130,10 @@ class Funnel:
         matches, unknowns: Verdicts.
         excluded: How many frames failed first at which feature or requirement.
         reasons: Why frames are unknown.
+        over_time: Of a query over time: "recordings" looked at, "starts" (frames that match the initial scene),
+            "bindings" that these make, and bindings "cut off" because the recording or a track ends before the program
+            does. Matches, unknowns and reasons are then those of intervals.
+        broken: Of a query over time: how many bindings without a match broke which requirement.
         missing: Frames of the dataset in which a property that the program sets is missing, although others have it.
         warnings: What the user should know, such as a map that the program does not fit.
         cut: Whether the time was over before all frames were decided.
@@ -114,6 +146,8 @@ class Funnel:
     unknowns: int = 0
     excluded: Counter[str] = field(default_factory=Counter[str])
     reasons: Counter[str] = field(default_factory=Counter[str])
+    over_time: Counter[str] = field(default_factory=Counter[str])
+    broken: Counter[str] = field(default_factory=Counter[str])
     missing: dict[str, int] = field(default_factory=dict[str, int])
     warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
     cut: bool = False
@@ -127,6 +161,8 @@ class Funnel:
         self.unknowns += other.unknowns
         self.excluded.update(other.excluded)
         self.reasons.update(other.reasons)
+        self.over_time.update(other.over_time)
+        self.broken.update(other.broken)
         self.missing.update(other.missing)
         self.cut = self.cut or other.cut
         self.warnings += [warning for warning in other.warnings if warning not in self.warnings]
@@ -135,6 +171,17 @@ class Funnel:
         """Count frames that the prefilter excludes."""
         self.frames += frames
         self.excluded[what] += frames
+
+    def count_interval(self, verdict: Verdict) -> None:
+        """Count a verdict on an interval."""
+        match verdict:
+            case Match():
+                self.matches += 1
+            case Unknown():
+                self.unknowns += 1
+                self.reasons[verdict.reason] += 1
+            case NoMatch():
+                self.broken[verdict.cause.what] += 1
 
     def count(self, verdict: Verdict) -> None:
         """Count a verdict of the matcher."""

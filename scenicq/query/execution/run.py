@@ -14,6 +14,7 @@ from typing import Literal, TypeVar, cast
 import numpy as np
 
 from scenicq.compiler.program import compile_scenario
+from scenicq.compiler.temporal import Behaviors
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
@@ -26,10 +27,11 @@ from scenicq.query.execution.compiled_map import about_dataset, map_remark
 from scenicq.query.execution.deadline import DeadlineError
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.results import Funnel, Result
-from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names
+from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
+from scenicq.temporal.intervals import IntervalOptions
 
 __all__ = ["Query", "QueryOptions", "Stretch", "read_program"]
 
@@ -48,6 +50,8 @@ class QueryOptions:
         limit: Matches after which to stop; None for all.
         every: Whether frames that do not match are results too.
         all_matches: Whether every correspondence of a frame is a result of its own.
+        behaviors: Whether a program with behaviors is refused, or matched over time without them.
+        time: Options of intervals.
         model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
         until: When the time is over, in seconds since 1970; None for never. What is decided by then are the results.
@@ -62,6 +66,8 @@ class QueryOptions:
     limit: int | None = None
     every: bool = False
     all_matches: bool = False
+    behaviors: Behaviors = "refuse"
+    time: IntervalOptions = field(default_factory=IntervalOptions)
     model: str | None = None
     strict: bool = False
     until: float | None = None
@@ -155,6 +161,7 @@ class Query:
                 network,
                 version=options.version,
                 initial=options.initial,
+                behaviors=options.behaviors,
                 loader=beside(self.file or Path(self.source.name)),
                 model=options.model,
             )
@@ -304,8 +311,27 @@ class Query:
             threads=threads,
             all_matches=options.all_matches,
             every=options.every,
+            time=options.time,
             until=options.until,
         )
+
+    def over_time(self, world: CompiledMap) -> bool:
+        """Whether intervals are looked for, and not frames."""
+        return world.scenario.dynamics is not None or self.options.time.min_duration_s is not None
+
+    def is_over_time(self) -> bool:
+        """Whether the results are intervals, and not frames; the program is compiled for the first map that it fits.
+
+        Raises:
+            ScenarioError: The program is wrong.
+        """
+        for name in self.dataset.maps:
+            try:
+                return self.over_time(self.world(name))
+            except ScenarioError as error:
+                if error.diagnostics[0].code != "map-lacks":
+                    raise
+        return False
 
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.
@@ -332,7 +358,12 @@ class Query:
                     yield from self._lacking(name, world, progress)
                     continue
                 cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1)
-                with closing(self._merge(world.plan, hands.decide(cut), progress)) as merged:
+                merge = self._merge
+                if self.over_time(world):
+                    with closing(self.dataset.connect()) as connection:
+                        cut = whole_recordings(self.dataset, connection, cut)
+                    merge = self._merge_intervals
+                with closing(merge(world.plan, hands.decide(cut), progress)) as merged:
                     for result in merged:
                         yield result
                         if isinstance(result.verdict, Match) and left is not None:
@@ -382,6 +413,26 @@ class Query:
                 for step, count in enumerate(np.bincount(past[past >= 0], minlength=len(plan.steps)).tolist()):
                     if count:
                         self.funnel.exclude(plan.steps[step].what, count)
+
+    def _merge_intervals(
+        self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]
+    ) -> Generator[Result]:
+        funnel = self.funnel
+        for block in _until_deadline(decided, funnel):
+            assert block.recordings is not None
+            past = block.missed[block.missed >= 0]
+            for step, count in enumerate(np.bincount(past, minlength=len(plan.steps)).tolist()):
+                if count:
+                    funnel.exclude(plan.steps[step].what, count)
+            funnel.frames += int((block.missed < 0).sum())
+            funnel.candidates += int((block.missed < 0).sum())
+            funnel.excluded.update(block.recordings.failed)
+            funnel.over_time.update(block.recordings.counts)
+            for result in block.recordings.results:
+                funnel.count_interval(result.verdict)
+                if self.options.every or isinstance(result.verdict, Match | Unknown):
+                    yield result
+            progress(len(block.missed))
 
 
 _Item = TypeVar("_Item")

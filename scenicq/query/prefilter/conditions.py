@@ -88,8 +88,10 @@ def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, s
     start = f"{alias}.{prefix}"
     found: dict[str, str | tuple[str, str]] = {name: f"{start}{name}" for name in _NUMBERS}
     found["position"] = (f"{start}x", f"{start}y")
-    found["velocity"] = (f"{start}vx", f"{start}vy")
-    found["speed"] = f"sqrt({start}vx * {start}vx + {start}vy * {start}vy)"
+    vx, vy = f"{start}motion_vx", f"{start}motion_vy"
+    found["velocity"] = (vx, vy)
+    found["speed"] = f"sqrt({vx} * {vx} + {vy} * {vy})"
+    found["acceleration"], found["angularSpeed"] = f"{start}acceleration", f"{start}yaw_rate"
     return found
 
 

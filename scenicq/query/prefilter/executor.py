@@ -9,9 +9,9 @@ A block is a run of frames in one part of the store, so memory depends on the si
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 import duckdb
@@ -21,11 +21,21 @@ from numpy.typing import NDArray
 from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, Plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
-from scenicq.store.reader import EGO_COLUMNS, LABEL_COLUMNS, OBJECT_COLUMNS, assemble
+from scenicq.store.reader import EGO_COLUMNS, LABEL_COLUMNS, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
 from scenicq.store.schema import ArrowTable
 from scenicq.store.sql import sql_text
 
-__all__ = ["Block", "Candidate", "Extent", "blocks", "candidates", "extents", "names", "run_prefilter"]
+__all__ = [
+    "Block",
+    "Candidate",
+    "Extent",
+    "blocks",
+    "candidates",
+    "extents",
+    "names",
+    "run_prefilter",
+    "whole_recordings",
+]
 
 _SENSORS = "block_sensors"
 _FEWEST_FRAMES, _MOST_FRAMES = 2048, 40_000
@@ -59,6 +69,7 @@ class Block:
         part: Number of the part.
         first, end: The rows of its labels, the end left out.
         recordings: Only from the first of these to the second, in order of their names; None for all.
+        runs: Of a query over time, the first and the last row of each recording, the last left out: they stay whole.
     """
 
     map: str
@@ -66,9 +77,18 @@ class Block:
     first: int
     end: int
     recordings: tuple[str, str] | None = None
+    runs: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def divisible(self) -> bool:
+        """Whether it can be halved."""
+        return len(self.runs) > 1 if self.runs else self.end - self.first > 1
 
     def halves(self) -> tuple[Block, Block]:
-        """The block in two; it must have two rows."""
+        """The block in two; it must be divisible."""
+        if self.runs:
+            first, second = self.runs[: len(self.runs) // 2], self.runs[len(self.runs) // 2 :]
+            return replace(self, end=first[-1][1], runs=first), replace(self, first=second[0][0], runs=second)
         middle = (self.first + self.end) // 2
         return replace(self, end=middle), replace(self, first=middle)
 
@@ -144,6 +164,33 @@ def blocks(
     return cut
 
 
+def whole_recordings(dataset: Dataset, connection: duckdb.DuckDBPyConnection, cut: Iterable[Block]) -> list[Block]:
+    """The blocks cut anew where a recording ends, each about as large as before.
+
+    Args:
+        dataset: The dataset.
+        connection: To it.
+        cut: Blocks in the order of the store.
+    """
+    found: list[Block] = []
+    for (part, map_name, between), group in groupby(cut, key=lambda block: (block.part, block.map, block.recordings)):
+        blocks_ = list(group)
+        size = max(block.end - block.first for block in blocks_)
+        whole = replace(blocks_[0], end=blocks_[-1].end)
+        path = sql_text(str(dataset.files("labels")[part]))
+        rows = connection.execute(
+            "SELECT min(file_row_number), max(file_row_number) + 1 "
+            f"FROM read_parquet({path}, file_row_number = true) WHERE {whole.where} GROUP BY recording ORDER BY 1"
+        ).fetchall()
+        run: list[tuple[int, int]] = []
+        for number, (first, end) in enumerate(rows):
+            run.append((first, end))
+            if end - run[0][0] >= size or number + 1 == len(rows):
+                found.append(Block(map_name, part, run[0][0], run[-1][1], between, tuple(run)))
+                run = []
+    return found
+
+
 def _open(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block) -> None:
     """Make the views that a plan reads."""
     views = {LABELS: "labels", OBJECTS: "objects", MEMBERSHIPS: "memberships", _SENSORS: "sensors"}
@@ -192,16 +239,18 @@ def names(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block)
     return connection.execute(f"SELECT frame, recording, timestamp_us FROM {LABELS} ORDER BY number").fetchall()
 
 
-def candidates(connection: duckdb.DuckDBPyConnection, plan: Plan) -> Iterator[Candidate]:
+def candidates(connection: duckdb.DuckDBPyConnection, plan: Plan, *, motion: bool = False) -> Iterator[Candidate]:
     """The labels that are left of the block that was sifted last, in order.
 
     Args:
         connection: The one that sifted.
         plan: The plan.
+        motion: Whether what is computed of motion is read, too.
     """
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
-    of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *EGO_COLUMNS))
-    of_objects = ", ".join(f"a.{name}" for name in OBJECT_COLUMNS)
+    more = MOTION_COLUMNS if motion else []
+    of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *EGO_COLUMNS, *(f"ego_{name}" for name in more)))
+    of_objects = ", ".join(f"a.{name}" for name in (*OBJECT_COLUMNS, *more))
     frames = _rows(connection, f"SELECT l.number, {of_frames} FROM {LABELS} l WHERE l.number IN {left} ORDER BY 1")
     mine = f"JOIN {LABELS} l ON s.frame = l.frame WHERE l.number IN {left} ORDER BY s.number"
     sensors = _rows(connection, f"SELECT s.channel, s.path FROM {_SENSORS} s {mine}")

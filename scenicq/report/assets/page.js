@@ -16,6 +16,7 @@
     const output = run.querySelector("output");
     const picture = run.querySelector(".picture");
     const shots = [...run.querySelectorAll(".shot")];
+    const now = run.querySelector(".timeline .now");
     const facts = [...run.querySelectorAll(".frame")];
     const show = (number) => {
       const at = Math.min(shots.length, Math.max(1, number)) - 1;
@@ -23,6 +24,11 @@
       slider.value = at + 1;
       slider.setAttribute("aria-valuetext", `frame ${at + 1} of ${shots.length}`);
       output.textContent = `${at + 1} / ${shots.length}`;
+      if (now) {
+        const x = Number(now.dataset.left) + Number(now.dataset.step) * (at + 0.5);
+        now.setAttribute("x1", x);
+        now.setAttribute("x2", x);
+      }
       facts.forEach((each, index) => { each.hidden = index !== at; });
       if (shot.dataset.picture) {
         picture.src = shot.dataset.picture;

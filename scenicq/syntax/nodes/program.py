@@ -10,6 +10,7 @@ from scenicq.syntax.nodes.base import Node
 
 if TYPE_CHECKING:
     from scenicq.syntax.ast import Expression, Statement
+    from scenicq.syntax.nodes.expressions import Parameter
 
 __all__ = [
     "DynamicDefinition",
@@ -83,25 +84,41 @@ class Simulator(Node):
 
 @dataclass(frozen=True, slots=True)
 class DynamicStatement(Node):
-    """What happens over time, skipped with its body.
+    """What happens over time, skipped with its body but for what ends a run.
 
     Kinds: `terminate when`, `terminate after`, `terminate simulation`, `terminate`, `record`, `record initial`,
-    `record final`, `do`, `do choose`, `do shuffle`, `take`, `wait`, `abort`, `invoke`, `override`, `try/interrupt`.
+    `record final`, `do`, `do choose`, `do shuffle`, `take`, `wait`, `wait for`, `wait until`, `abort`, `invoke`,
+    `override`, `try/interrupt`.
+
+    Attributes:
+        kind: Which.
+        operand: The condition of `terminate when` and `terminate simulation when`, the number of `terminate after`.
+        unit: "seconds" or "steps" for `terminate after`.
     """
 
     kind: str
+    operand: Expression | None = None
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class DynamicDefinition(Node):
-    """A definition of what happens over time, skipped with its body; unnamed blocks have an empty name.
+    """A definition of what happens over time, skipped with its body but for monitors; unnamed blocks have no name.
 
     Kinds: `behavior`, `monitor`, `scenario`, `setup`, `compose`, `precondition`, `invariant`. The span ends with the
     header's colon.
+
+    Attributes:
+        kind: Which.
+        name: Its name.
+        parameters: Of a monitor.
+        body: Of a monitor.
     """
 
     kind: str
     name: str
+    parameters: tuple[Parameter, ...] = ()
+    body: tuple[Statement, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,214 @@
+"""What a scenario says about time: formulas over conditions on one instant, monitors, and when it ends.
+
+Formulas are those of Scenic 3.1's requirements: linear temporal logic over finite traces (LTLf), `next` strong. Their
+atoms are boolean expressions of the forest, read at one sample of a recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from scenicq.errors import Span
+from scenicq.forest.nodes import Node
+
+__all__ = [
+    "Always",
+    "And",
+    "Atom",
+    "Dynamics",
+    "End",
+    "Eventually",
+    "Formula",
+    "Goto",
+    "Monitor",
+    "MonitorStep",
+    "Next",
+    "Not",
+    "Or",
+    "Reject",
+    "TemporalRequirement",
+    "Terminate",
+    "Termination",
+    "Test",
+    "Until",
+    "Wait",
+    "operands",
+]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Atom:
+    """A condition on one sample: its number among those of `Dynamics`."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Not:
+    """`not f`."""
+
+    operand: Formula
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class And:
+    """`f and g`."""
+
+    operands: tuple[Formula, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Or:
+    """`f or g`."""
+
+    operands: tuple[Formula, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Always:
+    """`always f`: at this sample and all later ones."""
+
+    operand: Formula
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Eventually:
+    """`eventually f`: at this sample or a later one."""
+
+    operand: Formula
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Next:
+    """`next f`: there is a next sample, and it holds there."""
+
+    operand: Formula
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Until:
+    """`f until g`: g at this sample or a later one, and f at all before that."""
+
+    left: Formula
+    right: Formula
+
+
+Formula: TypeAlias = Atom | Not | And | Or | Always | Eventually | Next | Until
+
+
+def operands(formula: Formula) -> tuple[Formula, ...]:
+    """The formulas that a formula is made of."""
+    match formula:
+        case Atom():
+            return ()
+        case Not() | Always() | Eventually() | Next():
+            return (formula.operand,)
+        case And() | Or():
+            return formula.operands
+        case Until():
+            return (formula.left, formula.right)
+
+
+@dataclass(frozen=True, slots=True)
+class TemporalRequirement:
+    """`require f` with an operator of time, evaluated from the first sample to the last, both included."""
+
+    formula: Formula
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Termination:
+    """What ends a run.
+
+    Attributes:
+        span: Where the program says it.
+        condition: `terminate when C`: at the first sample where it holds.
+        after_s: `terminate after N seconds`: at the first sample at least so many seconds after the start.
+    """
+
+    span: Span
+    condition: Atom | None = None
+    after_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    """Goes on with one of two steps, within the same sample."""
+
+    condition: Atom
+    then: int
+    otherwise: int
+
+
+@dataclass(frozen=True, slots=True)
+class Goto:
+    """Goes on with another step, within the same sample."""
+
+    then: int
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Goes on with a step at the next sample."""
+
+    then: int
+
+
+@dataclass(frozen=True, slots=True)
+class Terminate:
+    """Ends the run at this sample."""
+
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Reject:
+    """A `require` of the monitor does not hold: no match."""
+
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """The monitor is over, and says nothing any more."""
+
+
+MonitorStep: TypeAlias = Test | Goto | Wait | Terminate | Reject | End
+
+
+@dataclass(frozen=True, slots=True)
+class Monitor:
+    """A monitor as a graph of steps, of which it goes through some at each sample; it begins with the first.
+
+    Attributes:
+        span: Where the program requires it.
+        steps: They refer to each other by their numbers; every circle holds a `Wait`.
+    """
+
+    span: Span
+    steps: tuple[MonitorStep, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """What a dynamic program says beside its initial scene.
+
+    Attributes:
+        conditions: Boolean expressions, each about one sample: what atoms are.
+        requirements: Requirements with operators of time.
+        terminations: What ends a run; without any it may end anywhere.
+        monitors: Monitors that are required.
+    """
+
+    conditions: tuple[Node, ...] = ()
+    requirements: tuple[TemporalRequirement, ...] = ()
+    terminations: tuple[Termination, ...] = ()
+    monitors: tuple[Monitor, ...] = ()
+
+    @property
+    def terminates(self) -> bool:
+        """Whether the program says when it ends."""
+        steps = (step for monitor in self.monitors for step in monitor.steps)
+        return bool(self.terminations) or any(isinstance(step, Terminate) for step in steps)

@@ -1,0 +1,263 @@
+"""Why a recording matches a dynamic program, or how far the binding that comes closest gets and what breaks it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from scenicq.errors import DataError, Diagnostic, Span, render
+from scenicq.forest.nodes import Compare, Node
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.temporal import Atom, Formula, Termination, Test, operands
+from scenicq.match.matcher import Matcher
+from scenicq.match.verdict import Match
+from scenicq.query.execution.interval_frames import locate
+from scenicq.query.execution.recording_matcher import starts_of
+from scenicq.query.execution.run import Query
+from scenicq.smt.answer import Solver
+from scenicq.store.labels import Label
+from scenicq.store.tracks import RecordingTracks, TrackReader
+from scenicq.temporal.atoms import AtomColumns, HiddenVariable
+from scenicq.temporal.intervals import Interval, IntervalMatcher, Start
+from scenicq.temporal.ltlf import evaluate
+from scenicq.temporal.samples import Samples
+from scenicq.temporal.truth import FALSE, TRUE, Truth
+
+__all__ = ["Band", "IntervalExplanation", "bands_of", "explain_recording", "show_bands"]
+
+_WIDTH = 60
+"""Characters of a band, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A condition or requirement over the samples of an interval.
+
+    Attributes:
+        what: In the words of the program.
+        span: Where it says so.
+        values: The truth value at each sample: of a condition there, of a requirement from there to the end.
+        is_requirement: Whether it is a requirement.
+        sides: Of a condition that compares numbers, both at each sample; nan where there is none.
+    """
+
+    what: str
+    span: Span | None
+    values: tuple[int, ...]
+    is_requirement: bool = False
+    sides: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalExplanation:
+    """What became of a recording.
+
+    Attributes:
+        tracks: The recording.
+        interval: The match, else what came furthest; None where no frame matches the initial scene.
+        roles: The track of each object.
+        bands: Over the interval.
+        failed: What frames failed at that do not match the initial scene.
+    """
+
+    tracks: RecordingTracks
+    interval: Interval | None
+    roles: tuple[tuple[str, str], ...] = ()
+    bands: tuple[Band, ...] = ()
+    failed: Counter[str] | None = None
+
+    @property
+    def matches(self) -> bool:
+        """Whether it matches."""
+        return self.interval is not None and self.interval.truth == TRUE
+
+    def text(self) -> str:
+        """The explanation for a person."""
+        tracks, interval = self.tracks, self.interval
+        if interval is None:
+            counted = (self.failed or Counter()).most_common()
+            rows = [f"  {count:>6,}  {what}" for what, count in counted]
+            return "\n".join([f"no frame of {tracks.name} matches the initial scene; they fail at", *rows])
+        first, last = float(tracks.seconds[interval.start]), float(tracks.seconds[interval.end])
+        said = "matches" if interval.truth == TRUE else "does not match" if interval.truth == FALSE else "is unknown"
+        if interval.reason:
+            said += f" ({interval.reason})"
+        lines = [
+            f"recording {tracks.name} {said} from {first:.1f} s to {last:.1f} s "
+            f"({interval.end - interval.start + 1} frames from {tracks.frames[interval.start]})",
+            f"{'' if self.matches else 'closest '}correspondence: {', '.join(f'{r} = {t}' for r, t in self.roles)}",
+        ]
+        if interval.cut_off:
+            lines.append(f"cut off: the recording or a track ends at {last:.1f} s, before the program does")
+        lines += ["", *self._broken(interval)]
+        return "\n".join([*lines, *show_bands(self.bands)]).rstrip()
+
+    def _broken(self, interval: Interval) -> list[str]:
+        """The requirement that is broken, where, when, and by how much."""
+        if interval.broken is None:
+            return []
+        told = Diagnostic(
+            "frame-excluded",
+            "this does not hold",
+            interval.broken,
+            f"broken {self._when(interval)}",
+            severity="excluded",
+        )
+        hints = [f"  = {each}" for each in self._margins(interval)]
+        return [render(told), *hints, ""]
+
+    def _when(self, interval: Interval) -> str:
+        last = float(self.tracks.seconds[interval.end])
+        mine = next((band for band in self.bands if band.is_requirement and band.span == interval.broken), None)
+        wrong = [place for place, value in enumerate(mine.values) if value == FALSE] if mine is not None else []
+        seconds = float(self.tracks.seconds[interval.start + wrong[-1]]) if wrong else last
+        return f"at {seconds:.1f} s" if wrong else f"by {last:.1f} s"
+
+    def _margins(self, interval: Interval) -> list[str]:
+        """For each comparison inside the broken requirement how close it comes to the other outcome."""
+        broken = interval.broken
+        assert broken is not None
+        found: list[str] = []
+        for band in self.bands:
+            inside = band.span is not None and broken.start <= band.span.start and band.span.end <= broken.end
+            if band.is_requirement or not inside or not band.sides:
+                continue
+            known = [each for each in band.sides if not np.isnan(each).any()]
+            if known:
+                left, right = min(known, key=lambda each: abs(each[0] - each[1]))
+                widest = max(known, key=lambda each: abs(each[0] - each[1]))
+                found.append(
+                    f"`{band.what}`: off by {abs(left - right):.3g} at the nearest ({left:.3g} against {right:.3g}), "
+                    f"by {abs(widest[0] - widest[1]):.3g} at the furthest"
+                )
+        return found
+
+
+def explain_recording(query: Query, solver: Solver, name: str, time_us: int | None) -> IntervalExplanation:
+    """Explain a recording.
+
+    Args:
+        query: A query over time.
+        solver: Decides what is not decided otherwise.
+        name: Of the recording.
+        time_us: The timestamp at which the interval shall begin; anywhere by default.
+
+    Raises:
+        DataError: option-invalid: there is no such recording, or no frame at that time.
+    """
+    part, first, end = locate(query.dataset, name)
+    labels: list[Label] = list(query.dataset.labels_at(part, first, end))
+    with TrackReader(query.dataset, part) as reader:
+        tracks = reader.read(first, end)
+    scenario, _ = query.compile(labels[0].map)
+    matcher = Matcher(scenario, query.options.match, solver)
+    if time_us is not None and time_us not in tracks.times_us.tolist():
+        times = ", ".join(map(str, tracks.times_us.tolist()[:3]))
+        hint = f"its frames are at {times} ..."
+        raise DataError(Diagnostic("option-invalid", f"{name} has no frame at {time_us}", hints=(hint,)))
+    starts: list[Start] = []
+    failed: Counter[str] = Counter()
+    for sample, label in enumerate(labels):
+        if time_us is not None and label.timestamp_us != time_us:
+            continue
+        findings = list(matcher.findings(label))
+        found = [each for each in starts_of(scenario, label, sample, findings) if isinstance(each, Start)]
+        starts += found
+        if not found:
+            causes = [each.verdict.cause for each in findings if not isinstance(each.verdict, Match)]
+            failed[causes[0].what if causes else "tracks"] += 1
+    intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
+    results = intervals.intervals(tracks, starts)
+    if not results:
+        return IntervalExplanation(tracks, None, failed=failed)
+    best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
+    roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
+    return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best))
+
+
+def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: Interval) -> tuple[Band, ...]:
+    """The conditions and requirements of a program over an interval; those on hidden random variables are left out."""
+    dynamics = scenario.dynamics
+    if dynamics is None:
+        return ()
+    samples = Samples(tracks, dict(interval.binding), interval.start, interval.end + 1)
+    columns = AtomColumns(scenario, samples)
+    known: dict[int, Truth] = {}
+    for number, condition in enumerate(dynamics.conditions):
+        try:
+            known[number] = columns.truth(condition)
+        except HiddenVariable:
+            continue
+    found: list[Band] = []
+
+    def conditions(numbers: Sequence[int]) -> None:
+        for number in numbers:
+            condition = dynamics.conditions[number]
+            if number in known:
+                values = tuple(known[number].tolist())
+                found.append(Band(_named(condition, number), condition.span, values, sides=_sides(columns, condition)))
+
+    for requirement in dynamics.requirements:
+        numbers = _atoms(requirement.formula)
+        conditions(numbers)
+        if all(number in known for number in numbers):
+            ends = np.array([len(samples) - 1])
+            values = evaluate(requirement.formula, lambda atom: known[atom.number], ends)[:, 0]
+            text = " ".join(requirement.span.text.split())
+            found.append(Band(text, requirement.span, tuple(values.tolist()), is_requirement=True))
+    conditions([each.condition.number for each in _conditional(dynamics.terminations) if each.condition is not None])
+    conditions([s.condition.number for monitor in dynamics.monitors for s in monitor.steps if isinstance(s, Test)])
+    return tuple(found)
+
+
+def _conditional(terminations: Sequence[Termination]) -> list[Termination]:
+    return [each for each in terminations if each.condition is not None]
+
+
+def _atoms(formula: Formula) -> list[int]:
+    stack: list[Formula] = [formula]
+    found: list[int] = []
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Atom):
+            found.append(node.number)
+        stack.extend(reversed(operands(node)))
+    return found
+
+
+def _named(condition: Node, number: int) -> str:
+    return f"condition {number + 1}" if condition.span is None else " ".join(condition.span.text.split())
+
+
+def _sides(columns: AtomColumns, condition: Node) -> tuple[tuple[float, float], ...]:
+    """Both sides of a comparison of numbers at each sample."""
+    if not isinstance(condition, Compare):
+        return ()
+    left, right = (columns.number(columns.expanded(side)) for side in (condition.left, condition.right))
+    return () if left is None or right is None else tuple(zip(left.tolist(), right.tolist(), strict=True))
+
+
+def show_bands(bands: Sequence[Band]) -> list[str]:
+    """Bands as text: `#` true, `.` false, `?` unknown; of many samples, each character stands for several."""
+    if not bands:
+        return []
+    width = max(len(_short(band.what)) for band in bands)
+    return [f"{_short(band.what).ljust(width)}  {_drawn(band.values)}" for band in bands]
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 48 else f"{text[:47]}\N{HORIZONTAL ELLIPSIS}"
+
+
+def _drawn(values: Sequence[int]) -> str:
+    size = min(len(values), _WIDTH)
+    edges = [round(place * len(values) / size) for place in range(size + 1)]
+    signs: list[str] = []
+    for first, end in pairwise(edges):
+        some = set(values[first:end])
+        signs.append("#" if some == {2} else "." if some == {0} else "?" if 1 in some else "+")
+    return "".join(signs)

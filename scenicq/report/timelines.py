@@ -1,0 +1,113 @@
+"""Intervals in a report: their frames as a run, and under the slider a timeline of what held when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
+from scenicq.query.execution.interval_frames import frames_of, locate
+from scenicq.query.execution.results import Result
+from scenicq.query.execution.run import Query
+from scenicq.query.explain.interval_explanation import Band, bands_of
+from scenicq.report.runs import Run
+from scenicq.report.svg import element, escape
+from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader
+from scenicq.temporal.intervals import Interval
+from scenicq.temporal.truth import TRUE
+
+__all__ = ["interval_runs"]
+
+_WORDS = ("false", "unknown", "true")
+_ROW, _LABEL, _WIDTH = 16, 300, 560
+"""Pixels: height of a band, width of what it says, width of the band."""
+
+
+def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tuple[int, int]]) -> Iterator[Run]:
+    """A run for each interval, whose frames have the label objects of the roles.
+
+    Args:
+        query: The query.
+        results: Of intervals.
+        numbers: As `scenicq.report.runs.frame_numbers` gives them.
+    """
+    for result in results:
+        frames = tuple(
+            Result(label.frame, label.recording, label.timestamp_us, _at(result.verdict, roles), label.sensors)
+            for label, roles in frames_of(query.dataset, result)
+        )
+        number, count = numbers[result.frame]
+        yield Run(result.recording, frames, number, count, _timeline(query, result))
+
+
+def _at(verdict: Verdict, roles: dict[str, str]) -> Verdict:
+    """The verdict on an interval with the label objects of one of its frames."""
+    match verdict:
+        case Match():
+            return Match(roles, verdict.witness)
+        case Unknown():
+            return Unknown(verdict.reason, verdict.cause, roles)
+        case NoMatch():
+            return NoMatch(verdict.cause, roles)
+
+
+def _timeline(query: Query, result: Result) -> str:
+    """The bands of an interval as a picture; nothing for a program about one instant."""
+    part, first, end = locate(query.dataset, result.recording)
+    label = next(query.dataset.labels_at(part, first, first + 1))
+    scenario, _ = query.compile(label.map)
+    verdict = result.verdict
+    if scenario.dynamics is None or isinstance(verdict, NoMatch) or result.interval is None:
+        return ""
+    with TrackReader(query.dataset, part) as reader:
+        tracks = reader.read(first, end)
+    names = {thing.name: thing.index for thing in scenario.objects}
+    binding = tuple((names[name], _key(tracks, track)) for name, track in verdict.correspondence.items())
+    start, last = tracks.frames.index(result.frame), tracks.frames.index(result.interval.last)
+    return _drawn(bands_of(scenario, tracks, Interval(start, last, int(TRUE), binding)))
+
+
+def _key(tracks: RecordingTracks, name: str) -> TrackKey:
+    """The track that a result names."""
+    return ("ego", "") if name == "ego" else tracks.key(name)
+
+
+def _drawn(bands: tuple[Band, ...]) -> str:
+    if not bands:
+        return ""
+    rows: list[str] = []
+    for number, band in enumerate(bands):
+        y, step = number * _ROW, _WIDTH / len(band.values)
+        weight = "bold" if band.is_requirement else "normal"
+        short = band.what if len(band.what) <= 46 else f"{band.what[:45]}\N{HORIZONTAL ELLIPSIS}"
+        rows.append(element("text", escape(short), x=0, y=y + 12, font_size=11, font_weight=weight))
+        for place, length, value in _pieces(band.values):
+            x = round(_LABEL + place * step, 1)
+            told = element("title", escape(f"{band.what}: {_WORDS[value]} at {length} of {len(band.values)} samples"))
+            rows.append(
+                element("rect", told, x=x, y=y + 2, width=round(length * step, 1), height=_ROW - 4,
+                        class_=f"band {_WORDS[value]}")
+            )  # fmt: skip
+    # the script moves it with the slider
+    step = _WIDTH / len(bands[0].values)
+    rows.append(
+        element("line", class_="now", x1=_LABEL + step / 2, x2=_LABEL + step / 2, y1=0, y2=len(bands) * _ROW,
+                data_left=_LABEL, data_step=step)
+    )  # fmt: skip
+    said = "; ".join(f"{band.what}: {_summary(band.values)}" for band in bands)
+    return element(
+        "svg", *rows, class_="timeline", role="img", aria_label=f"Timeline. {said}",
+        viewBox=f"0 0 {_LABEL + _WIDTH} {len(bands) * _ROW}",
+    )  # fmt: skip
+
+
+def _pieces(values: tuple[int, ...]) -> Iterator[tuple[int, int, int]]:
+    """Runs of one value: where they begin, how long they are, the value."""
+    start = 0
+    for place in range(1, len(values) + 1):
+        if place == len(values) or values[place] != values[start]:
+            yield start, place - start, values[start]
+            start = place
+
+
+def _summary(values: tuple[int, ...]) -> str:
+    return ", ".join(f"{_WORDS[value]} for {length}" for _, length, value in _pieces(values))

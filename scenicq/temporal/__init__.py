@@ -1,0 +1,1 @@
+"""Does a stretch of a recording match a dynamic program?"""

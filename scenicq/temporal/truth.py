@@ -1,0 +1,29 @@
+"""Kleene's three truth values as whole numbers, so that columns of them are compared and combined by NumPy.
+
+`and` is the minimum, `or` the maximum, `not` the difference from `TRUE`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FALSE", "TRUE", "UNKNOWN", "Truth", "all_of", "negated"]
+
+Truth = NDArray[np.int8]
+"""Truth values of any shape."""
+
+FALSE, UNKNOWN, TRUE = np.int8(0), np.int8(1), np.int8(2)
+
+
+def negated(values: Truth) -> Truth:
+    """`not`, of each."""
+    return TRUE - values
+
+
+def all_of(*parts: Truth) -> Truth:
+    """`and` of some arrays that go together, at least one."""
+    found = parts[0]
+    for part in parts[1:]:
+        found = np.minimum(found, part)
+    return found
