@@ -11,13 +11,14 @@ from pathlib import Path
 
 from scenicq.compiler.named_map import NamedMap, named_map
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
+from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 from scenicq.importers.base import read_maps
 from scenicq.importers.opendrive import SUFFIX, convert_maps
 from scenicq.importers.report import Report
 from scenicq.store.dataset import Dataset
 
-__all__ = ["about_dataset", "map_remark", "program_network", "read_network"]
+__all__ = ["about_dataset", "map_remark", "program_network", "program_remarks", "read_network"]
 
 _SUFFIXES = (SUFFIX, ".geojson", ".json")
 _HINT = "`--map FILE` gives a map to use instead"
@@ -114,3 +115,23 @@ def map_remark(source: Source, version: int | None, dataset: Dataset) -> Diagnos
     message = f"the program names the map `{file}`; {dataset.name} has its own, and they are used: {maps}"
     hint = f"`scenicq ingest SOURCE DATASET --map NAME={file}` makes a dataset with that map"
     return Diagnostic("map-lacks", message, named.span, hints=(hint,), severity="warning")
+
+
+def program_remarks(scenario: Scenario) -> list[Diagnostic]:
+    """What the author should know: parts that say nothing about whether a label matches.
+
+    Args:
+        scenario: The scenario.
+    """
+    soft = [
+        Diagnostic(
+            "soft-requirement",
+            "this requirement excludes nothing",
+            span,
+            "holds only with a probability",
+            hints=("a scene that breaks it is still possible: write `require` for a condition that must hold",),
+            severity="warning",
+        )
+        for span in (requirement.span for requirement in scenario.soft)
+    ]
+    return [*scenario.warnings, *scenario.ignored, *soft]

@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Literal, TypeVar, cast
-
-import numpy as np
+from typing import Literal, cast
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.temporal import Behaviors
@@ -20,11 +19,11 @@ from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
-from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
+from scenicq.match.verdict import Cause, Match, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
-from scenicq.query.execution.compiled_map import about_dataset, map_remark
-from scenicq.query.execution.deadline import DeadlineError
+from scenicq.query.execution.compiled_map import about_dataset, map_remark, program_remarks
+from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
@@ -225,7 +224,7 @@ class Query:
         compiled = [world for world in worlds.values() if isinstance(world, CompiledMap)]
         if compiled:
             compared = self.coverage()
-            self.funnel.warnings += [*compared.warnings, *_remarks(compiled[0].scenario)]
+            self.funnel.warnings += [*compared.warnings, *program_remarks(compiled[0].scenario)]
             self.funnel.missing.update(compared.missing)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
@@ -358,12 +357,12 @@ class Query:
                     yield from self._lacking(name, world, progress)
                     continue
                 cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1)
-                merge = self._merge
+                merge = partial(merge_frames, every=self.options.every)
                 if self.over_time(world):
                     with closing(self.dataset.connect()) as connection:
                         cut = whole_recordings(self.dataset, connection, cut)
-                    merge = self._merge_intervals
-                with closing(merge(world.plan, hands.decide(cut), progress)) as merged:
+                    merge = partial(merge_intervals, every=self.options.every)
+                with closing(merge(world.plan, hands.decide(cut), self.funnel, progress)) as merged:
                     for result in merged:
                         yield result
                         if isinstance(result.verdict, Match) and left is not None:
@@ -383,95 +382,9 @@ class Query:
                         yield Result(frame, recording, time, NoMatch(cause))
         progress(self._frames(map_name))
 
-    def _merge(self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]) -> Generator[Result]:
-        for block in _until_deadline(decided, self.funnel):
-            found = _until_deadline(block.found, self.funnel)
-            start = 0
-            try:
-                for place in np.flatnonzero(block.missed < 0).tolist():
-                    if self.options.every:
-                        yield from _excluded(plan, block, start, place)
-                    verdicts = next(found, None)
-                    if verdicts is None:
-                        # the time was over in another process
-                        self.funnel.cut = True
-                        return
-                    first, *more = verdicts
-                    self.funnel.count(first.verdict)
-                    progress(place + 1 - start)
-                    start = place + 1
-                    if self.options.every or isinstance(first.verdict, Match | Unknown):
-                        yield first
-                    yield from more
-                if self.options.every:
-                    yield from _excluded(plan, block, start, len(block.missed))
-                progress(len(block.missed) - start)
-                start = len(block.missed)
-            finally:
-                # as far as results were taken
-                past = block.missed[:start]
-                for step, count in enumerate(np.bincount(past[past >= 0], minlength=len(plan.steps)).tolist()):
-                    if count:
-                        self.funnel.exclude(plan.steps[step].what, count)
-
-    def _merge_intervals(
-        self, plan: Plan, decided: Iterable[Decided], progress: Callable[[int], None]
-    ) -> Generator[Result]:
-        funnel = self.funnel
-        for block in _until_deadline(decided, funnel):
-            assert block.recordings is not None
-            past = block.missed[block.missed >= 0]
-            for step, count in enumerate(np.bincount(past, minlength=len(plan.steps)).tolist()):
-                if count:
-                    funnel.exclude(plan.steps[step].what, count)
-            funnel.frames += int((block.missed < 0).sum())
-            funnel.candidates += int((block.missed < 0).sum())
-            funnel.excluded.update(block.recordings.failed)
-            funnel.over_time.update(block.recordings.counts)
-            for result in block.recordings.results:
-                funnel.count_interval(result.verdict)
-                if self.options.every or isinstance(result.verdict, Match | Unknown):
-                    yield result
-            progress(len(block.missed))
-
-
-_Item = TypeVar("_Item")
-
-
-def _until_deadline(found: Iterable[_Item], funnel: Funnel) -> Iterator[_Item]:
-    """What comes before the time is over."""
-    try:
-        yield from found
-    except DeadlineError:
-        funnel.cut = True
-
-
-def _excluded(plan: Plan, block: Decided, start: int, end: int) -> Iterator[Result]:
-    """The frames between two candidates."""
-    numbers: list[int] = block.missed[start:end].tolist()
-    for (frame, recording, time), number in zip(block.names[start:end], numbers, strict=True):
-        step = plan.steps[number]
-        yield Result(frame, recording, time, NoMatch(Cause(step.what, step.detail, step.span)))
-
 
 def _ignore(frames: int) -> None:
     """No progress is shown."""
-
-
-def _remarks(scenario: Scenario) -> list[Diagnostic]:
-    """What the author should know: parts that say nothing about whether a label matches."""
-    soft = [
-        Diagnostic(
-            "soft-requirement",
-            "this requirement excludes nothing",
-            span,
-            "holds only with a probability",
-            hints=("a scene that breaks it is still possible: write `require` for a condition that must hold",),
-            severity="warning",
-        )
-        for span in (requirement.span for requirement in scenario.soft)
-    ]
-    return [*scenario.warnings, *scenario.ignored, *soft]
 
 
 def _start_worker(
@@ -482,6 +395,6 @@ def _start_worker(
 
     def work(block: Block, _tell: Callable[[object], None]) -> Decided:
         decided = decider.decide(block)
-        return replace(decided, found=list(_until_deadline(decided.found, Funnel())))
+        return replace(decided, found=list(until_deadline(decided.found, Funnel())))
 
     return work
