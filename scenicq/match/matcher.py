@@ -100,14 +100,8 @@ class Matcher:
             label: The label.
             among: As of `match`.
         """
-        found = self._findings(label, MapLookups(), None, {}, among)
-        while True:
-            with limited(self.options.timeout_s):
-                finding = next(found, None)
-            if finding is None:
-                return
-            if isinstance(finding.verdict, Match):
-                yield finding.verdict
+        found = (finding.verdict for finding in self.findings(label, among=among))
+        return (verdict for verdict in found if isinstance(verdict, Match))
 
     def findings(self, label: Label, *, among: Candidates | None = None) -> Iterator[Finding]:
         """Every correspondence by which a label matches; of interchangeable objects, one order only.
@@ -119,7 +113,7 @@ class Matcher:
             label: The label.
             among: As of `match`.
         """
-        found = self._findings(label, MapLookups(), None, {}, among, rest_too=True)
+        found = self._findings(label, MapLookups(), None, {}, among)
         while True:
             with limited(self.options.timeout_s):
                 finding = next(found, None)
@@ -167,11 +161,10 @@ class Matcher:
                 for batch in fit.fill(rows, self.options, lookups):
                     found.update(self._verdicts.matches(fit, batch))
         for place, (label, among) in enumerate(labels):
-            if place in found:
-                yield found[place]
-                continue
-            with limited(self.options.timeout_s):
-                verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
+            verdict: Verdict | None = found.get(place)
+            if verdict is None:
+                with limited(self.options.timeout_s):
+                    verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
             yield verdict
 
     def _batches(
@@ -204,10 +197,8 @@ class Matcher:
         reporter: Reporter | None,
         given: Mapping[str, str],
         among: Candidates | None,
-        *,
-        rest_too: bool = False,
     ) -> Iterator[Finding]:
-        """Matches, or else the one verdict that there is (algorithm 1); what else is undecided, if that is wanted."""
+        """Matches and what else is undecided, or else the one verdict that there is (algorithm 1)."""
         matched = False
         rest: list[tuple[int, Finding]] = []
         for ego in egos(self.scenario, label, self.options):
@@ -223,14 +214,12 @@ class Matcher:
                     for solution in search.solutions(plan, candidates):
                         matched = True
                         yield Finding(self._verdicts.match(label, solution), search, plan, solution.assignment)
-            except Exhausted:
-                ended = "budget"
-            except TimeIsUp:
-                ended = "timeout"
+            except (Exhausted, TimeIsUp) as error:
+                ended = "budget" if isinstance(error, Exhausted) else "timeout"
             weight, verdict = self._verdicts.without_match(label, search, ended)
             rest.append((weight, Finding(verdict, search)))
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest
             yield max(rest, key=lambda each: each[0], default=(0, Finding(self._verdicts.without_ego())))[1]
-        elif rest_too:
+        else:
             yield from (finding for _, finding in rest if isinstance(finding.verdict, Unknown))
