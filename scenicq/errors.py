@@ -49,7 +49,6 @@ CODES: dict[str, str] = {
     "runtime-error": "evaluating the program failed",
     "map-lacks": "the map of the dataset has no element of the needed kind",
     "option-invalid": "an option has a value that cannot be used",
-    "sql-invalid": "a question in SQL that the database refuses",
     # the data
     "unknown-class": "an object class that no taxonomy lists",
     "dataset-unrecognised": "no importer recognises the source",
@@ -64,6 +63,7 @@ CODES: dict[str, str] = {
     "store-version": "the dataset was written by another version",
     "store-damaged": "a file of the dataset is missing or changed",
     "dataset-invalid": "a table of the dataset holds what no dataset may",
+    "sql-invalid": "a question in SQL that the database refuses",
     "target-exists": "the target is there already",
     "target-busy": "another run writes to the target",
     "target-unwritable": "the target cannot be written",

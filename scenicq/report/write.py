@@ -54,7 +54,11 @@ def check_target(folder: Path) -> None:
         index = folder / "index.html"
         if index.is_file() and f'content="{GENERATOR} ' in index.read_text(encoding="utf-8", errors="replace")[:4000]:
             return
-        if any(_leftovers(folder)) and all(each.name in _OWN or _is_work(each) for each in folder.iterdir()):
+        if (
+            folder.is_dir()
+            and any(_leftovers(folder))
+            and all(each.name in _OWN or _is_work(each) for each in folder.iterdir())
+        ):
             return  # of a run that was killed
     except OSError as error:
         raise _unwritable(folder, error) from None
