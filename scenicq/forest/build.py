@@ -44,6 +44,7 @@ __all__ = [
     "minus",
     "norm",
     "offset_local",
+    "opposite",
     "rotate",
     "scale",
     "sector",
@@ -147,3 +148,16 @@ def sector(center: Node, radius: Node, heading: Node | None, angle: Node | None,
     if heading is None or angle is None or full:
         return fold(DiscAt(center, radius, span=span))
     return fold(SectorAt(center, radius, heading, angle, span=span))
+
+
+_OPPOSITE = {
+    CompareOp.LT: CompareOp.GE, CompareOp.LE: CompareOp.GT, CompareOp.GT: CompareOp.LE, CompareOp.GE: CompareOp.LT,
+    CompareOp.EQ: CompareOp.NE, CompareOp.NE: CompareOp.EQ,
+}  # fmt: skip
+
+
+def opposite(truth: Node) -> Node:
+    """What holds exactly where a truth value does not; of a comparison, the opposite one."""
+    if isinstance(truth, Compare) and truth.op in _OPPOSITE:
+        return compare(_OPPOSITE[truth.op], truth.left, truth.right, truth.span)
+    return logic(LogicOp.NOT, truth, span=truth.span)

@@ -266,12 +266,20 @@ def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict
     """
     kept: dict[str, tuple[MapFeature, ...]] = {}
     for name, features in maps.items():
-        far = {feature.id for feature in features if not max(map(abs, feature.shape.bounds), default=0.0) <= FARTHEST_M}
+        far = {feature.id for feature in features if not _farthest(feature) <= FARTHEST_M}
         for each in sorted(far):
             message = f"map `{name}`: element `{each}` is at no place on a map"
             report.left_out("map element", "map-invalid", message)
         kept[name] = tuple(feature for feature in features if feature.id not in far)
     return kept
+
+
+def _farthest(feature: MapFeature) -> float:
+    """The largest coordinate of an element's shape and centreline, without its sign."""
+    lines = cast("list[list[list[float]]]", feature.properties.get("centerline") or [])
+    return max(
+        (abs(each) for each in (*feature.shape.bounds, *(x for line in lines for xy in line for x in xy))), default=0.0
+    )
 
 
 def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapFeature, ...]]:

@@ -23,7 +23,6 @@ from scenicq.forest.nodes import (
     Identity,
     Index,
     Leaf,
-    LogicOp,
     Node,
     Select,
     Value,
@@ -132,7 +131,7 @@ class _Cascade:
         def outcomes() -> Iterator[Outcome]:
             for value in (True, False):
                 fixed = conditioned(items, memo={id(truth): Constant(value, span=truth.span)})
-                yield self.decide([*fixed, fact(truth if value else _opposite(truth))], given)
+                yield self.decide([*fixed, fact(truth if value else build.opposite(truth))], given)
 
         return self._branch(items[0][0], outcomes())
 
@@ -194,14 +193,3 @@ def _free_truth(items: list[Item]) -> Node | None:
             case _:
                 pass
     return None
-
-
-_OPPOSITE = {
-    CompareOp.LT: CompareOp.GE, CompareOp.LE: CompareOp.GT, CompareOp.GT: CompareOp.LE, CompareOp.GE: CompareOp.LT,
-}  # fmt: skip
-
-
-def _opposite(truth: Node) -> Node:
-    if isinstance(truth, Compare) and truth.op in _OPPOSITE:
-        return build.compare(_OPPOSITE[truth.op], truth.left, truth.right, truth.span)
-    return build.logic(LogicOp.NOT, truth, span=truth.span)

@@ -40,14 +40,14 @@ def conjuncts(item: Item) -> list[Item]:
     while todo:
         node, wanted = todo.pop()
         if not isinstance(node, Logic):
-            holding = node if wanted else build.logic(LogicOp.NOT, node, span=node.span)
+            holding = node if wanted else build.opposite(node)
             found.append((constraint, holding, seen))
         elif node.op is LogicOp.NOT:
             todo.append((node.args[0], not wanted))
         elif (node.op is LogicOp.AND) is wanted:
             todo += [(arg, wanted) for arg in reversed(node.args)]
         else:
-            args = tuple(arg if wanted else build.logic(LogicOp.NOT, arg, span=arg.span) for arg in node.args)
+            args = tuple(arg if wanted else build.opposite(arg) for arg in node.args)
             index = Index((1.0,) * len(args), span=node.span)
             found.append((constraint, Select(index, args, span=node.span), seen))
     return found

@@ -22,7 +22,6 @@ from scenicq.forest.nodes import (
     Constant,
     DirectionAt,
     Identity,
-    LogicOp,
     Node,
     Value,
 )
@@ -332,5 +331,5 @@ class _ChoiceSearch:
 def _is(index: Node, pick: int) -> Node:
     """That an expression takes an option."""
     if kind_of(index) == "boolean":
-        return index if pick else build.logic(LogicOp.NOT, index, span=index.span)
+        return index if pick else build.opposite(index)
     return build.compare(CompareOp.EQ, index, Constant(float(pick), span=index.span), index.span)

@@ -17,6 +17,7 @@ from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest.improvise import draw_scene
+from scenicq.geometry.angles import normalize
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
@@ -45,6 +46,11 @@ OPTIONS = {
     "radius": MatchOptions(tolerance=Tolerance(position=0.5), radius=25.0),
     "any ego": MatchOptions(tolerance=Tolerance(position=0.2, heading=0.1), ego="any"),
 }
+
+
+def turned_in(thing: LabelObject) -> LabelObject:
+    """With a heading as every importer gives it."""
+    return thing if thing.heading is None else replace(thing, heading=normalize(thing.heading))
 
 
 def nudged(thing: LabelObject, rng: random.Random) -> LabelObject:
@@ -82,8 +88,8 @@ def dataset_of(programs: dict[str, str], folder: Path) -> Dataset:
                 continue
             label = label_of(scenario, scene, rng, distractors=2, sizes=rng.random() < 0.5)
             for change in range(3):
-                things = tuple(nudged(each, rng) if change else each for each in label.objects)
-                ego = nudged(label.ego, rng) if change == 2 else label.ego
+                things = tuple(turned_in(nudged(each, rng) if change else each) for each in label.objects)
+                ego = turned_in(nudged(label.ego, rng) if change == 2 else label.ego)
                 number = len(labels)
                 labels.append(
                     replace(
