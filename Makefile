@@ -7,7 +7,7 @@ BIN := .venv/bin
 READY := .venv/.ready
 PYTEST := $(BIN)/python -m pytest -q -p no:cacheprovider
 LINTED := scenicq cli tests sample_data
-FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/test_search.py
+FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/search/test_backtracking.py
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo check test test-all golden bench bench-scale conformance fuzz mutate browser dreal clean
