@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import assert_never
 
 import numpy as np
@@ -49,7 +50,9 @@ def contains(region: Region, x: float, y: float) -> bool:
         case PolygonSet() | PolylineSet() | PointSet():
             return len(shapes.tree_within(region.tree, shapes.point(x, y), SLACK)) > 0
         case UnionOf():
-            return any(contains(part, x, y) for part in region.parts)
+            west, south, east, north = _part_boxes(region)
+            near = (west <= x + SLACK) & (south <= y + SLACK) & (east >= x - SLACK) & (north >= y - SLACK)
+            return any(contains(region.parts[number], x, y) for number in np.flatnonzero(near).tolist())
         case IntersectionOf():
             return all(contains(part, x, y) for part in region.parts)
         case DifferenceOf():
@@ -61,6 +64,12 @@ def contains(region: Region, x: float, y: float) -> bool:
             return _distance_within(region, x, y, _NEIGHBOURHOOD) <= SLACK
         case _:
             assert_never(region)
+
+
+@lru_cache(maxsize=64)
+def _part_boxes(region: UnionOf) -> NDArray[np.float64]:
+    """Western, southern, eastern and northern ends of a union's parts, shape (4, parts): maps have hundreds."""
+    return np.array([bounds(part) for part in region.parts], dtype=np.float64).reshape(-1, 4).T
 
 
 def contains_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
