@@ -8,12 +8,10 @@ from pathlib import Path
 import click
 
 from scenicq.errors import DataError, Diagnostic, Source
+from scenicq.query.execution.option_texts import DRIVING
 from scenicq.query.execution.run import read_program
 
-__all__ = ["DRIVING", "SCENARIO", "given_program", "read_scenario"]
-
-DRIVING = "scenic.domains.driving.model"
-"""The world model of a program that is given as text and names none."""
+__all__ = ["SCENARIO", "given_program", "read_scenario"]
 
 SCENARIO = "A Scenic program, as a file; `-` is standard input."
 """What the help says of the argument."""

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.detection import Detection
 from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation, WorstFrame
 from scenicq.evaluate.rows import tables
@@ -21,7 +18,7 @@ from scenicq.report.picture import View, ground, plane_of
 from scenicq.report.scene import draw_object
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.report.svg import Plane, element, escape, points_path
-from scenicq.report.write import check_target
+from scenicq.report.write import new_report
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 
@@ -52,23 +49,10 @@ def write_pages(evaluation: Evaluation, dataset: Dataset, folder: Path, sensors:
     Raises:
         DataError: target-exists, or target-unwritable.
     """
-    check_target(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=".report-", dir=folder))
-        try:
-            files = SensorFiles(roots_of(dataset, sensors), folder, work, can_make_thumbnails(), inside=True)
-            text = _Pages(evaluation, dataset, files).text()
-            (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
-            for name in ("pictures", "thumbnails"):
-                shutil.rmtree(folder / name, ignore_errors=True)
-            for new in sorted(work.iterdir()):
-                new.replace(folder / new.name)
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
-    except OSError as error:
-        message = f"{folder} cannot be written: {error.strerror or error}"
-        raise DataError(Diagnostic("target-unwritable", message)) from None
+    with new_report(folder) as work:
+        files = SensorFiles(roots_of(dataset, sensors), folder, work, can_make_thumbnails(), inside=True)
+        text = _Pages(evaluation, dataset, files).text()
+        (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
     return folder / "index.html"
 
 

@@ -15,13 +15,11 @@ import duckdb
 from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.notebook.frames import Frame
 from scenicq.notebook.matches import Matches
-from scenicq.query.execution.option_texts import OptionTexts, read_options
+from scenicq.query.execution.option_texts import DRIVING, OptionTexts, read_options
 from scenicq.query.execution.run import Query, read_program
 from scenicq.store.dataset import Dataset, open_dataset
 
 __all__ = ["OpenedDataset", "open"]
-
-_DRIVING = "scenic.domains.driving.model"
 
 
 @dataclass(eq=False, repr=False)
@@ -106,7 +104,7 @@ class OpenedDataset:
 
 def _with_model(options: OptionTexts) -> OptionTexts:
     """The options with the driving world model, unless they name one."""
-    texts: OptionTexts = {"model": _DRIVING}
+    texts: OptionTexts = {"model": DRIVING}
     texts.update(options)
     return texts
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from scenicq.report.shares import program_lines
 from scenicq.report.svg import element, escape
 from scenicq.report.timelines import interval_runs
 
-__all__ = ["INLINE", "MOST", "check_target", "write_report"]
+__all__ = ["INLINE", "MOST", "check_target", "new_report", "write_report"]
 
 INLINE = 300
 """Frames up to which everything is in the page itself."""
@@ -97,6 +97,25 @@ def write_report(
     Raises:
         DataError: target-exists, or target-unwritable.
     """
+    with new_report(folder) as work:
+        text = _Report(query, folder, work, sensors).text(results, near, command, elapsed_s)
+        (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
+    return folder / "index.html"
+
+
+@contextlib.contextmanager
+def new_report(folder: Path) -> Generator[Path]:
+    """A folder to make a report in, which takes the place of an earlier one when it is complete.
+
+    Args:
+        folder: Where the report shall be.
+
+    Yields:
+        Where its files go until then; all else there is lost.
+
+    Raises:
+        DataError: target-exists, or target-unwritable.
+    """
     check_target(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -104,14 +123,12 @@ def write_report(
             shutil.rmtree(each, ignore_errors=True)
         work = Path(tempfile.mkdtemp(prefix=_WORK, dir=folder))
         try:
-            text = _Report(query, folder, work, sensors).text(results, near, command, elapsed_s)
-            (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
+            yield work
             _replace(work, folder)
         finally:
             shutil.rmtree(work, ignore_errors=True)
     except OSError as error:
         raise _unwritable(folder, error) from None
-    return folder / "index.html"
 
 
 def _is_work(path: Path) -> bool:

@@ -14,9 +14,12 @@ from scenicq.store.classes import Granularity
 from scenicq.temporal.intervals import DEFAULT_GAP_S, IntervalOptions
 from scenicq.temporal.selection import Intervals
 
-__all__ = ["VERSIONS", "OptionTexts", "read_built_ins", "read_options"]
+__all__ = ["DRIVING", "VERSIONS", "OptionTexts", "read_built_ins", "read_options"]
 
 _DEFAULTS = MatchOptions()
+
+DRIVING = "scenic.domains.driving.model"
+"""The world model of a program that is given as text and names none."""
 
 VERSIONS: dict[str, Literal[1, 2, 3]] = {"1": 1, "2": 2, "3": 3}
 """The versions of Scenic by what names them."""

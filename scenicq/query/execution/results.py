@@ -174,20 +174,16 @@ class Funnel:
 
     def count_interval(self, verdict: Verdict) -> None:
         """Count a verdict on an interval."""
-        match verdict:
-            case Match():
-                self.matches += 1
-            case Unknown():
-                self.unknowns += 1
-                self.reasons[verdict.reason] += 1
-            case NoMatch():
-                self.broken[verdict.cause.what] += 1
+        self._tally(verdict, self.broken)
 
     def count(self, verdict: Verdict) -> None:
         """Count a verdict of the matcher."""
         self.frames += 1
         self.candidates += 1
         self.cast += not (isinstance(verdict, NoMatch) and verdict.cause.what.endswith(".class"))
+        self._tally(verdict, self.excluded)
+
+    def _tally(self, verdict: Verdict, failed: Counter[str]) -> None:
         match verdict:
             case Match():
                 self.matches += 1
@@ -195,4 +191,4 @@ class Funnel:
                 self.unknowns += 1
                 self.reasons[verdict.reason] += 1
             case NoMatch():
-                self.excluded[verdict.cause.what] += 1
+                failed[verdict.cause.what] += 1
