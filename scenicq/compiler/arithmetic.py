@@ -100,7 +100,7 @@ def check_weight(span: Span, *values: ModelValue, compared: bool = False) -> Non
                    (f"keep lists below {LARGEST:,} items and {_DEEPEST} levels",))  # fmt: skip
 
 
-def no_number(error: ArithmeticError, span: Span, label: str) -> ScenarioError:
+def no_number(error: ArithmeticError, span: Span | None, label: str) -> ScenarioError:
     """A runtime-error where arithmetic on known numbers has no result, or one that no float holds."""
     return fail("runtime-error", f"a number is too large, or not one: {error}", span, label)
 

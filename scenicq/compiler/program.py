@@ -261,14 +261,15 @@ def _scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
         tuple(
-            Requirement(_at_the_end(each.condition, each.span), each.span, probability=each.probability) for each in soft
+            Requirement(_at_the_end(each.condition, each.span), each.span, probability=each.probability)
+            for each in soft
         ),
         tuple(run.ignored), (*warnings, *(run.timed.remarks() if run.timed is not None else ())),
         dynamics=run.timed.dynamics() if run.timed is not None else None,
     )  # fmt: skip
 
 
-def _at_the_end(work: Callable[[], _Result], span: Span) -> _Result:
+def _at_the_end(work: Callable[[], _Result], span: Span | None) -> _Result:
     """What is worked out when the program has run: its numbers may still be too large."""
     try:
         return work()

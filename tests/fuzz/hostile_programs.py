@@ -157,8 +157,10 @@ def main() -> None:
         try:
             outcomes[attempt(text)] += 1
         except (Exception, Hang) as error:
-            name = type(error).__name__
+            name = f"{type(error).__name__} {traceback.extract_tb(error.__traceback__)[-1].name}"
             outcomes[f"BAD {name}"] += 1
+            if outcomes[f"BAD {name}"] > 3:
+                continue
             print(f"--- {name}\n{text}\n{traceback.format_exc(limit=-3)}", flush=True)
         finally:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0)
