@@ -56,7 +56,7 @@ def _address_space() -> int | None:
 
 
 def _take_memory_of_linear_algebra() -> None:
-    """Have OpenBLAS take its buffer now: where it finds no memory for it later, it ends the process with exit code 1."""
+    """Have OpenBLAS take its buffer now: where it finds no memory for it later, it ends the process with 1."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import numpy as np  # noqa: PLC0415 - loading may fail, too
 
