@@ -69,9 +69,10 @@ else
 endif
 
 MINUTES ?= 60
-fuzz: $(READY) ## Attack with hostile programs, datasets and kills, MINUTES=60 of each
+fuzz: $(READY) ## Attack with hostile programs, datasets, sources and kills, MINUTES=60 of each
 	$(BIN)/python tests/fuzz/hostile_programs.py --minutes $(MINUTES) --seed $(SEED)
 	$(BIN)/python tests/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/importers/fuzzing/fuzz.py --minutes $(MINUTES) --seed $(SEED)
 	$(BIN)/python tests/fuzz/kills.py --minutes $(MINUTES) --seed $(SEED)
 
 MUTATIONS ?= 200
