@@ -145,4 +145,4 @@ def _thing(number: int, thing: dict[str, Any], state: list[float]) -> dict[str, 
     name, category = f"object-{number}", label_object("", thing).category
     size = {"width": thing["width"], "length": thing["length"]}
     motion = {"position": [x, y], "heading": math.remainder(heading, math.tau), "velocity": [east, north]}
-    return {"id": name, "class": category, **size, **motion}
+    return {"id": name, "track": name, "class": category, **size, **motion}
