@@ -59,26 +59,25 @@ def _motion(dataset: Dataset) -> list[str]:
     observed = observed_motion(dataset)
     rows = [("MOTION", "labels' own", "from tracks", "unknown")]
     for name, known in observed.known.items():
-        total = known.own + known.derived + known.unknown
-        rows.append((name, *(f"{number / total:.1%}" for number in (known.own, known.derived, known.unknown))))
-    steps, gaps, longest = observed.steps, observed.gaps, f"{LONGEST_GAP_US / 1e6:g} s"
-    own = dataset.manifest.provenance.get("facts", {}).get("velocity")
-    return [
-        *(columns(rows, right=frozenset({1, 2, 3}), indent="") if len(rows) > 1 else []),
-        *([f"velocity of labels: {own}"] if own else []),
-        *(
-            [
-                f"{1 / steps.median:.3g} labels a second: {steps.median:.3g} s from one to the next "
-                f"({steps.shortest:.3g} to {steps.longest:.3g})"
-            ]
-            if steps
-            else ["no recording has two labels: nothing can be matched over time"]
-        ),
-        f"over {longest} without a label: {count(gaps.recordings, 'gap')} in recordings, "
-        f"{count(gaps.tracks, 'gap')} in tracks",
-        *([f"{count(observed.without_track, 'object')} without a track"] if observed.without_track else []),
-        "",
-    ]
+        own, derived, unknown = (f"{each / known.total:.1%}" for each in (known.own, known.derived, known.unknown))
+        rows.append((name, own, derived, unknown))
+    found = columns(rows, right=frozenset({1, 2, 3}), indent="") if len(rows) > 1 else []
+    facts = dataset.manifest.provenance.get("facts")
+    if isinstance(facts, dict) and "velocity" in facts:
+        found.append(f"velocity of labels: {facts['velocity']}")
+    steps, gaps = observed.steps, observed.gaps
+    if steps is None:
+        found.append("no recording has two labels: nothing can be matched over time")
+    else:
+        between = f"{steps.median:.3g} s from one to the next ({steps.shortest:.3g} to {steps.longest:.3g})"
+        found.append(f"{1 / steps.median:.3g} labels a second: {between}")
+    found.append(
+        f"over {LONGEST_GAP_US / 1e6:g} s without a label: {count(gaps.recordings, 'gap')} in recordings, "
+        f"{count(gaps.tracks, 'gap')} in tracks"
+    )
+    if observed.without_track:
+        found.append(f"{count(observed.without_track, 'object')} without a track")
+    return [*found, ""]
 
 
 def _lines(dataset: Dataset) -> list[str]:

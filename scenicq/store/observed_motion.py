@@ -1,4 +1,4 @@
-"""What a dataset observes of motion: how much labels say themselves, how much follows from tracks, how often, and gaps."""
+"""What a dataset observes of motion: how much labels say, how much follows from tracks, how often, and gaps."""
 
 from __future__ import annotations
 
@@ -30,6 +30,11 @@ class Known:
     own: int
     derived: int
     unknown: int
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return self.own + self.derived + self.unknown
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,5 @@
-"""What `rv_ltl`, which Scenic uses, says of temporal formulas at each sample of a trace. Runs in the environment that has
-it and not `scenicq`.
+"""What `rv_ltl`, which Scenic uses, says of temporal formulas at each sample of a trace. Runs in the environment that
+has it and not `scenicq`.
 
 One JSON object a line on standard input, {"formula": [operator, operands...] or the number of an atom, "trace": truth
 values of the atoms for each sample}; for each the verdicts after all its samples on standard output.

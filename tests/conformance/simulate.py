@@ -5,11 +5,11 @@ Usage: python simulate.py MAP.xodr OUT
 
 Writes OUT/map.geojson as `draw_scenes.py` does, then answers requests, one JSON object a line:
 
-- {"text" or "file", "seed", "seconds", "steps"} compiles and simulates a program. The answer is its trace: what is known
-  of the objects, their states at each step (x, y, heading, velocity), and how it ended; or an error.
-- {"replay": [{"states", "time_step"}, ...]} has Scenic decide, for the scene simulated last, whether the program holds on
-  given states: nothing acts, its behaviors are left out, and objects are where the states say. The answer has one pair for
-  each: "terminated" by the program, "lasts" beyond the states, or "rejected", and the step at which.
+- {"text" or "file", "seed", "seconds", "steps"} compiles and simulates a program. The answer is its trace: what is
+  known of the objects, their states at each step (x, y, heading, velocity), and how it ended; or an error.
+- {"replay": [{"states", "time_step"}, ...]} has Scenic decide, for the scene simulated last, whether the program holds
+  on given states: nothing acts, its behaviors are left out, and objects are where the states say. The answer has one
+  pair for each: "terminated" by the program, "lasts" beyond the states, or "rejected", and the step at which.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ class Replayed(Simulation):
         self._states = states
         super().__init__(scene, **options)
 
-    def createObjectInSimulator(self, obj: Any) -> None:  # noqa: N802 - Scenic's name
+    def createObjectInSimulator(self, obj: Any) -> None:
         """Nothing: the state of the first step is read like all others."""
 
     def step(self) -> None:
         """Nothing: states are read by the number of the step."""
 
-    def getProperties(self, obj: Any, properties: set[str]) -> dict[str, Any]:  # noqa: N802 - Scenic's name
+    def getProperties(self, obj: Any, properties: set[str]) -> dict[str, Any]:
         """What is recorded of an object, and what else Scenic asks for as it is."""
         number = next(n for n, each in enumerate(self.objects) if each is obj)
         x, y, heading, east, north = self._states[self.currentTime][number]
@@ -74,7 +74,7 @@ class Replayer(Simulator):
         super().__init__()
         self._states = states
 
-    def createSimulation(self, scene: Any, **options: Any) -> Replayed:  # noqa: N802 - Scenic's name
+    def createSimulation(self, scene: Any, **options: Any) -> Replayed:
         """A simulation of the scene."""
         return Replayed(scene, self._states, **options)
 

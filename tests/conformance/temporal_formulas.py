@@ -62,7 +62,13 @@ def compare_formulas(python: Path, count: int, seed: int = 1) -> int:
     rng = random.Random(seed)
     pairs = [{"formula": random_formula(rng, 4), "trace": random_trace(rng)} for _ in range(count)]
     text = "".join(json.dumps(pair) + "\n" for pair in pairs)
-    done = subprocess.run([str(python), str(Path(__file__).with_name("ltl_verdicts.py"))], input=text, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [str(python), str(Path(__file__).with_name("ltl_verdicts.py"))],
+        input=text,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     different = 0
     for pair, line in zip(pairs, done.stdout.splitlines(), strict=True):
         columns = 2 * np.array(pair["trace"], dtype=np.int8)

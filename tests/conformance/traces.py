@@ -2,10 +2,10 @@
 
 Run by `make conformance-time MAP=Town01.xodr`, or with SCENIC=a checkout for the programs that Scenic's repository
 publishes. Scenic's Newtonian simulator runs each program (`simulate.py`). Its trace is written as a recording, ingested,
-and matched with `--behaviors ignore`: it must match from its first sample to its last. So must what is left of it at 2 Hz,
-and with noise within the tolerance; and changed ones (an object late, stopped, aside, turned, or said to be faster, the
-trace cut) must match if and only if Scenic, replaying the same states without behaviors, says that the program holds, and
-must end where it says.
+and matched with `--behaviors ignore`: it must match from its first sample to its last. So must what is left of it at
+2 Hz, and with noise within the tolerance; and changed ones (an object late, stopped, aside, turned, or said to be
+faster, the trace cut) must match if and only if Scenic, replaying the same states without behaviors, says that the
+program holds, and must end where it says.
 """
 
 from __future__ import annotations
@@ -106,7 +106,9 @@ def expected_end(said: tuple[str, int], *, open_ended: bool) -> int | None:
     return step if kind == "terminated" or (kind == "lasts" and open_ended) else None
 
 
-def judge(row: Row, each: Recorded, said: tuple[str, int], found: list[dict[str, Any]], *, text: str, ends: bool) -> None:
+def judge(
+    row: Row, each: Recorded, said: tuple[str, int], found: list[dict[str, Any]], *, text: str, ends: bool
+) -> None:
     """Compare what both say of one recording.
 
     Args:
@@ -180,7 +182,11 @@ def programs(arguments: argparse.Namespace) -> Iterator[tuple[str, Path, Path]]:
     towns = maps_of([arguments.checkout / "assets", *arguments.maps])
     for program, town in published_programs(arguments.checkout):
         if town in towns:
-            yield f"{program.removeprefix('examples/').removesuffix('.scenic')}", arguments.checkout / program, towns[town]
+            yield (
+                f"{program.removeprefix('examples/').removesuffix('.scenic')}",
+                arguments.checkout / program,
+                towns[town],
+            )
 
 
 def parse_arguments() -> argparse.Namespace:
@@ -219,7 +225,8 @@ def main() -> int:
     finally:
         for original in originals.values():
             original.close()
-    right, compared = (sum((c for c in counts), Counter[str]()) for counts in zip(*((r.right, r.compared) for r in rows)))
+    right = sum((row.right for row in rows), Counter[str]())
+    compared = sum((row.compared for row in rows), Counter[str]())
     print(", ".join(f"{kind} {right[kind]}/{compared[kind]}" for kind in compared))
     print(f"{sum(row.traces for row in rows)} traces of {sum(row.traces > 0 for row in rows)} programs;", end=" ")
     print(f"on {sum(row.broken for row in rows)} of {compared.total()} recordings the program does not hold")

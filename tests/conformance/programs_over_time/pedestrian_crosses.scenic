@@ -14,5 +14,5 @@ spot = new OrientedPoint ahead of ego by 25
 walker = new Pedestrian right of spot by 4, facing 90 deg relative to spot.heading, with regionContainedIn None, with behavior Cross()
 require (distance to intersection) > 60
 require always (distance to walker) > 2.5
-require eventually walker.speed > 1
+require eventually (distance from walker to spot) < 1
 terminate when (distance from walker to spot) > 4.5 and (distance to walker) < 14

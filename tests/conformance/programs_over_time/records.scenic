@@ -2,5 +2,4 @@ model scenic.domains.driving.model
 ego = new Car with behavior FollowLaneBehavior(target_speed=7)
 record ego.speed as speed
 record final ego.position as place
-require[0.5] always ego.speed < 1
 terminate when ego.speed > 4
