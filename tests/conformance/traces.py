@@ -1,7 +1,7 @@
 """Do traces that Scenic simulates match the programs that they come from, over time?
 
 Run by `make conformance-time MAP=Town01.xodr`, or with SCENIC=a checkout for the programs that Scenic's repository
-publishes. Scenic's Newtonian simulator runs each program (`simulate.py`). Its trace is written as a recording, ingested,
+publishes. Scenic's Newtonian simulator runs each program (`simulate.py`). Its trace is written as a recording, ingested
 and matched with `--behaviors ignore`: it must match from its first sample to its last. So must what is left of it at
 2 Hz, and with noise within the tolerance; and changed ones (an object late, stopped, aside, turned, or said to be
 faster, the trace cut) must match if and only if Scenic, replaying the same states without behaviors, says that the
