@@ -6,6 +6,7 @@ same tolerance written in two ways. A label that one way cannot decide proves no
 """
 
 import argparse
+import math
 import os
 import random
 import shutil
@@ -91,7 +92,7 @@ def _pushed(thing: LabelObject, far: float, chance: random.Random) -> LabelObjec
     if chance.random() < 0.5:
         far = 0.0
     x, y = thing.x + chance.uniform(-far, far), thing.y + chance.uniform(-far, far)
-    heading = None if thing.heading is None else thing.heading + chance.uniform(-far, far) / 4
+    heading = None if thing.heading is None else math.remainder(thing.heading + chance.uniform(-far, far) / 4, math.tau)
     return replace(thing, x=x, y=y, heading=heading)
 
 
