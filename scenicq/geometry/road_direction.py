@@ -1,8 +1,8 @@
 """The direction of traffic as a vector field (`roadDirection` of Scenic's driving domain).
 
-At a point it is the direction of the nearest centreline segment of the lanes that contain the point; in an intersection
-each containing lane's nearest segment gives a direction of its own; off all lanes, the nearest lane within 20 m counts.
-What ties within a nanometre is all allowed.
+At a point it is the direction of the nearest segment of the centreline of the lane that holds it. Where lanes overlap,
+each gives a direction of its own: Scenic takes that of the first in its lists. Off all lanes, the nearest lane within
+20 m counts. What ties within a nanometre is all allowed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scenicq.geometry.angles import heading_of_array
 from scenicq.geometry.cell_guards import Guard, Nearer, Off, Within, segment_distances
 from scenicq.geometry.cells import joined_boxes
 from scenicq.geometry.fields import FieldCell
-from scenicq.geometry.road_cells import Contest, Outline, convex_outlines, segment_cells
+from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
 __all__ = ["DirectedLane", "RoadDirection", "along_lines"]
@@ -75,12 +75,10 @@ class RoadDirection:
 
     Attributes:
         lanes: The lanes; those without a segment have no direction and are passed over.
-        intersections: Polygons of the intersections.
         name: What messages call the field.
     """
 
     lanes: tuple[DirectedLane, ...] = field(repr=False)
-    intersections: tuple[Shape, ...] = field(default=(), repr=False)
     name: str = "roadDirection"
 
     def values(self, x: float, y: float) -> tuple[float, ...]:
@@ -132,10 +130,6 @@ class RoadDirection:
         return STRtree(self._areas)
 
     @cached_property
-    def _crossroads(self) -> STRtree:
-        return STRtree(self.intersections)
-
-    @cached_property
     def _all(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
         """Segments of all lanes, their headings, and where each lane's begin (with the end of the last)."""
         segments = np.concatenate([np.empty((0, 4)), *(segments for _, segments in self._directed)])
@@ -149,8 +143,8 @@ class RoadDirection:
         return {}
 
     @cached_property
-    def _lanes_known(self) -> dict[int, tuple[list[Outline], list[Contest]]]:
-        """Of each lane that was asked for the convex pieces, and what overlaps it."""
+    def _outlines(self) -> dict[int, list[Outline]]:
+        """Of each lane that was asked for the convex pieces."""
         return {}
 
     def _values(self, xy: Coordinates) -> list[tuple[float, ...]]:
@@ -159,27 +153,19 @@ class RoadDirection:
             return [()] * len(xy)
         points = shapes.points(xy)
         point, lane = shapes.tree_pairs_within(self._tree, points, _TIE)
-        # one nearest segment over all lanes, but in intersections and off the lanes one of each lane
-        group = point.copy()
         lanes = np.bincount(point, minlength=len(xy))
-        own = np.arange(len(point)) + len(xy)
-        if len(shared := np.nonzero(lanes > 1)[0]):
-            crossing = np.zeros(len(xy), dtype=bool)
-            crossing[shared[shapes.tree_pairs_within(self._crossroads, points[shared], _TIE)[0]]] = True
-            group[crossing[point]] = own[crossing[point]]
         off = np.nonzero(lanes == 0)[0]
         if len(off):
             off_point, off_lane = self._nearest_lanes(xy[off])
             point = np.concatenate([point, off[off_point]])
             lane = np.concatenate([lane, off_lane])
-            group = np.concatenate([group, np.arange(len(off_point)) + len(xy) + len(own)])
         counts = starts[lane + 1] - starts[lane]
         pair = np.repeat(np.arange(len(lane)), counts)
         segment = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[lane][pair]
         away = segment_distances(xy[point[pair]], segments[segment])
-        best = np.full(len(xy) + len(group), np.inf)
-        np.minimum.at(best, group[pair], away)
-        chosen = np.nonzero(away <= best[group[pair]] + _TIE)[0]
+        best = np.full(len(lane), np.inf)
+        np.minimum.at(best, pair, away)
+        chosen = np.nonzero(away <= best[pair] + _TIE)[0]
         found: list[dict[float, None]] = [{} for _ in range(len(xy))]
         for index, heading in zip(point[pair[chosen]].tolist(), headings[segment[chosen]].tolist(), strict=True):
             found[index][heading] = None
@@ -235,28 +221,11 @@ class RoadDirection:
         for index in near:
             found = self._cells_of.get((lane, index))
             if found is None:
-                if lane not in self._lanes_known:
-                    self._lanes_known[lane] = convex_outlines(area), list(self._contests(lane))
-                outlines, contests = self._lanes_known[lane]
+                if lane not in self._outlines:
+                    self._outlines[lane] = convex_outlines(area)
                 own = headings[starts[lane] : starts[lane + 1]]
-                found = self._cells_of[lane, index] = segment_cells(outlines, segments, own, index, contests)
+                found = self._cells_of[lane, index] = segment_cells(self._outlines[lane], segments, own, index)
             yield from found
-
-    def _contests(self, lane: int) -> Iterator[Contest]:
-        """The lanes that overlap a lane outside of intersections: there, another lane's segment may be nearer."""
-        _, headings, starts = self._all
-        area = self._directed[lane][0]
-        touching: list[int] = shapes.tree_within(self._tree, area, 0.0).tolist()
-        crossing: list[int] = shapes.tree_query(self._crossroads, area).tolist()
-        for other in touching:
-            rival, segments = self._directed[other]
-            if other == lane or not _overlap(rival, area):
-                continue
-            shared = shapes.intersection(area, rival)
-            for index in crossing:
-                shared = shapes.difference(shared, self.intersections[index])
-            if shared.area > 0:
-                yield Contest(shared, segments, headings[starts[other] : starts[other + 1]])
 
     def _surroundings(self, bounds: Bounds) -> list[FieldCell]:
         """Squares over what lies off the lanes, split until one heading is left or they are small."""
@@ -339,10 +308,6 @@ class RoadDirection:
 def _corners(box: Bounds) -> NDArray[np.float64]:
     west, south, east, north = box
     return np.array([(west, south), (east, south), (east, north), (west, north)])
-
-
-def _overlap(a: Shape, b: Shape) -> bool:
-    return shapes.intersection(a, b).area > 1e-6
 
 
 def _segments(lines: Sequence[Coordinates]) -> NDArray[np.float64]:
