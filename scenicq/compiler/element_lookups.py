@@ -45,12 +45,11 @@ def _lane_sections(network: Network) -> list[list[Entry]]:
     found: list[Entry] = []
     for lane in network.lanes:
         found += [(section, section, lane) for section in lane.sections]
-        if len(lane.sections) > 1:
-            cracks = shapes.difference(lane.polygon, shapes.union_all([section.polygon for section in lane.sections]))
-            for section in lane.sections if cracks.area > 0 else ():
-                beside = shapes.intersection(cracks, shapes.band(section.polygon, TOLERANCE))
-                for part in shapes.polygonal_part(beside):
-                    found.append((NetworkElement(section.id, cast(Polygon, part)), section, lane))
+        cracks = shapes.difference(lane.polygon, shapes.union_all([section.polygon for section in lane.sections]))
+        for section in lane.sections if cracks.area > 0 else ():
+            beside = shapes.intersection(cracks, shapes.band(section.polygon, TOLERANCE))
+            parts = shapes.polygonal_part(beside)
+            found += [(NetworkElement(section.id, cast(Polygon, part)), section, lane) for part in parts]
     return [found]
 
 
