@@ -37,6 +37,8 @@ _MARGIN = 0.01
 """Metres by which a box of cells is grown."""
 _DIGITS = 9
 """Of a radian, to which headings are one."""
+_ONE_HEADING = 1e-6
+"""Radians by which a heading that was worked with may be off."""
 _LARGEST, _SMALLEST = 16.0, 2.0
 """Metres: sides of the squares that cover the surroundings of lanes, at first and where they are no longer split."""
 
@@ -111,9 +113,16 @@ class RoadDirection:
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes stay whole."""
+        return self._cells_near(bounds, None)
+
+    def cells_of(self, heading: float, bounds: Bounds) -> list[FieldCell]:
+        """Those of one heading, and perhaps others off the lanes: cells of other segments need not be made."""
+        return self._cells_near(bounds, heading)
+
+    def _cells_near(self, bounds: Bounds, heading: float | None) -> list[FieldCell]:
         box = shapes.box(*bounds)
         near = np.sort(shapes.tree_query(self._tree, box)).tolist()
-        return [cell for lane in near for cell in self._lane_cells(lane, bounds)] + self._surroundings(bounds)
+        return [cell for lane in near for cell in self._lane_cells(lane, bounds, heading)] + self._surroundings(bounds)
 
     @cached_property
     def _directed(self) -> tuple[tuple[Shape, NDArray[np.float64]], ...]:
@@ -136,6 +145,12 @@ class RoadDirection:
         along = segments[:, 2:] - segments[:, :2]
         starts = np.cumsum([0, *(len(segments) for _, segments in self._directed)])
         return segments, heading_of_array(along[:, 0], along[:, 1]), starts
+
+    @cached_property
+    def _distinct(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """The headings of all segments in order, rounded, and which of them each segment has."""
+        distinct, number = np.unique(np.round(self._all[1], _DIGITS), return_inverse=True)
+        return distinct, number.astype(np.intp)
 
     @cached_property
     def _cells_of(self) -> dict[tuple[int, int], list[FieldCell]]:
@@ -172,7 +187,7 @@ class RoadDirection:
         return [tuple(sorted(values)) for values in found]
 
     def _headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        segments, headings, starts = self._all
+        segments, _, starts = self._all
         middle = (boxes[:, :2] + boxes[:, 2:]) / 2
         radius = np.hypot(*(boxes[:, 2:] - boxes[:, :2]).T) / 2 + _TIE
         centers = shapes.points(middle)
@@ -198,8 +213,10 @@ class RoadDirection:
         best = np.full(len(lane), np.inf)
         np.minimum.at(best, pair, gap)
         chosen = gap <= best[pair] + 2 * radius[box[pair]] + _TIE
-        found = np.unique(np.stack([box[pair[chosen]], np.round(headings[segment[chosen]], _DIGITS)]), axis=1)
-        return found[0].astype(np.intp), found[1]
+        distinct, number = self._distinct
+        # as one whole number a pair is found once much sooner than as two fractions
+        found = np.unique(box[pair[chosen]] * len(distinct) + number[segment[chosen]])
+        return found // max(1, len(distinct)), distinct[found % max(1, len(distinct))]
 
     def _nearest_lanes(self, xy: Coordinates) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Pairs (point, lane) of the lanes within reach that are nearest, ties included."""
@@ -211,14 +228,16 @@ class RoadDirection:
         nearest = (least[point] <= REACH) & (away <= least[point] + _TIE)
         return point[nearest], lane[nearest]
 
-    def _lane_cells(self, lane: int, bounds: Bounds) -> Iterator[FieldCell]:
-        """The cells of the segments of a lane that can be the nearest of it somewhere within the bounds."""
+    def _lane_cells(self, lane: int, bounds: Bounds, heading: float | None) -> Iterator[FieldCell]:
+        """The cells of a lane's segments, or those of a heading, that can be the nearest of it within the bounds."""
         _, headings, starts = self._all
         area, segments = self._directed[lane]
         west, south, east, north = bounds
         gap = segment_distances(np.array([(west + east) / 2, (south + north) / 2]), segments)
-        near = np.nonzero(gap <= gap.min() + math.hypot(east - west, north - south) + _TIE)[0].tolist()
-        for index in near:
+        near = gap <= gap.min() + math.hypot(east - west, north - south) + _TIE
+        if heading is not None:
+            near &= np.abs(headings[starts[lane] : starts[lane + 1]] - heading) <= _ONE_HEADING
+        for index in np.nonzero(near)[0].tolist():
             found = self._cells_of.get((lane, index))
             if found is None:
                 if lane not in self._outlines:
