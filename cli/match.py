@@ -15,14 +15,13 @@ from typing import Any
 import click
 
 from scenicq.errors import Diagnostic
-from scenicq.exporters.export import EXPORTS
+from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
-from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.store.atomic_files import sole_writer
-from scenicq.temporal.intervals import DEFAULT_GAP_S
+from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
 from .advise import advise, is_nearly_empty
 from .datasets import open_checked
@@ -47,6 +46,8 @@ __all__ = ["match"]
 def _near(query: Query, count: int | None) -> Iterator[Result]:
     """The frames that come closest, looked for once the matches are there."""
     if count is not None and not query.funnel.cut:
+        from scenicq.query.explain.nearest_miss import nearest_misses  # noqa: PLC0415 - takes long to load
+
         yield from nearest_misses(query, count)
 
 
@@ -120,7 +121,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--engine", metavar="dask[=ADDRESS]", callback=parse_engine, help="Match in pieces on Dask: in processes "
               "on this machine (--jobs of them, or one a processor), or on the cluster whose scheduler is at ADDRESS.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run with the same -o FILE stopped.")
-@click.option("--export", metavar="FORM DIR", type=(click.Choice(list(EXPORTS)), click.Path(path_type=Path)),
+@click.option("--export", metavar="FORM DIR", type=(click.Choice(FORMS), click.Path(path_type=Path)),
               help="Hand the matching frames on, too, in a new folder DIR: nuscenes-tokens, argoverse2, paths (of "
               "sensor files), interchange (to ingest elsewhere) or openlabel.")
 @click.option("--explain", is_flag=True,

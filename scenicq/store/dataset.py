@@ -24,7 +24,6 @@ from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
-from scenicq.store.soundness import check_dataset
 from scenicq.store.sql import sql_text
 
 __all__ = ["Dataset", "open_dataset"]
@@ -224,6 +223,8 @@ def open_dataset(address: str | Path, *, older: bool = False, check: bool = True
         raise DataError(problems)
     dataset = Dataset(place, manifest)
     if check:
+        from scenicq.store.soundness import check_dataset  # noqa: PLC0415 - takes long to load
+
         try:
             with dataset.blamed():
                 check_dataset(dataset)

@@ -30,7 +30,7 @@ from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, nam
 from scenicq.query.prefilter.plan import Plan
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
-from scenicq.temporal.intervals import IntervalOptions
+from scenicq.temporal.interval_options import IntervalOptions
 
 __all__ = ["Query", "QueryOptions", "Stretch", "read_program"]
 
