@@ -196,8 +196,8 @@ def _check_texts(name: str, values: ArrowArray, file: str) -> None:
         bad = [not (is_class(text) or (text == "" and name == "ego_class")) for text in texts.to_pylist()]
         _refuse_texts(bad, "is no class of the class tree", numbers, file, name)
     if is_json and name != "properties":
-        problems = [text is not None and _attributes_problem(text) for text in texts.to_pylist()]
-        for problem in dict.fromkeys(filter(None, problems)):
+        problems = [None if text is None else _attributes_problem(text) for text in texts.to_pylist()]
+        for problem in dict.fromkeys(each for each in problems if each is not None):
             _refuse_texts([each == problem for each in problems], problem, numbers, file, name)
 
 

@@ -127,7 +127,7 @@ class Decider:
         """
         check_deadline(self.until)
         if self._connection is None:
-            self._connection = self.dataset.connect(threads=self.threads)
+            self._connection = self.dataset.connect(threads=self.threads, views=False)
             self._open.callback(self._connection.close)
             self._solver = self._open.enter_context(LazySolver(self.solver))
         if block.map not in self._worlds:
