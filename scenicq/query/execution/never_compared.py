@@ -121,14 +121,14 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
     found = sorted(places.values(), key=lambda each: each.span.start if each.span is not None else 0)
     if not found or not dataset.manifest.total.frames:
         return Coverage()
-    with closing(dataset.connect()) as connection, dataset.blamed():
+    with closing(dataset.connect(views=False)) as connection, dataset.blamed():
         counts = _counts(dataset, connection, [each for each in found if each.comparable], options)
         warnings: list[Diagnostic] = []
         missing: dict[str, int] = {}
         for each in found:
             rows, present, lacking = counts.get(each, (1, 0, 0))
             if not present and rows:
-                warnings.append(_warning(connection, each, options))
+                warnings.append(_warning(dataset, connection, each, options))
             elif present and lacking:
                 missing[each.what] = max(lacking, missing.get(each.what, 0))
     return Coverage(tuple(warnings), missing)
@@ -160,13 +160,13 @@ def _counts(
         mine = [each for each in mine if each not in found]
         rows = [f"count(*) FILTER ({_own(each, options)})" for each in mine]
         present = [f"count(*) FILTER ({_own(each, options)} AND {_present(each)})" for each in mine]
-        numbers = _row(connection, [*rows, *present], table)
+        numbers = _row(dataset, connection, [*rows, *present], table)
         counts = list(zip(mine, numbers, numbers[len(mine) :], strict=False))
         partial = [each for each, count, there in counts if 0 < there < count]
         frames = [
             f"count(DISTINCT frame) FILTER ({_own(each, options)} AND NOT ({_present(each)}))" for each in partial
         ]
-        lacking = dict(zip(partial, _row(connection, frames, table), strict=True))
+        lacking = dict(zip(partial, _row(dataset, connection, frames, table), strict=True))
         found |= {each: (count, there, lacking.get(each, 0)) for each, count, there in counts}
     return found
 
@@ -181,10 +181,19 @@ def _own(each: _Setting, options: MatchOptions) -> str:
     return f"{'ego_class' if each.ego else 'class'} IN {_classes(each.category, options)}" if each.category else "true"
 
 
-def _row(connection: duckdb.DuckDBPyConnection, columns: list[str], table: str) -> tuple[int, ...]:
+def _paths(dataset: Dataset, table: str) -> str:
+    return "[" + ", ".join(sql_text(str(path)) for path in dataset.files(table)) + "]"
+
+
+def _read(dataset: Dataset, table: str) -> str:
+    """What SQL reads a table from."""
+    return f"read_parquet({_paths(dataset, table)})"
+
+
+def _row(dataset: Dataset, connection: duckdb.DuckDBPyConnection, columns: list[str], table: str) -> tuple[int, ...]:
     if not columns:
         return ()
-    row = connection.execute(f"SELECT {', '.join(columns)} FROM {table}").fetchone()
+    row = connection.execute(f"SELECT {', '.join(columns)} FROM {_read(dataset, table)}").fetchone()
     assert row is not None
     return row
 
@@ -195,18 +204,17 @@ def _full_columns(
     """Those of some columns in which every row has a value, by the statistics of the files: no row need be read."""
     if not names:
         return set()
-    paths = ", ".join(sql_text(str(path)) for path in dataset.files(table))
     listed = ", ".join(sql_text(name) for name in names if name is not None)
     rows = connection.execute(
-        f"SELECT path_in_schema FROM parquet_metadata([{paths}]) WHERE path_in_schema IN ({listed}) "
+        f"SELECT path_in_schema FROM parquet_metadata({_paths(dataset, table)}) WHERE path_in_schema IN ({listed}) "
         "GROUP BY 1 HAVING count(*) = count(stats_null_count) AND sum(stats_null_count) = 0"
     ).fetchall()
     return {name for (name,) in rows}
 
 
-def _known(connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> list[str]:
+def _known(dataset: Dataset, connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> list[str]:
     """The properties that labels have of such an object beside class and position, or the parameters that they have."""
-    table, prefix = ("labels", "ego_") if each.ego else ("objects", "")
+    table, prefix = (_read(dataset, "labels"), "ego_") if each.ego else (_read(dataset, "objects"), "")
     own = f"{prefix}class IN {_classes(each.category, options)}" if each.category else "true"
     names: list[str] = []
     if each.category:
@@ -222,8 +230,10 @@ def _known(connection: duckdb.DuckDBPyConnection, each: _Setting, options: Match
     return names + sorted(further - set(names))
 
 
-def _warning(connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> Diagnostic:
-    known = _known(connection, each, options)
+def _warning(
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions
+) -> Diagnostic:
+    known = _known(dataset, connection, each, options)
     kind = "the ego" if each.ego else f"`{each.category}`"
     if not each.category:
         message = f"`{each.what}` is never compared: no label of the dataset has such a parameter"
