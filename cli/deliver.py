@@ -15,6 +15,7 @@ import click
 
 from scenicq.exporters.export import Exporter
 from scenicq.match.verdict import NoMatch
+from scenicq.query.execution.result_origin import ORIGIN, name_origin
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target, write_report
@@ -71,6 +72,7 @@ def _deliver(
     started = time.perf_counter()
     unlisted = 0
     file, report = wanted.file, wanted.report
+    origin = name_origin(query.dataset)
     exporter = None
     if wanted.export is not None:
         exporter = Exporter(wanted.export[0], query.dataset, wanted.export[1], Path(query.source.name).stem)
@@ -83,12 +85,13 @@ def _deliver(
                 sink,
                 query.roles,
                 query.dataset.short_frames,
+                origin=origin,
                 ranked=wanted.ranked,
                 over_time=query.is_over_time(),
             )
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
-                writer.write(record(result))
+                writer.write(record(result) | {ORIGIN: origin})
             unlisted += wanted.form == "ids" and isinstance(result.verdict, NoMatch)
             if exporter is not None:
                 exporter.add(result)

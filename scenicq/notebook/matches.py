@@ -20,6 +20,7 @@ from scenicq.match.verdict import NoMatch
 from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import Picture, Text
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.result_tables import result_schema, result_table
 from scenicq.query.execution.results import Funnel, Result, record
 from scenicq.query.execution.run import Query
@@ -169,7 +170,8 @@ class Matches(Sequence[FrameResult]):
 
     def to_arrow(self) -> pa.Table:
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
-        return result_table((each.record for each in self._all()), result_schema(self.query.roles()))
+        schema = result_schema(self.query.roles(), origin=name_origin(self.query.dataset))
+        return result_table((each.record for each in self._all()), schema)
 
     def to_pandas(self) -> Any:
         """The results as a data frame; pandas is to be installed."""
