@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from importlib import resources
 
 from scenicq import __version__
-from scenicq.report.hatching import hatching
 from scenicq.report.legend import legend
 from scenicq.report.picture import stylesheet
 from scenicq.report.svg import element, escape
@@ -56,9 +55,8 @@ def page(title: str, body: Sequence[str], *, script: bool = True) -> str:
         f'<meta name="generator" content="{GENERATOR} {escape(__version__)}">'
         f"{element('title', escape(title))}<style>{style}</style>"
     )
-    patterns = element("svg", hatching(), class_="patterns", width=0, height=0, aria_hidden="true")
     end = f"<script>{code}</script>" if script else ""
-    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{"".join(body)}{patterns}{end}</body></html>\n'
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{"".join(body)}{end}</body></html>\n'
 
 
 def _select(name: str, label: str, options: Sequence[tuple[str, str]]) -> str:
