@@ -89,7 +89,9 @@ def _toolbar(recordings: Sequence[str], kinds: Sequence[str]) -> str:
     )
 
 
-def runs_section(cards: Sequence[str], recordings: Sequence[str], kinds: Sequence[str], note: str) -> str:
+def runs_section(
+    cards: Sequence[str], recordings: Sequence[str], kinds: Sequence[str], note: str, what: str = "run"
+) -> str:
     """The runs, with what filters and sorts them.
 
     Args:
@@ -97,6 +99,7 @@ def runs_section(cards: Sequence[str], recordings: Sequence[str], kinds: Sequenc
         recordings: Names of all their recordings.
         kinds: Kinds of verdicts that there are: match, unknown, near.
         note: What the reader should know, or nothing.
+        what: What a card is about: a run, or an interval.
     """
     empty = element("p", "No frame matches. The funnel says what excluded them.", class_="hint") if not cards else ""
     return element(
@@ -106,6 +109,6 @@ def runs_section(cards: Sequence[str], recordings: Sequence[str], kinds: Sequenc
         empty,
         _toolbar(recordings, kinds) if cards else "",
         legend() if cards else "",
-        element("div", *cards, id="runs"),
+        element("div", *cards, id="runs", data_what=what),
         aria_labelledby="runs-title",
     )

@@ -38,7 +38,7 @@ __all__ = [
 
 Style = Literal["adaptive", "light", "none"]
 
-_NEAREST, _FARTHEST = 25.0, 100.0
+_NEAREST, _FARTHEST = 25.0, 250.0
 """Metres from the middle to the edge of a picture, at least and at most."""
 _BARS = (1, 2, 5, 10, 20, 50)
 _SMALL = 0.06

@@ -72,17 +72,18 @@ def sheet_section(tiles: Sequence[str], runs: int) -> str:
     )
 
 
-def timelines_section(runs: Sequence[Run]) -> str:
+def timelines_section(runs: Sequence[Run], *, over_time: bool = False) -> str:
     """Where in each recording the runs are.
 
     Args:
         runs: All runs.
+        over_time: Whether each is an interval; these may share frames.
     """
     numbered = sorted(enumerate(runs, 1), key=lambda each: each[1].recording)
     groups = [(name, list(group)) for name, group in groupby(numbered, key=lambda each: each[1].recording)]
     if not groups:
         return ""
-    rows = [_timeline(name, group) for name, group in groups[:_ROWS]]
+    rows = [_timeline(name, group, over_time=over_time) for name, group in groups[:_ROWS]]
     left = len(groups) - len(rows)
     note = element("p", f"{left:,} more recordings are not shown here.", class_="hint") if left > 0 else ""
     return element(
@@ -94,7 +95,7 @@ def timelines_section(runs: Sequence[Run]) -> str:
     )
 
 
-def _timeline(name: str, runs: Sequence[tuple[int, Run]]) -> str:
+def _timeline(name: str, runs: Sequence[tuple[int, Run]], *, over_time: bool) -> str:
     of = runs[0][1].of
     marks: list[str] = []
     for number, run in runs:
@@ -112,6 +113,8 @@ def _timeline(name: str, runs: Sequence[tuple[int, Run]]) -> str:
         f"{count:,} {plural[kind] if count == 1 or kind == 'unknown' else plural[kind] + 'es'}"
         for kind, count in counts.items()
     )
+    if over_time:
+        said = f"{len(runs):,} {'interval' if len(runs) == 1 else 'intervals'}"
     track = element("rect", class_="track", width=of, height=10)
     strip = element("svg", track, *marks, viewBox=f"0 0 {of} 10", preserveAspectRatio="none", class_="strip")
     return element("li", element("b", escape(name)), strip, element("span", f"{said} in {of:,} frames", class_="time"))

@@ -216,9 +216,14 @@ class _Report:
         world = next((found for name in dataset.maps if (found := self.world(name))), None)
         lines, rest = program_lines(world.scenario, funnel.excluded) if world else ([], dict(funnel.excluded))
         name = Path(self.query.source.name).name
-        told = (
-            f"{funnel.matches:,} {'match' if funnel.matches == 1 else 'matches'}, {funnel.unknowns:,} unknown of "
-            f"{funnel.frames:,} frames in {dataset.manifest.name or dataset.name}"
+        number = f"{funnel.matches:,} {'match' if funnel.matches == 1 else 'matches'}"
+        if over_time:
+            number = f"{funnel.matches:,} {'interval matches' if funnel.matches == 1 else 'intervals match'}"
+        told = f"{number}, {funnel.unknowns:,} unknown {'in' if over_time else 'of'} {funnel.frames:,} frames"
+        told += (
+            f" of {dataset.manifest.name or dataset.name}"
+            if over_time
+            else f" in {dataset.manifest.name or dataset.name}"
         )
         head = element("header", element("h1", escape(name)), element("p", escape(told)))
         overview = element(
@@ -230,9 +235,9 @@ class _Report:
         main = element(
             "main",
             sheet_section(self.tiles, len(cards)),
-            timelines_section(runs),
+            timelines_section(runs, over_time=over_time),
             overview,
-            runs_section(cards, recordings, [run.kind for run in runs], note),
+            runs_section(cards, recordings, [run.kind for run in runs], note, "interval" if over_time else "run"),
             how_section(self.query, command, elapsed_s),
         )
         skip = element("a", "Skip to the frames", href="#runs-title", class_="skip")

@@ -68,7 +68,7 @@
     }
     const left = visible();
     const frames = left.reduce((sum, run) => sum + Number(run.dataset.length), 0);
-    shown.textContent = `${frames} ${frames === 1 ? "frame" : "frames"} in ${left.length} ${left.length === 1 ? "run" : "runs"}`;
+    shown.textContent = `${frames} ${frames === 1 ? "frame" : "frames"} in ${left.length} ${list.dataset.what}${left.length === 1 ? "" : "s"}`;
   };
   const arrange = () => {
     const down = sort.value.startsWith("-");
