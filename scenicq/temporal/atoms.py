@@ -47,7 +47,7 @@ from scenicq.geometry.angles import heading_of_array, normalize_array
 from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.temporal.samples import MOVING, Samples
+from scenicq.temporal.samples import MOVING, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["AtomColumns", "HiddenVariable"]
@@ -102,7 +102,7 @@ class AtomColumns:
     """
 
     scenario: Scenario
-    samples: Samples
+    samples: Observed
     assignment: Mapping[Identity, Value] = field(default_factory=dict["Identity", "Value"])
     _features: dict[tuple[int, str], _Column | None] = field(default_factory=dict["tuple[int, str]", "_Column | None"])
 
@@ -142,11 +142,16 @@ class AtomColumns:
 
     def number(self, node: Node) -> Numbers | None:
         """The values of an expanded scalar expression, nan where it has none; None if it is no number."""
+        found = self.scalar(node)
+        return None if found is None else found[0]
+
+    def scalar(self, node: Node) -> tuple[Numbers, NDArray[np.bool_]] | None:
+        """As `number`, with where the value is not known."""
         chosen = {id(each): 0 for each in postorder((node,)) if isinstance(each, DirectionAt)}
         column = self._evaluate(node, chosen, {})
         if not isinstance(column.data, np.ndarray) or column.data.dtype == np.bool_:
             return None
-        return np.where(column.status == _DEFINED, column.data, np.nan)
+        return np.where(column.status == _DEFINED, column.data, np.nan), column.status == _UNKNOWN
 
     def _definition(self, feature: Feature) -> Node | None:
         if feature.property in MOVING or self._feature(feature) is not None:
