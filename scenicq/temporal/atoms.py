@@ -47,10 +47,10 @@ from scenicq.geometry.angles import heading_of_array, normalize_array
 from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.temporal.samples import MOVING, Observed
+from scenicq.temporal.samples import FIXED, MOVING, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["AtomColumns", "HiddenVariable"]
+__all__ = ["AtomColumns", "HiddenVariable", "reads_start"]
 
 _DEFINED, _UNDEFINED, _UNKNOWN = np.int8(0), np.int8(1), np.int8(2)
 _MOST_CHOICES = 64
@@ -58,6 +58,12 @@ _MOST_CHOICES = 64
 
 Numbers: TypeAlias = NDArray[np.float64]
 _Data: TypeAlias = "Numbers | NDArray[np.bool_] | tuple[Numbers, Numbers] | list[Value]"
+
+
+def reads_start(condition: Node) -> bool:
+    """Whether an expanded condition over time hangs on what was observed at the first sample."""
+    nodes = postorder((condition,))
+    return any(isinstance(node, Feature) and not node.current and node.property not in FIXED for node in nodes)
 
 
 class HiddenVariable(Exception):
@@ -99,16 +105,18 @@ class AtomColumns:
         scenario: The scenario.
         samples: The samples.
         assignment: Values of random variables.
+        start: For each sample the first one of its run, at which what is not current is read; None where each is one.
     """
 
     scenario: Scenario
     samples: Observed
     assignment: Mapping[Identity, Value] = field(default_factory=dict["Identity", "Value"])
+    start: NDArray[np.int64] | None = None
     _features: dict[tuple[int, str], _Column | None] = field(default_factory=dict["tuple[int, str]", "_Column | None"])
 
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
         """The same with values of random variables; what is observed is shared."""
-        return AtomColumns(self.scenario, self.samples, assignment, self._features)
+        return AtomColumns(self.scenario, self.samples, assignment, self.start, self._features)
 
     def expanded(self, condition: Node) -> Node:
         """A condition with the program's own value of what no label observes and what does not change."""
@@ -186,7 +194,9 @@ class AtomColumns:
             case Feature():
                 found = self._feature(node)
                 n = len(self.samples)
-                return found if found is not None else _Column(np.full(n, np.nan), np.full(n, _UNKNOWN))
+                if found is None:
+                    return _Column(np.full(n, np.nan), np.full(n, _UNKNOWN))
+                return found if node.current or self.start is None else self._as_at(self.start, found)
             case DirectionAt():
                 return self._direction(node, args, chosen[id(node)])
             case Logic():
@@ -211,6 +221,15 @@ class AtomColumns:
             return _Column((np.full(n, value[0]), np.full(n, value[1])), status)
         values: list[Value] = [value] * n
         return _Column(values, status)
+
+    def _as_at(self, start: NDArray[np.int64], column: _Column) -> _Column:
+        """The values at some samples."""
+        data = column.data
+        if isinstance(data, tuple):
+            return _Column((data[0][start], data[1][start]), column.status[start])
+        if isinstance(data, list):
+            return _Column([data[sample] for sample in start.tolist()], column.status[start])
+        return _Column(data[start], column.status[start])
 
     def _feature(self, node: Feature) -> _Column | None:
         """What is observed of a feature; None if no sample has it."""

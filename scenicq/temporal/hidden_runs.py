@@ -80,7 +80,7 @@ class HiddenRuns:
             if known is not None and not thin[mine].any():
                 continue
             one = stretches.some(np.arange(places.start, places.stop))
-            own = AtomColumns(self.scenario, one.places)
+            own = AtomColumns(self.scenario, one.places, start=one.heads())
             found.put(mine, [*self._of_binding(one, own, expanded, variables, joint, remember, details)], places.start)
         return found, details
 

@@ -22,7 +22,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.tracks import TrackKey
-from scenicq.temporal.atoms import AtomColumns
+from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
 from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
 from scenicq.temporal.presence import by_presence
@@ -111,7 +111,10 @@ class IntervalMatcher:
 
     def __post_init__(self) -> None:
         """Make ready what the program says about time."""
-        self._runs = None if self.scenario.dynamics is None else RunColumns(self.scenario.dynamics)
+        dynamics = self.scenario.dynamics
+        self._runs = None if dynamics is None else RunColumns(dynamics)
+        # what is read at the start of a run is another value for each
+        self._apart = dynamics is not None and any(map(reads_start, dynamics.conditions))
 
     def intervals(self, table: StartTable, remember: Callable[[int], Remembered]) -> list[Interval]:
         """What became of each binding: the intervals to report, or else the one that came furthest.
@@ -127,7 +130,7 @@ class IntervalMatcher:
         table = table.chosen(order)
         parts = [
             part
-            for stretches in stretches_of(table, self.options.gap_s)
+            for stretches in stretches_of(table, self.options.gap_s, apart=self._apart)
             for part in self._followed(stretches, table, lambda number: remember(int(order[number])))
         ]
         found = [each for part in self._reported(parts, table, bindings) for each in part]
@@ -144,7 +147,7 @@ class IntervalMatcher:
             return
         for chosen_ in by_presence(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
             some = stretches if len(chosen_) == len(stretches.labels) else stretches.some(chosen_)
-            columns = AtomColumns(self.scenario, some.places)
+            columns = AtomColumns(self.scenario, some.places, start=some.heads())
             expanded = [columns.expanded(condition) for condition in dynamics.conditions]
             yield self._dynamic(some, table, columns, expanded, remember)
 

@@ -13,10 +13,13 @@ from scenicq.forest.nodes import Value
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
-__all__ = ["MOVING", "WITH_COLUMNS", "Binding", "Observed", "Places", "Samples"]
+__all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "Observed", "Places", "Samples"]
 
 MOVING = frozenset({"position", "heading", "velocity", "speed", "angularSpeed", "acceleration"})
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
+
+FIXED = frozenset({"width", "length", "height"})
+"""Properties that are the same at each sample."""
 
 _COLUMNS = {
     "heading": "heading", "width": "width", "length": "length", "height": "height",

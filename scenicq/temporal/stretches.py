@@ -70,6 +70,10 @@ class Stretches:
     starts: Members
     numbers: Members
 
+    def heads(self) -> Members:
+        """For each place the first one of its stretch."""
+        return np.repeat(self.bounds[:-1], np.diff(self.bounds))
+
     def ends(self) -> Members:
         """For each start the last place of its stretch."""
         return self.bounds[np.searchsorted(self.bounds, self.starts, side="right")] - 1
@@ -100,12 +104,13 @@ class Stretches:
             )
 
 
-def stretches_of(table: StartTable, gap_s: float) -> Iterator[Stretches]:
+def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[Stretches]:
     """The stretches that starts make, so many at a time that they stay in memory.
 
     Args:
         table: Starts, sorted by binding, then by label; no two objects of one play the same track.
         gap_s: Seconds without a label after which a track's life ends.
+        apart: Whether each start makes a stretch of its own.
     """
     if not len(table):
         return
@@ -113,7 +118,7 @@ def stretches_of(table: StartTable, gap_s: float) -> Iterator[Stretches]:
     tracks = {index: block.tracks(mine) for index, mine in table.members.items()}
     seen = _Seen(block, np.unique(np.concatenate([*tracks.values()])), gap_s)
     ends = np.minimum.reduce([seen.life_ends(mine, labels) for mine in tracks.values()])
-    changes = np.zeros(len(table), np.bool_)
+    changes = np.full(len(table), apart)
     changes[0] = True
     for mine in (*tracks.values(), ends):
         changes[1:] |= mine[1:] != mine[:-1]
