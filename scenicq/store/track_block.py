@@ -89,8 +89,8 @@ class TrackBlock:
         for number, (first, end) in enumerate(self.runs):
             self.recording_of[first:end] = number
         self._numbers: dict[str, Numbers] = {}
-        self._said: tuple[NDArray[np.int32], list[Mapping[str, Any]]] | None = None
-        self._categories: tuple[NDArray[np.int32], list[str]] | None = None
+        self._said: tuple[NDArray[np.int64], list[Mapping[str, Any]]] | None = None
+        self._categories: tuple[NDArray[np.int64], list[str]] | None = None
         self._texts: dict[str, Any] = {}
         self._tracks: Integers | None = None
         self._names: list[str] = []
@@ -131,15 +131,15 @@ class TrackBlock:
             self._numbers[name] = np.concatenate((_reals(objects), _reals(egos), [np.nan]))
         return self._numbers[name]
 
-    def said(self) -> tuple[NDArray[np.int32], list[Mapping[str, Any]]]:
+    def said(self) -> tuple[NDArray[np.int64], list[Mapping[str, Any]]]:
         """What labels say beside the columns: by member the number of one of the distinct answers, and these."""
         if self._said is None:
             objects, egos = self._pair("attributes")
             codes, texts = _codes(pa.chunked_array([*objects.chunks, *egos.chunks]))
-            self._said = np.append(codes, len(texts)).astype(np.int32), [*map(json.loads, texts), {}]
+            self._said = np.append(codes, len(texts)).astype(np.int64), [*map(json.loads, texts), {}]
         return self._said
 
-    def categories(self) -> tuple[NDArray[np.int32], list[str]]:
+    def categories(self) -> tuple[NDArray[np.int64], list[str]]:
         """By member the number of its class, and the classes."""
         if self._categories is None:
             objects, egos = self._pair("class")
@@ -221,13 +221,13 @@ class TrackBlock:
         return self._objects_column(name), egos
 
 
-def _codes(column: Any) -> tuple[NDArray[np.int32], list[str]]:
+def _codes(column: Any) -> tuple[NDArray[np.int64], list[str]]:
     """Numbers of distinct texts, and these; null has the number behind the last."""
     encoded = column.dictionary_encode().unify_dictionaries().combine_chunks()
     if isinstance(encoded, pa.ChunkedArray):
         encoded = encoded.chunk(0) if encoded.num_chunks else pa.array([], pa.string()).dictionary_encode()
     texts: list[str] = encoded.dictionary.to_pylist()
-    return encoded.indices.fill_null(len(texts)).to_numpy(zero_copy_only=False).astype(np.int32), texts
+    return encoded.indices.fill_null(len(texts)).to_numpy(zero_copy_only=False).astype(np.int64), texts
 
 
 def _reals(column: Any) -> Numbers:

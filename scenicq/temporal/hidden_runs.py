@@ -72,14 +72,15 @@ class HiddenRuns:
         known = None if joint else thresholds_of(self.runs, stretches, columns, expanded, variables)
         found = Runs.unknown(stretches.starts.copy())
         details: Details = {}
+        thin = np.ones(len(stretches.starts), np.bool_)
         if known is not None:
             found, thin = known.runs, known.thin
             for number, value in zip(stretches.numbers.tolist(), known.values.tolist(), strict=True):
                 details[number] = "", {_place(variables[0]): value}
         for places, mine in stretches.apart():
-            if known is not None and not thin[mine].any():
+            if not thin[mine].any():
                 continue
-            one = stretches.some(np.arange(places.start, places.stop))
+            one = stretches.some(np.arange(int(places.start), int(places.stop), dtype=np.int64))
             own = AtomColumns(self.scenario, one.places, start=one.heads())
             found.put(mine, [*self._of_binding(one, own, expanded, variables, joint, remember, details)], places.start)
         return found, details

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.errors import Span
-from scenicq.forest.nodes import Node
+from scenicq.forest.condition import expand
+from scenicq.forest.nodes import Feature, Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.match.options import MatchOptions
@@ -27,6 +28,7 @@ from scenicq.temporal.hidden import random_variables
 from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
 from scenicq.temporal.presence import by_presence
 from scenicq.temporal.run_columns import RunColumns, Runs
+from scenicq.temporal.samples import MOVING
 from scenicq.temporal.selection import Intervals, chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -114,7 +116,14 @@ class IntervalMatcher:
         dynamics = self.scenario.dynamics
         self._runs = None if dynamics is None else RunColumns(dynamics)
         # what is read at the start of a run is another value for each
-        self._apart = dynamics is not None and any(map(reads_start, dynamics.conditions))
+        still = [] if dynamics is None else [expand(each, self._own_value) for each in dynamics.conditions]
+        self._apart = any(map(reads_start, still))
+
+    def _own_value(self, feature: Feature) -> Node | None:
+        """What the program says of a property that does not change, should no label tell."""
+        if feature.property in MOVING:
+            return None
+        return self.scenario.objects[feature.object].properties[feature.property].value
 
     def intervals(self, table: StartTable, remember: Callable[[int], Remembered]) -> list[Interval]:
         """What became of each binding: the intervals to report, or else the one that came furthest.
@@ -177,10 +186,13 @@ class IntervalMatcher:
         """What is reported of each binding."""
         if not parts:
             return
-        starts, ends, truth, origins, broken, cut_off = (
+        starts, ends, truth, origins, cut_off = (
             np.concatenate([getattr(part, name) for part in parts])
-            for name in ("starts", "ends", "truth", "origins", "broken", "cut_off")
+            for name in ("starts", "ends", "truth", "origins", "cut_off")
         )
+        broken: list[Span | None] = []
+        for part in parts:
+            broken += part.broken.tolist()
         details = {number: each for part in parts for number, each in part.details.items()}
         times = table.block.times_us
         lasting = (times[ends] - times[starts]) / 1e6
@@ -189,17 +201,18 @@ class IntervalMatcher:
         groups = bindings[origins][order]
         for mine in np.split(order, np.flatnonzero(np.diff(groups)) + 1):
             kept = mine[chosen(starts[mine], ends[mine], truth[mine], lasting[mine], self.options.intervals, least)]
-            found = truth
-            if not len(kept):
+            matches = len(kept) > 0
+            if not matches:
                 # what was cut off might have matched; else what was matched but is too short, else what came furthest
                 rank = np.lexsort((-starts[mine], ends[mine] - starts[mine], truth[mine], cut_off[mine]))
-                kept, found = mine[rank[-1:]], np.zeros_like(truth)
+                kept = mine[rank[-1:]]
+            verdicts = truth[kept] if matches else np.full(1, FALSE)
             yield [
                 self._interval(
-                    table, int(origins[each]), (int(starts[each]), int(ends[each])), int(found[each]),
+                    table, int(origins[each]), (int(starts[each]), int(ends[each])), int(verdict),
                     details.get(int(origins[each]), ("", {})), broken[each], cut_off=bool(cut_off[each]),
                 )
-                for each in kept.tolist()
+                for each, verdict in zip(kept.tolist(), verdicts.tolist(), strict=True)
             ]  # fmt: skip
 
     def _interval(

@@ -123,6 +123,7 @@ class StartSearch:
         out, sure = np.zeros(n, np.bool_), np.ones(n, np.bool_)
         may = dict(cast.may)
         for role, requirements in self.plain.items():
+            chosen = np.empty(0, np.int64)
             if role == scenario.ego:
                 members, where = {role: block.ego(cast.labels)}, np.arange(n)
             else:
@@ -141,12 +142,12 @@ class StartSearch:
             gone = np.flatnonzero(~kept & ~out)
             first = np.full(n, -1)
             first[where[::-1]] = first_broken[::-1]
-            for number, count in zip(*np.unique(first[gone], return_counts=True), strict=True):
-                if number >= 0:
-                    requirement = requirements[number]
+            for number, requirement in enumerate(requirements):
+                mine = gone[first[gone] == number]
+                if len(mine):
                     condition = Condition(requirement, requirement.condition)
-                    failed[describe_constraint(scenario, condition)] += int(count)
-                    out[gone[first[gone] == number]] = True
+                    failed[describe_constraint(scenario, condition)] += len(mine)
+                    out[mine] = True
         cast = Cast(cast.labels, cast.members, may)
         starts, decided = self._correspondences(block, cast, np.flatnonzero(sure & ~out))
         left = ~out

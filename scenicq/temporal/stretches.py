@@ -131,7 +131,7 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[St
         sizes = lengths[first:last]
         bounds = np.concatenate(([0], np.cumsum(sizes)))
         which = np.repeat(np.arange(len(sizes)), sizes)
-        at = labels[heads[first:last]][which] + np.arange(bounds[-1]) - bounds[which]
+        at: Members = labels[heads[first:last]][which] + np.arange(int(bounds[-1])) - bounds[which]
         members = {index: seen.members(mine[heads[first:last]][which], at) for index, mine in tracks.items()}
         low, high = int(heads[first]), int(heads[last]) if last < len(heads) else len(table)
         mine = np.searchsorted(heads, np.arange(low, high), side="right") - 1 - first

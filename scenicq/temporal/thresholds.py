@@ -228,8 +228,8 @@ class _Reader:
             return _Sets.where(self.columns.truth_of(node if positive else Logic(LogicOp.NOT, (node,))) >= level)
         if isinstance(node, Logic):
             if node.op is LogicOp.NOT:
-                return self._condition(node.operands[0], level, positive=not positive)
-            parts = [self._condition(part, level, positive=positive) for part in node.operands]
+                return self._condition(node.args[0], level, positive=not positive)
+            parts = [self._condition(part, level, positive=positive) for part in node.args]
             return _combined(parts, _Sets.both if (node.op is LogicOp.AND) == positive else _Sets.either)
         if not isinstance(node, Compare):
             raise _NoInterval

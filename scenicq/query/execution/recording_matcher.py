@@ -123,7 +123,8 @@ class RecordingMatcher:
         cast = self._cast(block, labels, left)
         sure = np.ones(len(labels), np.bool_)
         codes, classes = block.categories()
-        if cast is not None and all(classes[code] for code in np.unique(codes[block.ego(labels)]).tolist()):
+        own: list[int] = np.unique(codes[block.ego(labels)]).tolist()
+        if cast is not None and all(classes[code] for code in own):
             starts = self._search.decide(block, cast)
             arrays, cast, sure = starts.members, starts.left, starts.sure
             labels = cast.labels
@@ -156,7 +157,7 @@ class RecordingMatcher:
         members = _objects_of(block, labels)
         codes, classes = block.categories()
         fits: dict[str, NDArray[np.bool_]] = {}
-        may = {}
+        may: dict[int, NDArray[np.bool_]] = {}
         for thing in scenario.objects:
             if thing.index != scenario.ego:
                 if thing.category not in fits:

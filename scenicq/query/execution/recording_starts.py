@@ -130,7 +130,7 @@ def _object(block: TrackBlock, member: int, id_: str, relevant: frozenset[str]) 
     codes, classes = block.categories()
     said_codes, said = block.said()
     return LabelObject(
-        id_, classes[codes[member]], "",
+        id_, classes[int(codes[member])], "",
         float(block.numbers("x")[member]), float(block.numbers("y")[member]), number("heading"),
-        number("width"), number("length"), number("height"), None, None, said[said_codes[member]], motion,
+        number("width"), number("length"), number("height"), None, None, said[int(said_codes[member])], motion,
     )  # fmt: skip
