@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,7 +193,7 @@ class IntervalMatcher:
         )
         broken: list[Span | None] = []
         for part in parts:
-            broken += part.broken.tolist()
+            broken.extend(cast("list[Span | None]", part.broken.tolist()))
         details = {number: each for part in parts for number, each in part.details.items()}
         times = table.block.times_us
         lasting = (times[ends] - times[starts]) / 1e6
@@ -206,13 +207,14 @@ class IntervalMatcher:
                 # what was cut off might have matched; else what was matched but is too short, else what came furthest
                 rank = np.lexsort((-starts[mine], ends[mine] - starts[mine], truth[mine], cut_off[mine]))
                 kept = mine[rank[-1:]]
-            verdicts = truth[kept] if matches else np.full(1, FALSE)
+            numbers: list[int] = kept.tolist()
+            verdicts: list[int] = truth[kept].tolist() if matches else [int(FALSE)]
             yield [
                 self._interval(
-                    table, int(origins[each]), (int(starts[each]), int(ends[each])), int(verdict),
+                    table, int(origins[each]), (int(starts[each]), int(ends[each])), verdict,
                     details.get(int(origins[each]), ("", {})), broken[each], cut_off=bool(cut_off[each]),
                 )
-                for each, verdict in zip(kept.tolist(), verdicts.tolist(), strict=True)
+                for each, verdict in zip(numbers, verdicts, strict=True)
             ]  # fmt: skip
 
     def _interval(

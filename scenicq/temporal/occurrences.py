@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next, Not, Or, Until, operands
+from scenicq.temporal.folding import folded
 from scenicq.temporal.truth import TRUE, Truth, negated
 
 __all__ = ["Clause", "Kind", "Part", "bounds", "clauses_of", "joined", "next_at", "present_value"]
@@ -67,17 +68,35 @@ def clauses_of(formula: Formula, *, positive: bool = True) -> list[Clause] | Non
         formula: The formula.
         positive: Whether it shall hold, or not.
     """
+    return folded((formula, positive), _clause_parts, _clauses)
+
+
+def _clause_parts(asked: tuple[Formula, bool]) -> list[tuple[Formula, bool]]:
+    """What the clauses of a formula are made of; those of formulas without operators of time are their own."""
+    formula, positive = asked
+    if isinstance(formula, Not):
+        return [(formula.operand, not positive)]
+    if isinstance(formula, And | Or) and not _is_plain(formula):
+        return [(part, positive) for part in formula.operands]
+    return []
+
+
+def _clauses(asked: tuple[Formula, bool], parts: list[list[Clause] | None]) -> list[Clause] | None:
+    """The clauses of a formula, given those of its parts."""
+    formula, positive = asked
     if _is_plain(formula):
         return [(Part(Kind.NOW, formula, positive),)]
     match formula:
         case Not():
-            return clauses_of(formula.operand, positive=not positive)
+            return parts[0]
         case And() | Or():
-            parts = [clauses_of(part, positive=positive) for part in formula.operands]
             known = [part for part in parts if part is not None]
             if len(known) < len(parts):
                 return None
-            return joined(known) if isinstance(formula, And) == positive else [c for part in known for c in part]
+            if isinstance(formula, And) == positive:
+                return joined(known)
+            either = [clause for part in known for clause in part]
+            return either if len(either) <= _MOST_CLAUSES else None
         case Always() | Eventually() | Next():
             if not _is_plain(formula.operand):
                 return None
@@ -119,17 +138,21 @@ def _is_plain(formula: Formula) -> bool:
 
 def present_value(formula: Formula, atom: Callable[[Atom], Truth]) -> Truth:
     """The value of a formula without operators of time at each place."""
-    match formula:
-        case Atom():
-            return atom(formula)
-        case Not():
-            return negated(present_value(formula.operand, atom))
-        case And():
-            return np.minimum.reduce([present_value(part, atom) for part in formula.operands])
-        case Or():
-            return np.maximum.reduce([present_value(part, atom) for part in formula.operands])
-        case _:
-            raise ValueError("an operator of time inside another")
+
+    def value(node: Formula, parts: list[Truth]) -> Truth:
+        match node:
+            case Atom():
+                return atom(node)
+            case Not():
+                return negated(parts[0])
+            case And():
+                return np.minimum.reduce(parts)
+            case Or():
+                return np.maximum.reduce(parts)
+            case _:
+                raise ValueError("an operator of time inside another")
+
+    return folded(formula, operands, value)
 
 
 def next_at(holds: NDArray[np.bool_]) -> Places:

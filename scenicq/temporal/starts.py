@@ -21,7 +21,7 @@ from scenicq.forest.walk import features, leaves
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.compiled_expressions import Column, Columns, Get, UnclearError
 from scenicq.match.matcher import Matcher
-from scenicq.match.problem.constraints import describe_constraint
+from scenicq.match.problem.constraints import Signature, describe_constraint
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.search.group_plan import MatchPlan, relevant_properties
 from scenicq.store.track_block import TrackBlock
@@ -72,6 +72,28 @@ class Starts:
 
 
 @dataclass(eq=False)
+class _Rest(Matcher):
+    """The matcher without requirements that are known to hold; they still tell objects apart.
+
+    Attributes:
+        whole: The matcher with them.
+    """
+
+    whole: Matcher = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        """What matters of a label is what mattered before."""
+        super().__post_init__()
+        self._relevant = relevant_properties(self.whole.scenario, self.whole.options)
+
+    def plan(self, signature: Signature) -> MatchPlan:
+        """The groups that are left for a signature."""
+        if signature not in self._plans:
+            self._plans[signature] = replace(super().plan(signature), twins=self.whole.plan(signature).twins)
+        return self._plans[signature]
+
+
+@dataclass(eq=False)
 class StartSearch:
     """A scenario made ready.
 
@@ -102,11 +124,11 @@ class StartSearch:
         if self.plain:
             mine = {id(requirement) for found in self.plain.values() for requirement in found}
             left = tuple(each for each in scenario.requirements if id(each) not in mine)
-            self.rest = Matcher(replace(scenario, requirements=left), options, self.matcher.solver)
+            self.rest = _Rest(replace(scenario, requirements=left), options, self.matcher.solver, whole=self.matcher)
         compared = {name for name, given in scenario.params.items() if given.explicit}
         # parameters are the labels' own, and not in arrays
         self._arrays = self._arrays and not compared - options.ignore_params
-        self._relevant = relevant_properties(self.rest.scenario, self.rest.options)
+        self._relevant = relevant_properties(scenario, options)
 
     def decide(self, block: TrackBlock, cast: Cast) -> Starts:
         """Find the labels that are starts.

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.nodes import Compare, CompareOp, DiscreteRange, Index, Leaf, Logic, LogicOp, Node
-from scenicq.forest.temporal import And, Atom, Formula, Not, Or
+from scenicq.forest.temporal import And, Atom, Formula, Not, Or, operands
 from scenicq.forest.walk import leaves
 from scenicq.temporal.atoms import AtomColumns
+from scenicq.temporal.folding import folded
 from scenicq.temporal.hidden import UnclearVariable, affine_sides, inside, support
 from scenicq.temporal.occurrences import Clause, Kind, Part, bounds
 from scenicq.temporal.run_columns import RunColumns, Runs, ends_of
@@ -133,7 +134,7 @@ def thresholds_of(
         starts = stretches.starts
         n = len(starts)
         truth, values = np.full(n, FALSE), np.full(n, math.nan)
-        thin = unclear.copy()
+        thin = np.zeros(n, np.bool_)
         for level in (UNKNOWN, TRUE):
             for clause in runs.together:
                 found = reader.clause(clause, int(level), starts, ends)
@@ -158,7 +159,7 @@ def thresholds_of(
             broken[left] = runs.dynamics.requirements[-1].span
     except (_NoInterval, UnclearVariable):
         return None
-    return Thresholds(Runs(ends, truth, broken, over), values, thin & ~over)
+    return Thresholds(Runs(ends, truth, broken, over), values, unclear | (thin & ~over))
 
 
 @dataclass(eq=False, slots=True)
@@ -209,31 +210,51 @@ class _Reader:
 
     def _formula(self, formula: Formula, level: int, *, positive: bool) -> _Sets:
         """The numbers for which a formula without operators of time has at least a truth value at each place."""
-        if not positive:
-            return self._formula(formula, int(TRUE) + 1 - level, positive=True).others()
-        match formula:
-            case Atom():
-                return self._condition(self.expanded[formula.number], level, positive=True)
-            case Not():
-                return self._formula(formula.operand, level, positive=False)
-            case And() | Or():
-                parts = [self._formula(part, level, positive=True) for part in formula.operands]
-                return _combined(parts, _Sets.both if isinstance(formula, And) else _Sets.either)
-            case _:
-                raise _NoInterval
+        # of a negation the other level is asked: it holds as surely as what it negates fails
+        least = level if positive else int(TRUE) + 1 - level
 
-    def _condition(self, node: Node, level: int, *, positive: bool) -> _Sets:
+        def below(asked: tuple[Formula, int]) -> list[tuple[Formula, int]]:
+            node, wanted = asked
+            return [(part, int(TRUE) + 1 - wanted if isinstance(node, Not) else wanted) for part in operands(node)]
+
+        def sets(asked: tuple[Formula, int], parts: list[_Sets]) -> _Sets:
+            node, wanted = asked
+            match node:
+                case Atom():
+                    return self._condition(self.expanded[node.number], wanted)
+                case Not():
+                    return parts[0].others()
+                case And() | Or():
+                    return _combined(parts, _Sets.both if isinstance(node, And) else _Sets.either)
+                case _:
+                    raise _NoInterval
+
+        found = folded((formula, least), below, sets)
+        return found if positive else found.others()
+
+    def _condition(self, root: Node, level: int) -> _Sets:
         """The same for a condition; what is undefined is undefined negated, too."""
-        if not leaves(node):
-            return _Sets.where(self.columns.truth_of(node if positive else Logic(LogicOp.NOT, (node,))) >= level)
-        if isinstance(node, Logic):
+
+        def below(asked: tuple[Node, bool]) -> list[tuple[Node, bool]]:
+            node, positive = asked
+            if not isinstance(node, Logic) or not leaves(node):
+                return []
+            return [(part, positive != (node.op is LogicOp.NOT)) for part in node.args]
+
+        def sets(asked: tuple[Node, bool], parts: list[_Sets]) -> _Sets:
+            node, positive = asked
+            if not leaves(node):
+                truth = self.columns.truth_of(node if positive else Logic(LogicOp.NOT, (node,)))
+                return _Sets.where(truth >= level)
+            if isinstance(node, Compare):
+                return self._comparison(node, level, positive=positive)
+            if not isinstance(node, Logic):
+                raise _NoInterval
             if node.op is LogicOp.NOT:
-                return self._condition(node.args[0], level, positive=not positive)
-            parts = [self._condition(part, level, positive=positive) for part in node.args]
+                return parts[0]
             return _combined(parts, _Sets.both if (node.op is LogicOp.AND) == positive else _Sets.either)
-        if not isinstance(node, Compare):
-            raise _NoInterval
-        return self._comparison(node, level, positive=positive)
+
+        return folded((root, True), below, sets)
 
     def _comparison(self, node: Compare, level: int, *, positive: bool) -> _Sets:
         if node.op in (CompareOp.EQ, CompareOp.NE):
@@ -269,15 +290,14 @@ def _combined(parts: Sequence[_Sets], combine: Callable[[_Sets, _Sets], _Sets]) 
 
 
 def _atoms(formula: Formula) -> list[Atom]:
-    match formula:
-        case Atom():
-            return [formula]
-        case Not():
-            return _atoms(formula.operand)
-        case And() | Or():
-            return [atom for part in formula.operands for atom in _atoms(part)]
-        case _:
-            return []
+    found: list[Atom] = []
+    stack = [formula]
+    while stack:
+        node = stack.pop()
+        stack.extend(operands(node))
+        if isinstance(node, Atom):
+            found.append(node)
+    return found
 
 
 def _between(combine: np.ufunc, values: Numbers, starts: Places, ends: Places) -> Numbers:

@@ -80,7 +80,7 @@ class RecordingMatcher:
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
         self._search = StartSearch(self.matcher)
-        self._relevant = relevant_properties(self._search.rest.scenario, self._search.rest.options)
+        self._relevant = relevant_properties(self.matcher.scenario, self.matcher.options)
 
     def decide(self, rows: Block, left: Survivors) -> DecidedRecordings:
         """Decide a block of whole recordings.
