@@ -73,10 +73,12 @@ conformance-time: $(READY) ## Match what Scenic 3.1.1 simulates over time (MAP=a
 	$(BIN)/python tests/conformance/traces.py $(if $(SCENIC),--checkout $(SCENIC),--map $(MAP)) --seeds $(TRACES)
 
 MINUTES ?= 60
-fuzz: $(READY) ## Attack with hostile programs, datasets and kills, MINUTES=60 of each
+fuzz: $(READY) ## Attack with hostile programs, datasets, sources and kills, MINUTES=60 of each
 	$(BIN)/python tests/fuzz/hostile_programs.py --minutes $(MINUTES) --seed $(SEED)
 	$(BIN)/python tests/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/importers/fuzzing/fuzz.py --minutes $(MINUTES) --seed $(SEED)
 	$(BIN)/python tests/fuzz/kills.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/fuzz/differential.py --minutes $(MINUTES) --seed $(SEED)
 
 MUTATIONS ?= 200
 mutate: $(READY) ## Change the code in MUTATIONS=200 small ways and count which the fast tests notice
