@@ -114,7 +114,7 @@ STARTS = (
 @pytest.mark.parametrize("prefilter", [False, True])
 def test_starts_from_arrays_are_the_matchers(tmp_path, monkeypatch, more, prefilter):
     draw = random.Random(5)
-    traces = {f"r{number}": random_trace(draw, gaps=True) for number in range(12)}
+    traces = {f"r{number}": random_trace(draw, gaps=True) for number in range(10)}
     write_dataset(tmp_path / "d", [recording_of(*each) for each in traces.items()], {}, name="d")
     head = "ego = new Object at (Range(-999, 999), Range(-999, 999)), facing 0\n"
     head += "a = new Object at (Range(-999, 999), Range(-999, 999)), facing 0\n"
