@@ -27,32 +27,15 @@ from scenicq.store.tracks import TrackKey
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
 from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
+from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.presence import by_presence
 from scenicq.temporal.run_columns import RunColumns, Runs
 from scenicq.temporal.samples import MOVING
-from scenicq.temporal.selection import Intervals, chosen
+from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["DEFAULT_GAP_S", "Interval", "IntervalMatcher", "IntervalOptions"]
-
-DEFAULT_GAP_S = 1.5
-"""Seconds without a label after which a track's life ends."""
-
-
-@dataclass(frozen=True, slots=True)
-class IntervalOptions:
-    """How intervals are looked for.
-
-    Attributes:
-        intervals: Of overlapping ones the longest, or all.
-        min_duration_s: How long an interval must be at least; None for a static program that is matched frame by frame.
-        gap_s: Seconds without a label after which a track's life ends.
-    """
-
-    intervals: Intervals = "longest"
-    min_duration_s: float | None = None
-    gap_s: float = DEFAULT_GAP_S
+__all__ = ["Interval", "IntervalMatcher"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.temporal.interval_options import Intervals
 from scenicq.temporal.truth import FALSE, Truth
 
-__all__ = ["Intervals", "chosen"]
-
-Intervals = Literal["longest", "all"]
-"""Of overlapping intervals the longest, the earliest of equals; or all."""
+__all__ = ["chosen"]
 
 
 def chosen(

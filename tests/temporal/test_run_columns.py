@@ -14,7 +14,7 @@ from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset
 from scenicq.temporal import hidden_runs
-from scenicq.temporal.intervals import IntervalOptions
+from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.run_columns import RunColumns
 from scenicq.temporal.runs import runs_from
 from scenicq.temporal.starts import StartSearch
