@@ -175,7 +175,7 @@ class Dataset:
             return shortened(connection)
 
     def labels_at(self, part: int, first: int, end: int, *, motion: bool = True) -> Iterator[Label]:
-        """Labels of one part, in order.
+        """Labels of one part, in order, as matching sees them: without heights, tilts and cameras.
 
         Args:
             part: Number of the part.
@@ -185,7 +185,8 @@ class Dataset:
         """
         labels, objects, sensors = (self.files(table)[part] for table in ("labels", "objects", "sensors"))
         with self.blamed():
-            yield from read_labels([(labels, objects, sensors)], np.arange(first, end), None, motion=motion)
+            parts = [(labels, objects, sensors)]
+            yield from read_labels(parts, np.arange(first, end), None, motion=motion, space=False)
 
     def verify(self) -> None:
         """Compare every file with its checksum.

@@ -19,6 +19,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
+from scenicq.store.camera_rows import CAMERA_COLUMNS, camera_problem, cameras_of
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M, ArrowTable
 from scenicq.store.validation import invalid
 
@@ -46,6 +47,7 @@ def check_part(tables: Mapping[str, ArrowTable], names: Mapping[str, str], maps:
         _check_copies(tables[table], labels, owners[table], names[table])
     _check_objects(tables["objects"], labels, owners["objects"], names["objects"])
     _check_unique(tables["sensors"], "channel", owners["sensors"], names["sensors"])
+    _check_cameras(tables["sensors"], names["sensors"])
     _check_class_counts(labels, tables["objects"], owners["objects"], file)
     _check_memberships(tables, names, owners["objects"])
 
@@ -139,6 +141,20 @@ def _check_unique(rows: ArrowTable, column: str, owner: NDArray[np.int64], file:
     again = np.ones(len(pairs), dtype=bool)
     again[first] = False
     _refuse(again, "occurs twice in a label", file, column)
+
+
+def _check_cameras(rows: ArrowTable, file: str) -> None:
+    """A sensor file has a whole camera, or nothing of one."""
+    wide, high, seen, pose = CAMERA_COLUMNS
+    there = _flags(pc.is_valid(rows[wide]))
+    _refuse(_flags(pc.is_valid(rows[high])) != there, "is there without the width, or is not", file, high)
+    for name, numbers in ((seen, 4), (pose, 7)):
+        wrong = pc.list_value_length(rows[name]).to_numpy() != np.where(there, numbers, 0)
+        _refuse(wrong, f"has not the {numbers} numbers of a camera, or has numbers without one", file, name)
+    where = np.flatnonzero(there)
+    for row, camera in zip(where.tolist(), cameras_of(rows.take(pa.array(where))), strict=True):
+        if camera is not None and (problem := camera_problem(camera)) is not None:
+            invalid(file, problem, row)
 
 
 def _check_class_counts(labels: ArrowTable, objects: ArrowTable, owner: NDArray[np.int64], file: str) -> None:
