@@ -24,8 +24,8 @@ class Camera(NamedTuple):
         width, height: Of the image, pixels.
         intrinsics: Focal lengths fx, fy and principal point cx, cy, pixels.
         position: x, y, z of the lens, metres, frame of the map.
-        rotation: Unit quaternion w, x, y, z that turns the camera's frame (x to the right of the image, y down, z ahead)
-            into that of the map.
+        rotation: Unit quaternion w, x, y, z that turns the camera's frame (x right in the image, y down, z ahead) into
+            that of the map.
     """
 
     width: int
@@ -58,7 +58,8 @@ def box_corners(
         center: Metres.
         size: Width, length and height, metres.
         heading: Radians, 0 along +y, counter-clockwise.
-        pitch, roll: Radians about the box's axis to the left, and about that ahead.
+        pitch: Radians about the box's axis to the left.
+        roll: Radians about its axis ahead.
     """
     width, length, height = size
     sp, cp, sr, cr = math.sin(pitch), math.cos(pitch), math.sin(roll), math.cos(roll)

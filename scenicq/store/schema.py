@@ -43,7 +43,7 @@ UPGRADABLE = frozenset({2, 3})
 """Older versions of which `scenicq index` makes this one: it computes anew what is computed."""
 
 ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}
-"""Columns of the source that came with a version (those of egos begin with `ego_`); older datasets know nothing there."""
+"""Columns of the source that came with a version (of egos with `ego_` before); older datasets know nothing there."""
 
 MEMBERSHIP_RADIUS_M = 2.0
 """`memberships` lists the regions within this distance: a position tolerance up to it can be prefiltered."""
