@@ -28,13 +28,14 @@ class Centres:
     Attributes:
         frame: Number of the frame.
         category: Number of the class.
-        x, y: Centre, metres.
+        x, y, z: Centre, metres; z is 0 everywhere where distances are those in the plane.
     """
 
     frame: NDArray[np.int32]
     category: NDArray[np.int32]
     x: Reals
     y: Reals
+    z: Reals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +67,7 @@ def find_pairs(predictions: Centres, objects: Centres, reach_m: float, *, neares
         joined = "FROM predictions p JOIN objects o ON p.frame = o.frame AND p.category = o.category"
         if nearest_only:
             # a pair of numbers is compared by the first, then by the second
-            square = "(p.x - o.x) * (p.x - o.x) + (p.y - o.y) * (p.y - o.y)"
+            square = " + ".join(f"(p.{axis} - o.{axis}) * (p.{axis} - o.{axis})" for axis in "xyz")
             found = connection.execute(
                 f"SELECT prediction, least.number AS object, sqrt(least.square) AS distance FROM "
                 f"(SELECT p.number AS prediction, min({{square: {square}, number: o.number}}) AS least {joined} "
@@ -74,11 +75,11 @@ def find_pairs(predictions: Centres, objects: Centres, reach_m: float, *, neares
             ).fetchnumpy()
             return Pairs(_numbers(found["prediction"]), _numbers(found["object"]), np.asarray(found["distance"]))
         found = connection.execute(
-            f"SELECT p.number AS prediction, o.number AS object, p.x - o.x AS dx, p.y - o.y AS dy {joined} "
-            "WHERE abs(p.x - o.x) < $reach AND abs(p.y - o.y) < $reach",
+            "SELECT p.number AS prediction, o.number AS object, p.x - o.x AS dx, p.y - o.y AS dy, p.z - o.z AS dz "
+            f"{joined} WHERE abs(p.x - o.x) < $reach AND abs(p.y - o.y) < $reach",
             {"reach": reach_m},
         ).fetchnumpy()
-    distance = np.sqrt(np.square(found["dx"]) + np.square(found["dy"]))
+    distance = np.sqrt(np.square(found["dx"]) + np.square(found["dy"]) + np.square(found["dz"]))
     near = distance < reach_m
     prediction, numbers, distance = found["prediction"][near], found["object"][near], distance[near]
     order = np.lexsort((numbers, distance, prediction))
@@ -97,6 +98,7 @@ def _table(boxes: Centres) -> Any:
             "category": boxes.category,
             "x": boxes.x,
             "y": boxes.y,
+            "z": boxes.z,
         }
     )
 

@@ -160,7 +160,9 @@ def evaluate(
             hint = f"it has {', '.join(sorted(runs))}; a scenario is called after its file of results"
             raise DataError(Diagnostic("file-invalid", message, hints=(hint,)))
         found = [replace(each, simulated=verdict(runs[each.name], _decisive(each))) for each in found]
-    return Evaluation(predictions.name, distance_m, least_score, tuple(found), tuple(_warnings(found)), detection)
+    return Evaluation(
+        predictions.name, distance_m, least_score, tuple(found), tuple(_warnings(found, detection)), detection
+    )
 
 
 def _name_of(results: Results) -> str:
@@ -190,7 +192,13 @@ def _corrected(found: list[ScenarioEvaluation]) -> list[ScenarioEvaluation]:
     return done
 
 
-def _warnings(found: Iterable[ScenarioEvaluation]) -> Iterator[Diagnostic]:
+def _warnings(found: Iterable[ScenarioEvaluation], detection: Detection) -> Iterator[Diagnostic]:
+    if detection.flat:
+        message = (
+            "the benchmark takes distances in space, and the dataset does not know all heights: the plane is taken"
+        )
+        hint = "a dataset that was made before heights were kept gets them when its source is ingested again"
+        yield Diagnostic("heights-unknown", message, severity="warning", hints=(hint,))
     for one in found:
         for each in one.headline:
             if each.share.of and each.few:

@@ -122,11 +122,15 @@ def make_older(folder, version):
         digest = hashlib.sha256(data).hexdigest()
         named = part_path(table, 0, digest)
         file.rename(folder / named)
-        for changed, text in texts.items():
-            text = text.replace(part["path"], named).replace(part["sha256"], digest)
-            texts[changed] = text.replace(f'"bytes": {part["bytes"]}', f'"bytes": {len(data)}').replace(
-                f"[{part['bytes']},", f"[{len(data)},"
-            )
+        new = {
+            part["path"]: named,
+            part["sha256"]: digest,
+            f'"bytes": {part["bytes"]}': f'"bytes": {len(data)}',
+            f"[{part['bytes']},": f"[{len(data)},",
+        }
+        for changed in texts:
+            for before, after in new.items():
+                texts[changed] = texts[changed].replace(before, after)
     texts[manifest] = texts[manifest].replace(f'"schema": {SCHEMA_VERSION}', f'"schema": {version}')
     for changed, text in texts.items():
         changed.write_text(text)
