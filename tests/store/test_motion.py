@@ -128,9 +128,8 @@ def make_older(folder, version):
             f'"bytes": {part["bytes"]}': f'"bytes": {len(data)}',
             f"[{part['bytes']},": f"[{len(data)},",
         }
-        for changed in texts:
-            for before, after in new.items():
-                texts[changed] = texts[changed].replace(before, after)
+        for before, after in new.items():
+            texts = {changed: text.replace(before, after) for changed, text in texts.items()}
     texts[manifest] = texts[manifest].replace(f'"schema": {SCHEMA_VERSION}', f'"schema": {version}')
     for changed, text in texts.items():
         changed.write_text(text)
