@@ -92,6 +92,7 @@ class _Pages:
     def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
         counts = f"{each.matching:,} frames match, {each.other:,} do not"
         sentences = [element("p", element("b", escape(role.sentence))) for role in each.headline]
+        sentences += [element("p", escape(one.sentence)) for one in each.weighted]
         if each.simulated is not None:
             sentences.append(element("p", escape(each.simulated.sentence)))
         parts = [element("h2", escape(each.name)), element("p", escape(counts)), *sentences]
@@ -192,7 +193,7 @@ def _shown(detection: Detection, frame: int, least: float) -> Iterator[tuple[int
     found = detection.predictions
     numbers: list[int] = np.flatnonzero((detection.frame == frame) & (found.score >= least)).tolist()
     for number in numbers:
-        category = detection.classes[detection.prediction_class[number]]
+        category = detection.classes[int(detection.prediction_class[number])]
         yield number, f"predicted {category}, score {found.score[number]:.2f}"
 
 
