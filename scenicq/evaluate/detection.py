@@ -333,17 +333,14 @@ def _pairs(
 ) -> Pairs:  # fmt: skip
     counted = np.flatnonzero(object_class >= 0)
 
-    def height(z: Reals) -> Reals:
-        return z if spatial else np.zeros(len(z))
-
     found = find_pairs(
-        Centres(frame, category, predictions.x, predictions.y, height(predictions.z)),
+        Centres(frame, category, predictions.x, predictions.y, predictions.z if spatial else None),
         Centres(
             objects.frame[counted],
             object_class[counted],
             objects.x[counted],
             objects.y[counted],
-            height(objects.z[counted]),
+            objects.z[counted] if spatial else None,
         ),
         max(THRESHOLDS_M),
         nearest_only=predictions.protocol.nearest_only,

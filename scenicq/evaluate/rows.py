@@ -203,7 +203,8 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
     ]
     classes = [each for each in scenario.classes if each.distance_m == distance_m]
     errors = {(each.category, each.group): each.errors for each in scenario.classes if each.errors}
-    heads = ("CLASS", "FRAMES", "OBJECTS", "RECALL", "PRECISION", "AP", *(name.upper() for name in ERRORS))
+    told = [name for name in ERRORS if any(name in each for each in errors.values())]
+    heads = ("CLASS", "FRAMES", "OBJECTS", "RECALL", "PRECISION", "AP", *(name.upper() for name in told))
     rows = [
         (
             each.category,
@@ -212,7 +213,7 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
             _percent(*each.recall),
             _percent(*each.precision),
             _percent(*each.average_precision),
-            *(_error(errors.get((each.category, each.group), {}).get(name)) for name in ERRORS),
+            *(_error(errors.get((each.category, each.group), {}).get(name)) for name in told),
         )
         for each in sorted(classes, key=lambda each: each.category)
     ]

@@ -2,8 +2,8 @@
 
 - `dataset.json`: {"name", "interchange": 1, "angle": "heading" | "yaw", "classes": "nuscenes" | "scenic" | FILE};
 - `labels.jsonl`: one label a line; also `labels-*.jsonl`, either with `.gz`, or `labels.parquet`. An explicit null says
-  that there is no ego, or that a heading is not known. Objects may have `z`, `pitch` and `roll`; a sensor is a path, or an
-  object with `path` and what `cameras.CAMERA_KEYS` lists;
+  that there is no ego, or that a heading is not known. Objects may have `z`, `pitch` and `roll`; a sensor is a path, or
+  an object with `path` and what `cameras.CAMERA_KEYS` lists;
 - `maps/NAME.geojson`: metres of the map's frame.
 """
 

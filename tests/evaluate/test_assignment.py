@@ -11,11 +11,11 @@ from scenicq.evaluate.assignment import Centres, assign, find_pairs
 from scenicq.evaluate.precision import Errors, average_precision, box_errors, mean_errors, resampled_errors
 
 
-def centres(rng: np.random.Generator, count: int) -> Centres:
+def centres(rng: np.random.Generator, count: int, *, spatial: bool = False) -> Centres:
     frame, category = rng.integers(0, 4, count).astype(np.int32), rng.integers(0, 2, count).astype(np.int32)
     # whole metres: many distances are equal
-    x, y = (rng.integers(0, 8, count).astype(np.float64) for _ in range(2))
-    return Centres(frame, category, x, y, np.zeros(len(x)))
+    x, y, z = (rng.integers(0, 8, count).astype(np.float64) for _ in range(3))
+    return Centres(frame, category, x, y, z / 2 if spatial else None)
 
 
 def one_by_one(predictions: Centres, objects: Centres, threshold: float, *, nearest_only: bool) -> list[int]:
@@ -26,7 +26,9 @@ def one_by_one(predictions: Centres, objects: Centres, threshold: float, *, near
         for other in range(len(objects.x)):
             same = predictions.frame[number] == objects.frame[other]
             if same and predictions.category[number] == objects.category[other]:
-                away = math.hypot(predictions.x[number] - objects.x[other], predictions.y[number] - objects.y[other])
+                up = 0.0 if predictions.z is None or objects.z is None else predictions.z[number] - objects.z[other]
+                dx, dy = predictions.x[number] - objects.x[other], predictions.y[number] - objects.y[other]
+                away = math.sqrt(dx * dx + dy * dy + up * up)
                 if away < best and (nearest_only or other not in taken):
                     best, nearest = away, other
         mine = nearest >= 0 and nearest not in taken and best < threshold
@@ -36,11 +38,12 @@ def one_by_one(predictions: Centres, objects: Centres, threshold: float, *, near
     return found
 
 
+@pytest.mark.parametrize("spatial", [False, True])
 @pytest.mark.parametrize("nearest_only", [False, True])
 @pytest.mark.parametrize("seed", range(20))
-def test_the_same_as_one_after_the_other(seed: int, nearest_only: bool) -> None:
+def test_the_same_as_one_after_the_other(seed: int, nearest_only: bool, spatial: bool) -> None:
     rng = np.random.default_rng(seed)
-    predictions, objects = centres(rng, 60), centres(rng, 40)
+    predictions, objects = centres(rng, 60, spatial=spatial), centres(rng, 40, spatial=spatial)
     pairs = find_pairs(predictions, objects, 4.0, nearest_only=nearest_only)
     for threshold in (0.5, 1.5, 4.0):
         found = assign(pairs, np.arange(60), 40, threshold, nearest_only=nearest_only)
@@ -48,7 +51,7 @@ def test_the_same_as_one_after_the_other(seed: int, nearest_only: bool) -> None:
 
 
 def test_nothing_to_assign() -> None:
-    none = Centres(*(np.zeros(0, dtype=np.int32),) * 2, *(np.zeros(0),) * 3)
+    none = Centres(*(np.zeros(0, dtype=np.int32),) * 2, *(np.zeros(0),) * 2)
     some = centres(np.random.default_rng(0), 3)
     for predictions, objects in ((none, some), (some, none), (none, none)):
         pairs = find_pairs(predictions, objects, 4.0)
