@@ -179,7 +179,7 @@ class Dataset:
             return shortened(connection)
 
     def labels_at(self, part: int, first: int, end: int, *, motion: bool = True) -> Iterator[Label]:
-        """Labels of one part, in order.
+        """Labels of one part, in order, as matching sees them: without heights, tilts and cameras.
 
         Args:
             part: Number of the part.
@@ -199,7 +199,7 @@ class Dataset:
         """
         labels, objects, sensors = (self.files(table)[part] for table in ("labels", "objects", "sensors"))
         with self.blamed():
-            yield from read_labels([(labels, objects, sensors)], rows, None, motion=motion)
+            yield from read_labels([(labels, objects, sensors)], rows, None, motion=motion, space=False)
 
     def verify(self) -> None:
         """Compare every file with its checksum.
