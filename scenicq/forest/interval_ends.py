@@ -4,28 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, cast
+from typing import Protocol, TypeVar, cast
 
 import numpy as np
 
-__all__ = ["ARRAYS", "FLOATS", "Array", "Ends", "Interval"]
+from scenicq.forest.interval_values import Array, Interval
+
+__all__ = ["ARRAYS", "FLOATS", "Ends"]
 
 E = TypeVar("E")
-Array: TypeAlias = Any
-"""A float or an array of floats; as a truth value, a bool or an array of them."""
-
-
-class Interval(NamedTuple, Generic[E]):
-    """A number between two ends.
-
-    Attributes:
-        low, high: The ends; infinite where nothing is known.
-        exact: Whether both ends are the number itself.
-    """
-
-    low: E
-    high: E
-    exact: bool = False
 
 
 class Ends(Protocol[E]):

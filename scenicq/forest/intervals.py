@@ -1,8 +1,8 @@
 """The domain of intervals: outer bounds of values, never too narrow, over ends of any kind (`interval_ends`).
 
-A scalar is an interval, a vector a pair of them, a truth value whether it can hold and whether it can fail; anything
-else (a region, a text) is None. With ends that are columns, an expression over what many labels or samples observe has
-exact intervals: their ends are its values, and where nothing is observed they are infinite.
+A scalar is an interval, a vector or a region a box, a truth value whether it can hold and whether it can fail; anything
+else (a text, a vector field) is None. With ends that are columns, an expression over what many labels or samples
+observe has exact intervals: their ends are its values, and where nothing is observed they are infinite.
 """
 
 from __future__ import annotations
@@ -10,15 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, NamedTuple, TypeAlias, TypeVar, cast
+from functools import reduce
+from typing import Generic, TypeVar
 
 from scenicq.forest.interpret import OnMap, RegionNode
-from scenicq.forest.interval_ends import Array, Ends, Interval
+from scenicq.forest.interval_ends import Ends
+from scenicq.forest.interval_values import Array, Bounds, Interval, IntervalVector, Truth
 from scenicq.forest.nodes import (
     ArithmeticOp,
     CompareOp,
-    Constant,
     DirectionAt,
+    DiscAt,
     DiscreteRange,
     Distance,
     Feature,
@@ -28,34 +30,21 @@ from scenicq.forest.nodes import (
     LogicOp,
     PointIn,
     Range,
+    RectangleAt,
+    RegionDifference,
+    RegionIntersection,
+    RegionUnion,
+    SectorAt,
     TruncatedNormal,
     Undefined,
     Value,
 )
 from scenicq.geometry.membership import bounds as region_bounds
-from scenicq.geometry.regions import Region
+from scenicq.geometry.regions import SLACK, Region
 
-__all__ = ["Bounds", "IntervalDomain", "IntervalVector", "Truth"]
+__all__ = ["IntervalDomain"]
 
 E = TypeVar("E")
-
-
-class IntervalVector(NamedTuple, Generic[E]):
-    """A vector whose coordinates are between ends."""
-
-    x: Interval[E]
-    y: Interval[E]
-
-
-class Truth(NamedTuple):
-    """Whether a condition can hold, and whether it can fail: bools, or arrays of them."""
-
-    can_hold: Array
-    can_fail: Array
-
-
-Bounds: TypeAlias = Interval[E] | IntervalVector[E] | Truth | None
-
 _OPEN = Truth(True, True)
 _RANGES: Mapping[ArithmeticOp, tuple[float, float]] = {
     ArithmeticOp.SIN: (-1.0, 1.0),
@@ -118,6 +107,9 @@ class IntervalDomain(Generic[E]):
             return self.ends.known(self.ends.number(value))
         if isinstance(value, tuple):
             return IntervalVector(*(self.ends.known(self.ends.number(part)) for part in value))
+        if isinstance(value, Region):
+            west, south, east, north = region_bounds(value)
+            return IntervalVector(self._within(west, east), self._within(south, north))
         return self.everything() if isinstance(value, Undefined) else None
 
     def feature(self, node: Feature) -> Bounds[E]:
@@ -137,16 +129,21 @@ class IntervalDomain(Generic[E]):
             case Index():
                 return self._within(0.0, len(node.weights) - 1.0)
             case PointIn():
-                return self._point(node)
+                return self._point(node, self._pair(args[0]))
             case _:
                 return self.everything()
 
-    def _point(self, node: PointIn) -> IntervalVector[E]:
-        west, south, east, north = -math.inf, -math.inf, math.inf, math.inf
-        if isinstance(node.region, Constant):
-            west, south, east, north = region_bounds(cast(Region, node.region.value))
-        (x0, x1), (y0, y1) = self.points.get(node.identity, ((-math.inf, math.inf), (-math.inf, math.inf)))
-        return IntervalVector(self._within(max(west, x0), min(east, x1)), self._within(max(south, y0), min(north, y1)))
+    def _point(self, node: PointIn, region: IntervalVector[E]) -> IntervalVector[E]:
+        if node.identity not in self.points:
+            return region
+        (x0, x1), (y0, y1) = self.points[node.identity]
+        return self._common(region, IntervalVector(self._within(x0, x1), self._within(y0, y1)))
+
+    def _common(self, a: IntervalVector[E], b: IntervalVector[E]) -> IntervalVector[E]:
+        """The box that two boxes have in common."""
+        most, least = self.ends.most, self.ends.least
+        x, y = (self.ends.between(most([p.low, q.low]), least([p.high, q.high])) for p, q in zip(a, b, strict=True))
+        return IntervalVector(x, y)
 
     # --- scalars
 
@@ -329,8 +326,8 @@ class IntervalDomain(Generic[E]):
             case CompareOp.NE:
                 return Truth(True, self.ends.both(below, above))
 
-    def _at_most(self, a: E, b: E) -> Array:
-        return self.ends.at_most(a, self.ends.plus(b, self.ends.number(self.slack)))
+    def _at_most(self, a: E, b: E, beyond: float = 0.0) -> Array:
+        return self.ends.at_most(a, self.ends.plus(b, self.ends.number(self.slack + beyond)))
 
     def logic(self, op: LogicOp, args: Sequence[Bounds[E]]) -> Truth:
         """A combination of truth values."""
@@ -361,15 +358,43 @@ class IntervalDomain(Generic[E]):
     # --- the map
 
     def on_map(self, node: OnMap, args: Sequence[Bounds[E]]) -> Bounds[E]:
-        """Distances are not negative, directions any heading; whether a region holds something is open."""
+        """Points are in a region only where they are in its box, and no closer to it than to its box."""
         match node:
-            case Distance():
-                return self._within(0.0, math.inf)
             case DirectionAt():
                 return self._within(-math.pi, math.pi)
+            case Distance():
+                return self._distance(self._pair(args[0]), self._pair(args[1]))
             case _:
-                return _OPEN
+                return Truth(self._meet(self._pair(args[0]), self._pair(args[1])), True)
+
+    def _distance(self, region: IntervalVector[E], point: IntervalVector[E]) -> Interval[E]:
+        ends, zero, endless = self.ends, self.ends.number(0.0), self.ends.number(math.inf)
+        x, y = (self.add(p, self.negative(q)) for p, q in zip(point, region, strict=True))
+        near = ends.hypot(self._nearest(x), self._nearest(y))
+        far = ends.hypot(self._largest(x), self._largest(y))
+        # nothing is known of how far what is anywhere is from nothing
+        return ends.between(
+            ends.where(ends.at_most(zero, near), near, zero), ends.where(ends.at_most(zero, far), far, endless)
+        )
+
+    def _meet(self, a: IntervalVector[E], b: IntervalVector[E]) -> Array:
+        """Whether two boxes have a point in common."""
+        found = [self._at_most(p.low, q.high, SLACK) for p, q in (*zip(a, b, strict=True), *zip(b, a, strict=True))]
+        return reduce(self.ends.both, found)
 
     def region(self, node: RegionNode, args: Sequence[Bounds[E]]) -> Bounds[E]:
-        """Regions have no bounds here."""
-        return None
+        """The box of a region."""
+        boxes = [self._pair(arg) for arg in args]
+        match node:
+            case RegionUnion():
+                return IntervalVector(self._hull([box.x for box in boxes]), self._hull([box.y for box in boxes]))
+            case RegionIntersection():
+                return reduce(self._common, boxes)
+            case RegionDifference():
+                return boxes[0]
+            case DiscAt() | SectorAt():
+                reach = self._largest(self._scalar(args[1]))
+            case RectangleAt():
+                reach = self.ends.hypot(*(self._largest(self._scalar(arg)) for arg in args[2:]))
+        around = self.ends.between(self.ends.negative(reach), reach)
+        return IntervalVector(self.add(boxes[0].x, around), self.add(boxes[0].y, around))
