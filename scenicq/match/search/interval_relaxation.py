@@ -44,7 +44,7 @@ def possible(group: Group, steps: Steps, observed: Observed, tolerance: Toleranc
         return _bounds(observed(node.object, node.property))
 
     with np.errstate(all="ignore"):
-        known = interpret(steps, IntervalDomain(ARRAYS, seen, slack=SLACK))
+        known = interpret(steps, IntervalDomain(ARRAYS, seen, slack=SLACK, boxed=False))
         result: Array = True
         for item in group.constraints:
             if isinstance(item, Comparison):
