@@ -14,6 +14,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import Any, assert_never, cast
 
+from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
@@ -247,8 +248,7 @@ class Interpreter:
             try:
                 self._execute(statement, scope)
             except ArithmeticError as error:
-                told = f"a number is too large, or not one: {error}"
-                raise fail("runtime-error", told, statement.span, "in this statement") from None
+                raise no_number(error, statement.span, "in this statement") from None
 
     def _execute(self, node: ast.Statement, scope: Environment) -> None:
         self.budget.step(node.span)
