@@ -98,17 +98,17 @@ class Draws:
                 self._points[leaf.identity] = self._points_of(region)
             return self._points[leaf.identity]
         first, second = self._share(leaf)
-        args = cast("tuple[Any, ...]", region.args)
+        (x, y), numbers = region.center, region.numbers
         match region.node:
             case DiscAt():
-                away, turn = args[1] * np.sqrt(first), math.tau * second
+                away, turn = numbers[0] * np.sqrt(first), math.tau * second
             case SectorAt():
-                away, turn = args[1] * np.sqrt(first), args[2] + args[3] * (second - 0.5)
+                away, turn = numbers[0] * np.sqrt(first), numbers[1] + numbers[2] * (second - 0.5)
             case RectangleAt():
-                right, ahead = args[2] * (first - 0.5), args[3] * (second - 0.5)
-                sine, cosine = np.sin(args[1]), np.cos(args[1])
-                return args[0][0] + cosine * right - sine * ahead, args[0][1] + sine * right + cosine * ahead
-        return args[0][0] - away * np.sin(turn), args[0][1] + away * np.cos(turn)
+                right, ahead = numbers[1] * (first - 0.5), numbers[2] * (second - 0.5)
+                sine, cosine = np.sin(numbers[0]), np.cos(numbers[0])
+                return x + cosine * right - sine * ahead, y + sine * right + cosine * ahead
+        return x - away * np.sin(turn), y + away * np.cos(turn)
 
     def _points_of(self, regions: Data) -> Vectors:
         """Points of whichever region each draw has chosen."""
@@ -187,11 +187,11 @@ def point_density(region: Data, point: Vectors) -> Array:
 
 def _area(region: Placed) -> Array:
     """Square metres."""
-    args = cast("tuple[Any, ...]", region.args)
+    numbers = region.numbers
     match region.node:
         case DiscAt():
-            return math.pi * args[1] ** 2
+            return math.pi * numbers[0] ** 2
         case SectorAt():
-            return np.minimum(args[3], math.tau) * args[1] ** 2 / 2
+            return np.minimum(numbers[2], math.tau) * numbers[0] ** 2 / 2
         case RectangleAt():
-            return args[2] * args[3]
+            return numbers[1] * numbers[2]

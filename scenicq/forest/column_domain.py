@@ -259,10 +259,11 @@ class ColumnDomain:
 
     def region(self, node: RegionNode, args: Sequence[Column]) -> Column:
         """A region."""
-        data = tuple(arg.data for arg in args)
-        known = isinstance(data[0], tuple) and all(isinstance(each, np.ndarray) for each in data[1:])
-        if isinstance(node, DiscAt | SectorAt | RectangleAt) and known:
-            return Column(Placed(node, data), common_status(args))
+        center = args[0].data
+        numbers = tuple(arg.data for arg in args[1:] if isinstance(arg.data, np.ndarray))
+        known = len(numbers) == len(args) - 1
+        if isinstance(node, DiscAt | SectorAt | RectangleAt) and isinstance(center, tuple) and known:
+            return Column(Placed(node, center, numbers), common_status(args))
         return self._each(partial(compute, node), args)
 
     def _contained(self, node: Contains, regions: Coded, args: Sequence[Column]) -> Column:

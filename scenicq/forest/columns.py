@@ -24,6 +24,8 @@ __all__ = [
 ]  # fmt: skip
 
 Array: TypeAlias = NDArray[Any]
+Vectors: TypeAlias = tuple[Array, Array]
+"""The x and y coordinates of vectors."""
 DEFINED, UNDEFINED, UNKNOWN = np.int8(0), np.int8(1), np.int8(2)
 """Whether there is a value at a place: where several hold of what a value hangs on, the last of them."""
 
@@ -47,15 +49,15 @@ class Placed:
 
     Attributes:
         node: Which of them.
-        args: Their parameters, in the order of the node's children.
+        center: Their centres.
+        numbers: Their other parameters, in the order of the node's children.
     """
 
     node: DiscAt | SectorAt | RectangleAt
-    args: tuple[Data, ...]
+    center: Vectors
+    numbers: tuple[Array, ...]
 
 
-Vectors: TypeAlias = tuple[Array, Array]
-"""The x and y coordinates of vectors."""
 Data: TypeAlias = "Array | Vectors | Coded | Placed"
 """Numbers or truth values, the coordinates of vectors, or other values; of no meaning where there is no value."""
 
@@ -142,30 +144,33 @@ def _parts(column: Column) -> tuple[Array, ...]:
 
 def _arrays(data: Data) -> tuple[Array, ...]:
     if isinstance(data, Placed):
-        return tuple(each for arg in data.args for each in _arrays(arg))
+        return *data.center, *data.numbers
     return data if isinstance(data, tuple) else (data.which if isinstance(data, Coded) else data,)
 
 
 def distances(shape: Placed, x: Array, y: Array) -> Array:
     """Distances in metres from points to regions."""
-    args = cast("tuple[Any, ...]", shape.args)
-    dx, dy = x - args[0][0], y - args[0][1]
+    dx, dy = x - shape.center[0], y - shape.center[1]
     match shape.node:
         case DiscAt():
-            return to_discs(dx, dy, args[1])
+            return to_discs(dx, dy, *shape.numbers)
         case SectorAt():
-            return to_sectors(dx, dy, args[1], args[2], args[3])
+            return to_sectors(dx, dy, *shape.numbers)
         case RectangleAt():
-            return to_rectangles(dx, dy, args[1], args[2], args[3])
+            return to_rectangles(dx, dy, *shape.numbers)
 
 
 def value_reader(data: Data, shape: tuple[int, ...]) -> Callable[[int], Value]:
     """The value at a place of a row of all."""
-    if isinstance(data, Placed):
-        read = [value_reader(arg, shape) for arg in data.args]
-        node: Node = data.node
-        return lambda place: compute(node, tuple(each(place) for each in read))
     arrays = [np.broadcast_to(each, shape).ravel() for each in _arrays(data)]
+    if isinstance(data, Placed):
+        node: Node = data.node
+
+        def region(place: int) -> Value:
+            x, y, *numbers = (float(each[place]) for each in arrays)
+            return compute(node, ((x, y), *numbers))
+
+        return region
     if isinstance(data, Coded):
         options = data.options
         return lambda place: options[int(arrays[0][place])]

@@ -127,7 +127,7 @@ class _Alternatives:
         return self._each(self.domain.rotate, (vector, angle))
 
     def coordinate(self, vector: Alternatives, axis: int) -> Alternatives:
-        return self._each(lambda each: self.domain.coordinate(each, axis), (vector,))
+        return self._each(lambda *chosen: self.domain.coordinate(chosen[0], axis), (vector,))
 
     def norm(self, vector: Alternatives) -> Alternatives:
         return self._each(self.domain.norm, (vector,))
@@ -161,16 +161,17 @@ class _Alternatives:
         kept = list(dict.fromkeys(found))
         if len(kept) > _MOST_ALTERNATIVES:
             kept = [self._joined(kept)]
-        return tuple(map(self._readable, kept))
+        return tuple(
+            IntervalVector(*map(self._readable, each)) if isinstance(each, IntervalVector)
+            else self._readable(each) if isinstance(each, Interval)
+            else each
+            for each in kept
+        )  # fmt: skip
 
     def _joined(self, parts: Sequence[Bound[Expr]]) -> Bound[Expr]:
         """What holds all of some alternatives."""
         return parts[0] if len(parts) == 1 else self.domain.select(None, parts)
 
-    def _readable(self, value: Bound[Expr]) -> Bound[Expr]:
-        if isinstance(value, Interval):
-            long = any(isinstance(end, str) and len(end) > _MOST_TEXT for end in value[:2])
-            return self.domain.everything() if long else value
-        if isinstance(value, IntervalVector):
-            return IntervalVector(*(part for each in value if isinstance(part := self._readable(each), Interval)))
-        return value
+    def _readable(self, value: Interval[Expr]) -> Interval[Expr]:
+        long = any(isinstance(end, str) and len(end) > _MOST_TEXT for end in value[:2])
+        return self.domain.everything() if long else value
