@@ -78,6 +78,7 @@ fuzz: $(READY) ## Attack with hostile programs, datasets, sources and kills, MIN
 	$(BIN)/python tests/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(SEED)
 	$(BIN)/python tests/importers/fuzzing/fuzz.py --minutes $(MINUTES) --seed $(SEED)
 	$(BIN)/python tests/fuzz/kills.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/fuzz/differential.py --minutes $(MINUTES) --seed $(SEED)
 
 MUTATIONS ?= 200
 mutate: $(READY) ## Change the code in MUTATIONS=200 small ways and count which the fast tests notice

@@ -102,6 +102,22 @@ class Original:
         """
         return [(kind, step) for kind, step in self._ask({"replay": recordings})]
 
+    def at_points(self, count: int, seed: int) -> list[dict[str, Any]]:
+        """What the network says at random points, see `map_answers`.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        return self._ask({"points": count, "seed": seed})["points"]
+
+    def of_elements(self) -> dict[str, dict[str, Any]]:
+        """What its elements say of each other.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        return self._ask({"elements": True})["elements"]
+
     def _ask(self, request: dict[str, Any]) -> Any:
         assert self._process.stdin is not None
         assert self._process.stdout is not None

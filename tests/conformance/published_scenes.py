@@ -14,9 +14,9 @@ from scenicq.compiler.named_map import named_map
 from scenicq.errors import Source
 
 FOLDERS = ("examples/driving", "examples/carla")
-SECOND = ("Town05", "Town10HD", "Town01")
-"""Towns on which programs are drawn besides their own: the first two that are not."""
-SECONDS = 15.0
+SECOND = ("Town05", "Town10HD", "Town03", "Town01")
+"""Towns on which programs are drawn besides their own, in this order."""
+SECONDS = 45.0
 """Processor time that Scenic may take for the scenes of one program on one town."""
 
 
