@@ -13,8 +13,9 @@ from typing import TypeAlias, cast
 
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.interval_ends import FLOATS
-from scenicq.forest.interval_ends import Interval as Ends
-from scenicq.forest.intervals import Bounds, IntervalDomain, IntervalVector
+from scenicq.forest.interval_values import Bounds, IntervalVector
+from scenicq.forest.interval_values import Interval as Ends
+from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import Constant, Identity, Node, PointIn, Rotate, Scale, VectorSum
 
 __all__ = ["EVERYTHING", "Box", "Interval", "leaf_boxes", "point_boxes", "scalar_bounds", "vector_bounds"]

@@ -6,7 +6,7 @@ which operation a node is, once and exhaustively. `intervals` has the domain of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol, TypeAlias, TypeVar, assert_never
 
 from scenicq.forest.nodes import (
@@ -133,16 +133,18 @@ def steps_of(*roots: Node) -> Steps:
     return tuple((node, children(node)) for node in postorder(roots))
 
 
-def interpret(steps: Steps, domain: Domain[V]) -> dict[int, V]:
+def interpret(steps: Steps, domain: Domain[V], given: Mapping[int, V] | None = None) -> dict[int, V]:
     """The abstract value of each node, by the node's id.
 
     Args:
         steps: Those of the expressions.
         domain: What operations do.
+        given: Values of some nodes, by their ids.
     """
-    known: dict[int, V] = {}
+    known: dict[int, V] = dict(given or {})
     for node, below in steps:
-        known[id(node)] = _value(node, [known[id(child)] for child in below], domain)
+        if id(node) not in known:
+            known[id(node)] = _value(node, [known[id(child)] for child in below], domain)
     return known
 
 

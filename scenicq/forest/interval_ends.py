@@ -4,28 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, cast
+from typing import Protocol, TypeVar, cast
 
 import numpy as np
 
-__all__ = ["ARRAYS", "FLOATS", "Array", "Ends", "Interval"]
+from scenicq.forest.interval_values import Array, Interval
+from scenicq.geometry.angles import heading_of, heading_of_array, normalize
+
+__all__ = ["ARRAYS", "FLOATS", "Ends"]
 
 E = TypeVar("E")
-Array: TypeAlias = Any
-"""A float or an array of floats; as a truth value, a bool or an array of them."""
-
-
-class Interval(NamedTuple, Generic[E]):
-    """A number between two ends.
-
-    Attributes:
-        low, high: The ends; infinite where nothing is known.
-        exact: Whether both ends are the number itself.
-    """
-
-    low: E
-    high: E
-    exact: bool = False
 
 
 class Ends(Protocol[E]):
@@ -83,8 +71,16 @@ class Ends(Protocol[E]):
         """The cosine of an angle in radians."""
         ...
 
-    def remainder(self, a: E, divisor: float) -> E:
-        """What is left after whole divisors, in [0, divisor)."""
+    def magnitude(self, a: E) -> E:
+        """The distance from zero."""
+        ...
+
+    def heading(self, x: E, y: E) -> E:
+        """The heading of a vector in radians, in [-pi, pi]."""
+        ...
+
+    def turned(self, a: E) -> E:
+        """An angle in radians, less whole turns, in [-pi, pi]."""
         ...
 
     def at_most(self, a: E, b: E) -> Array:
@@ -150,8 +146,14 @@ class _Floats:
     def cosine(self, a: float) -> float:
         return math.cos(a)
 
-    def remainder(self, a: float, divisor: float) -> float:
-        return a % divisor
+    def magnitude(self, a: float) -> float:
+        return abs(a)
+
+    def heading(self, x: float, y: float) -> float:
+        return heading_of(x, y)
+
+    def turned(self, a: float) -> float:
+        return normalize(a) if math.isfinite(a) else math.nan
 
     def at_most(self, a: float, b: float) -> bool:
         return a <= b
@@ -221,8 +223,14 @@ class _Arrays:
     def cosine(self, a: Array) -> Array:
         return np.cos(a)
 
-    def remainder(self, a: Array, divisor: float) -> Array:
-        return np.remainder(a, divisor)
+    def magnitude(self, a: Array) -> Array:
+        return np.abs(a)
+
+    def heading(self, x: Array, y: Array) -> Array:
+        return heading_of_array(x, y)
+
+    def turned(self, a: Array) -> Array:
+        return np.remainder(a + math.pi, math.tau) - math.pi
 
     def at_most(self, a: Array, b: Array) -> Array:
         return np.less_equal(a, b)

@@ -170,11 +170,10 @@ def bounds(region: Region) -> Bounds:
         case PolygonSet() | PolylineSet() | PointSet():
             return region.extent
         case UnionOf():
-            boxes = [bounds(part) for part in region.parts]
-            lows, highs = zip(*((box[:2], box[2:]) for box in boxes), strict=True) if boxes else ((), ())
-            west, south = (min((low[i] for low in lows), default=math.inf) for i in (0, 1))
-            east, north = (max((high[i] for high in highs), default=-math.inf) for i in (0, 1))
-            return west, south, east, north
+            if not region.parts:
+                return bounds(Nowhere())
+            west, south, east, north = _part_boxes(region)
+            return float(west.min()), float(south.min()), float(east.max()), float(north.max())
         case IntersectionOf():
             box = bounds(Everywhere())
             for part in region.parts:

@@ -15,8 +15,9 @@ from expressions import expressions
 from scenicq.forest import build
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.interpret import interpret, steps_of
-from scenicq.forest.interval_ends import ARRAYS, FLOATS, Interval
-from scenicq.forest.intervals import IntervalDomain, IntervalVector, Truth
+from scenicq.forest.interval_ends import ARRAYS, FLOATS
+from scenicq.forest.interval_values import Interval, IntervalVector, Truth
+from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import Compare, CompareOp, Coordinate, Feature, Logic, LogicOp, PointIn, Range, Undefined
 from scenicq.forest.walk import transform
 

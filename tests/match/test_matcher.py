@@ -56,6 +56,20 @@ class Fixed:
         return self.answer
 
 
+@pytest.mark.parametrize(
+    ("condition", "holds"),
+    [
+        ("Uniform(1, 2)", True), ("Uniform(0, 1)", True), ("Uniform(None, 1)", True), ("Uniform(True, 2)", True),
+        ("not Uniform(0, 1)", True), ("Uniform(0, 1) and a.position.y > 11", False),
+        ("Uniform(a.position.y * 0, a.position.y * 2)", True), ("Uniform(a.position.y - 10, 0)", False),
+    ],
+)  # fmt: skip
+def test_a_choice_of_numbers_is_a_condition(condition, holds):
+    """As in Python, a number that is not zero is true."""
+    found = verdict(f"ego = new Car\na = new Car\nrequire {condition}\n", frame(car("a", 0.0, 10.0)))
+    assert isinstance(found, Match if holds else NoMatch)
+
+
 NONLINEAR = (
     "angle = Range(-20, 20) deg\nego = new Car\nother = new Car offset along angle relative to ego.heading by "
     "(0, Range(5, 10)), facing angle relative to ego.heading"

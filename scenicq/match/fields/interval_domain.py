@@ -4,8 +4,8 @@ An interval is an array (2, n) of lower and upper ends, a box an array (2, 2, n)
 take either where that makes sense, and never return too little.
 
 For cases of one correspondence, in which everything is random: all arrays have one length and are inverted as well
-(`branches`, `multiples`). For candidates of roles, where most values are known numbers that must stay exact and arrays
-of different axes broadcast, see `interval_arrays`; for one interval with exact ends, `interval`.
+(`contractor`, `interval_affine`). For candidates of roles, where most values are known numbers that must stay exact and
+arrays of different axes broadcast, see `forest/intervals`.
 """
 
 from __future__ import annotations

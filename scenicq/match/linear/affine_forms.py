@@ -5,26 +5,25 @@ After conditioning on the label most groups are affine; then geometry or a linea
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
+from scenicq.forest.interpret import OnMap, RegionNode, interpret, steps_of
 from scenicq.forest.nodes import (
-    Arithmetic,
     ArithmeticOp,
-    Constant,
-    Coordinate,
+    CompareOp,
+    Feature,
     Identity,
+    Leaf,
+    LogicOp,
     Node,
     Normal,
     PointIn,
     Range,
-    Rotate,
-    Scale,
     TruncatedNormal,
-    VectorOf,
-    VectorSum,
+    Value,
 )
-from scenicq.forest.walk import children, postorder
 from scenicq.geometry.angles import rotate
 
 __all__ = ["Affine", "AffineVector", "Variable", "affine_scalar", "affine_vector"]
@@ -64,83 +63,99 @@ def _known(form: _Form) -> float | None:
     return form.constant if isinstance(form, Affine) and not form.terms else None
 
 
-def _scalar(op: ArithmeticOp, args: list[_Form]) -> Affine | None:
-    forms = [arg for arg in args if isinstance(arg, Affine)]
-    if len(forms) != len(args):
-        return None
-    match op:
-        case ArithmeticOp.ADD:
-            total = forms[0]
-            for form in forms[1:]:
-                total = total.plus(form)
-            return total
-        case ArithmeticOp.SUB:
-            return forms[0].plus(forms[1], -1.0)
-        case ArithmeticOp.NEG:
-            return forms[0].times(-1.0)
-        case ArithmeticOp.MUL:
-            for one, other in ((forms[0], forms[1]), (forms[1], forms[0])):
-                if not one.terms:
-                    return other.times(one.constant)
-            return None
-        case ArithmeticOp.DIV if not forms[1].terms and forms[1].constant:
-            return forms[0].times(1 / forms[1].constant)
-        case _:
-            return None
+class _AffineDomain:
+    """The domain of affine forms: a number, a vector, or None where an expression is neither or not affine."""
 
+    def constant(self, value: Value) -> _Form:
+        if isinstance(value, float):
+            return Affine(value, {})
+        return (Affine(value[0], {}), Affine(value[1], {})) if isinstance(value, tuple) else None
 
-def _vector(node: Node, args: list[_Form]) -> _Form:
-    first = args[0]
-    if isinstance(node, VectorOf):
-        second = args[1]
-        return (first, second) if isinstance(first, Affine) and isinstance(second, Affine) else None
-    if not isinstance(first, tuple):
+    def feature(self, node: Feature) -> _Form:
         return None
-    x, y = first
-    match node:
-        case VectorSum():
-            other = args[1]
-            return (x.plus(other[0]), y.plus(other[1])) if isinstance(other, tuple) else None
-        case Scale():
-            factor = _known(args[1])
-            return None if factor is None else (x.times(factor), y.times(factor))
-        case Rotate():
-            angle = _known(args[1])
-            if angle is None:
+
+    def variable(self, node: Leaf, args: Sequence[_Form]) -> _Form:
+        match node:
+            case Range() | Normal() | TruncatedNormal():
+                return Affine(0.0, {(node.identity, 0): 1.0})
+            case PointIn():
+                return (Affine(0.0, {(node.identity, 0): 1.0}), Affine(0.0, {(node.identity, 1): 1.0}))
+            case _:
                 return None
-            c, s = rotate(1.0, 0.0, angle)
-            return (x.times(c).plus(y, -s), x.times(s).plus(y, c))
-        case Coordinate():
-            return first[node.axis]
-        case _:
+
+    def arithmetic(self, op: ArithmeticOp, args: Sequence[_Form]) -> _Form:
+        forms = [arg for arg in args if isinstance(arg, Affine)]
+        if len(forms) != len(args):
             return None
+        match op:
+            case ArithmeticOp.ADD:
+                total = forms[0]
+                for form in forms[1:]:
+                    total = total.plus(form)
+                return total
+            case ArithmeticOp.SUB:
+                return forms[0].plus(forms[1], -1.0)
+            case ArithmeticOp.NEG:
+                return forms[0].times(-1.0)
+            case ArithmeticOp.MUL:
+                for one, other in ((forms[0], forms[1]), (forms[1], forms[0])):
+                    if not one.terms:
+                        return other.times(one.constant)
+                return None
+            case ArithmeticOp.DIV if not forms[1].terms and forms[1].constant:
+                return forms[0].times(1 / forms[1].constant)
+            case _:
+                return None
+
+    def vector(self, x: _Form, y: _Form) -> _Form:
+        return (x, y) if isinstance(x, Affine) and isinstance(y, Affine) else None
+
+    def sum(self, left: _Form, right: _Form) -> _Form:
+        if not isinstance(left, tuple) or not isinstance(right, tuple):
+            return None
+        return (left[0].plus(right[0]), left[1].plus(right[1]))
+
+    def scale(self, vector: _Form, factor: _Form) -> _Form:
+        by = _known(factor)
+        return (vector[0].times(by), vector[1].times(by)) if isinstance(vector, tuple) and by is not None else None
+
+    def rotate(self, vector: _Form, angle: _Form) -> _Form:
+        by = _known(angle)
+        if not isinstance(vector, tuple) or by is None:
+            return None
+        (x, y), (c, s) = vector, rotate(1.0, 0.0, by)
+        return (x.times(c).plus(y, -s), x.times(s).plus(y, c))
+
+    def coordinate(self, vector: _Form, axis: int) -> _Form:
+        return vector[axis] if isinstance(vector, tuple) else None
+
+    def norm(self, vector: _Form) -> _Form:
+        return None
+
+    def bearing(self, vector: _Form) -> _Form:
+        return None
+
+    def compare(self, op: CompareOp, left: _Form, right: _Form) -> _Form:
+        return None
+
+    def logic(self, op: LogicOp, args: Sequence[_Form]) -> _Form:
+        return None
+
+    def select(self, index: _Form, options: Sequence[_Form]) -> _Form:
+        return None
+
+    def on_map(self, node: OnMap, args: Sequence[_Form]) -> _Form:
+        return None
+
+    def region(self, node: RegionNode, args: Sequence[_Form]) -> _Form:
+        return None
+
+
+_DOMAIN = _AffineDomain()
 
 
 def _form(root: Node) -> _Form:
-    forms: dict[int, _Form] = {}
-    for node in postorder((root,)):
-        args = [forms[id(child)] for child in children(node)]
-        match node:
-            case Constant():
-                value = cast(object, node.value)
-                form: _Form = None
-                if isinstance(value, float):
-                    form = Affine(value, {})
-                elif isinstance(value, tuple):
-                    x, y = cast("tuple[float, float]", value)
-                    form = (Affine(x, {}), Affine(y, {}))
-            case Range() | Normal() | TruncatedNormal():
-                form = Affine(0.0, {(node.identity, 0): 1.0})
-            case PointIn():
-                form = (Affine(0.0, {(node.identity, 0): 1.0}), Affine(0.0, {(node.identity, 1): 1.0}))
-            case Arithmetic():
-                form = _scalar(node.op, args)
-            case VectorOf() | VectorSum() | Scale() | Rotate() | Coordinate():
-                form = _vector(node, args)
-            case _:
-                form = None
-        forms[id(node)] = form
-    return forms[id(root)]
+    return interpret(steps_of(root), _DOMAIN)[id(root)]
 
 
 def affine_scalar(node: Node) -> Affine | None:

@@ -15,12 +15,13 @@ import numpy as np
 
 from scenicq.forest.groups import Comparison, Group
 from scenicq.forest.interpret import Steps, interpret
-from scenicq.forest.interval_ends import ARRAYS, Array, Interval
-from scenicq.forest.intervals import Bounds, IntervalDomain, IntervalVector, Truth
+from scenicq.forest.interval_ends import ARRAYS
+from scenicq.forest.interval_values import Array, Bounds, Interval, IntervalVector, can_hold
+from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import Feature, Node, Rotate, VectorSum
-from scenicq.match.tolerance import SLACK, Tolerance
+from scenicq.match.tolerance import SLACK, Margin, Tolerance
 
-__all__ = ["Observed", "possible"]
+__all__ = ["Observed", "possible", "within_margin"]
 
 Observed = Callable[[int, str], Array | tuple[Array, Array] | None]
 """What is observed of an object: numbers or a pair of them for all its candidates; None where it is no number."""
@@ -43,14 +44,13 @@ def possible(group: Group, steps: Steps, observed: Observed, tolerance: Toleranc
         return _bounds(observed(node.object, node.property))
 
     with np.errstate(all="ignore"):
-        known = interpret(steps, IntervalDomain(ARRAYS, seen, slack=SLACK))
+        known = interpret(steps, IntervalDomain(ARRAYS, seen, slack=SLACK, boxed=False))
         result: Array = True
         for item in group.constraints:
             if isinstance(item, Comparison):
                 answer = _reachable(item, observed(item.object, item.property), known, tolerance)
             else:
-                truth = known[id(item.expression)]
-                answer = truth.can_hold if isinstance(truth, Truth) else True
+                answer = can_hold(known[id(item.expression)])
             result = answer if result is True else np.logical_and(result, answer)
     return result
 
@@ -68,11 +68,24 @@ def _reachable(
     item: Comparison, seen: Array | tuple[Array, Array] | None, known: dict[int, Bounds[Array]], tolerance: Tolerance
 ) -> Array:
     value, margin = known[id(item.expression)], tolerance.of(item.object, item.property)
-    if isinstance(seen, tuple):
-        if item.property != "position" or not isinstance(value, IntervalVector):
+    if isinstance(seen, tuple) and isinstance(value, IntervalVector):
+        if item.property != "position":
             return True
         return _meets(item.expression, cast("tuple[Array, Array]", seen), margin.reach + SLACK, known)
-    if seen is None or not isinstance(value, Interval):
+    return within_margin(value, cast(Array, seen), margin)
+
+
+def within_margin(value: Bounds[Array], seen: Array | tuple[Array, Array] | None, margin: Margin) -> Array:
+    """Whether a value between bounds can be within tolerance of what a label observes.
+
+    Args:
+        value: The bounds.
+        seen: A number or a vector; arrays that broadcast with the bounds.
+        margin: The tolerance.
+    """
+    if isinstance(seen, tuple) and isinstance(value, IntervalVector):
+        return _in_box(cast("tuple[Array, Array]", seen), value, margin.reach + SLACK)
+    if seen is None or isinstance(seen, tuple) or not isinstance(value, Interval):
         return True
     low, high = value.low, value.high
     allowed = margin.size + SLACK
@@ -80,6 +93,13 @@ def _reachable(
         return (low - allowed <= seen) & (seen <= high + allowed)
     width = high - low + 2 * allowed
     return ~np.isfinite(width) | (np.mod(seen - low + allowed, math.tau) <= width)
+
+
+def _in_box(target: tuple[Array, Array], box: IntervalVector[Array], reach: float) -> Array:
+    """Whether a point is in a box or within a reach of it."""
+    x, y = target
+    across = (box.x.low - reach <= x) & (x <= box.x.high + reach)
+    return across & (box.y.low - reach <= y) & (y <= box.y.high + reach)
 
 
 def _meets(root: Node, target: tuple[Array, Array], radius: float, known: dict[int, Bounds[Array]]) -> Array:
@@ -101,10 +121,7 @@ def _meets(root: Node, target: tuple[Array, Array], radius: float, known: dict[i
             case _:
                 break
     box = known[id(node)]
-    if not isinstance(box, IntervalVector):
-        return True
-    across = (box.x.low - radius <= x) & (x <= box.x.high + radius)
-    return across & (box.y.low - radius <= y) & (y <= box.y.high + radius)
+    return _in_box((x, y), box, radius) if isinstance(box, IntervalVector) else True
 
 
 def _is_point(value: Bounds[Array]) -> bool:

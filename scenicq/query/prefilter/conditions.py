@@ -35,20 +35,8 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.regions import RegionNames, near_region
-from scenicq.query.prefilter.sql_bounds import Bounds
-from scenicq.query.prefilter.sql_interval import (
-    Expr,
-    Interval,
-    add,
-    all_of,
-    any_of,
-    between,
-    difference,
-    less,
-    modulo_turn,
-    number,
-    rotate,
-)
+from scenicq.query.prefilter.sql_bounds import ARITHMETIC, Bounds
+from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
 __all__ = ["EGO", "Condition", "conditions", "object_columns"]
@@ -174,15 +162,15 @@ class _Reader:
                 sides = ((node.left, node.right), (node.right, node.left))
                 for part, rest in sides:
                     if known := bounds.exact_vector(part):
-                        shifted = [difference((p, p), (q, q))[0] for p, q in zip(place, known, strict=True)]
+                        shifted = [_difference(p, q) for p, q in zip(place, known, strict=True)]
                         place, node, moved = (shifted[0], shifted[1]), rest, True
                         break
                 else:
                     return place, node, moved
             elif isinstance(node, Rotate) and (angle := bounds.exact(node.angle)) is not None:
-                back: Expr = -angle if isinstance(angle, float) else f"(-{angle})"
-                (px, _), (py, _) = rotate(((place[0], place[0]), (place[1], place[1])), (back, back))
-                place, node, moved = (px, py), node.vector, True
+                vector = ARITHMETIC.vector(*map(SQL.known, place))
+                x, y = ARITHMETIC.rotate(vector, SQL.known(SQL.negative(angle)))
+                place, node, moved = (x.low, y.low), node.vector, True
             else:
                 return place, node, moved
 
@@ -223,9 +211,9 @@ class _Reader:
         if center is None:
             return True
         from_ego = self._is_ego(region.center, "position") and place == ("a.x", "a.y")
-        dx, dy = (difference((p, p), (q, q))[0] for p, q in zip(place, center, strict=True))
+        dx, dy = (_difference(p, q) for p, q in zip(place, center, strict=True))
         away = "a.ego_distance" if from_ego else f"sqrt({number(dx)} * {number(dx)} + {number(dy)} * {number(dy)})"
-        near = any_of([less(away, add((high, high), (reach, reach))[1]) for _, high in bounds.intervals(region.radius)])
+        near = any_of([less(away, SQL.plus(each.high, reach)) for each in bounds.intervals(region.radius)])
         if not isinstance(region, SectorAt) or not isinstance(region.angle, Constant):
             return near
         half = float(region.angle.value) / 2 if isinstance(region.angle.value, float) else math.pi
@@ -248,19 +236,19 @@ class _Reader:
         if relative is not None and index != self.scenario.ego:
             base, rest = f"{alias}relative_heading", [term for term in rest if term is not relative]
         width = self.tolerance.of(index, "heading").size + SLACK
-        alternatives = [((0.0, 0.0))]
+        alternatives = [SQL.known(0.0)]
         for term in rest:
-            alternatives = [add(total, more) for total in alternatives for more in bounds.intervals(term)]
-        spans: list[tuple[Interval, Expr]] = []
-        for low, high in alternatives:
-            _, span = difference((high, high), (low, low))
+            alternatives = [ARITHMETIC.add(total, more) for total in alternatives for more in bounds.intervals(term)]
+        spans: list[tuple[Expr, Expr]] = []
+        for low, high, _ in alternatives:
+            span = _difference(high, low)
             if (isinstance(span, float) and span + 2 * width >= math.tau) or math.inf in (high, span):
                 return ""
-            spans.append((add((low, low), (-width, -width)), add((span, span), (2 * width, 2 * width))[1]))
+            spans.append((SQL.plus(low, -width), SQL.plus(span, 2 * width)))
 
         def holds(turned: str) -> str:
             # from where each span starts
-            angles = [(modulo_turn(number(difference((turned, turned), start)[0])), span) for start, span in spans]
+            angles = [(modulo_turn(number(_difference(turned, start))), span) for start, span in spans]
             return _sql(any_of([less(angle, span) for angle, span in angles]))
 
         if not along:
@@ -297,6 +285,10 @@ class _Reader:
                         yield objects, "", near
                 continue
             yield objects, _sql(self.of(objects).can_hold(part)), ""
+
+
+def _difference(a: Expr, b: Expr) -> Expr:
+    return SQL.plus(a, SQL.negative(b))
 
 
 def _sql(condition: str | bool) -> str:

@@ -8,7 +8,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.query.prefilter.conditions import EGO, Condition
 from scenicq.query.prefilter.sql_bounds import Bounds
-from scenicq.query.prefilter.sql_interval import any_of, between
+from scenicq.query.prefilter.sql_ends import any_of, between
 from scenicq.store.sql import sql_text
 
 __all__ = ["param_conditions"]

@@ -21,7 +21,7 @@ from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO, Condition, conditions
 from scenicq.query.prefilter.params import param_conditions
-from scenicq.query.prefilter.sql_interval import number
+from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.sql import sql_text
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, Region, UnionOf
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.sql_interval import number
+from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.sql import sql_text
 
 __all__ = ["RegionNames", "near_region"]
