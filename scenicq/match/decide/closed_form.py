@@ -211,6 +211,24 @@ def _close(dx: float, dy: float, margin: Margin) -> tuple[bool, bool]:
     return off <= margin.sure, (off > margin.reach + SLACK) & (off < math.inf)
 
 
+def _apart(middle: XY, half: XY, turn: XY, margin: Margin) -> bool:
+    """Whether a rectangle surely misses a box of tolerance: some side of either separates them; of columns, each.
+
+    Args:
+        middle: The rectangle's, from the box's, along the rectangle's sides.
+        half: Half its sides; of unbounded ones nothing is said.
+        turn: Cosine and sine of the angle from the box's sides to the rectangle's.
+        margin: The box.
+    """
+    (u, v), (w, h), (c, s), across, along = middle, half, turn, margin.size + SLACK, margin.y + SLACK
+    return (
+        (abs(u) > w + abs(c) * across + abs(s) * along)
+        | (abs(v) > h + abs(s) * across + abs(c) * along)
+        | (abs(u * c - v * s) > abs(c) * w + abs(s) * h + across)
+        | (abs(u * s + v * c) > abs(s) * w + abs(c) * h + along)
+    )
+
+
 def _length(x: float, y: float) -> float:
     """The length of a vector; of columns, a column of the same numbers to the last bit."""
     if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
@@ -271,6 +289,7 @@ def _offset(item: Comparison) -> ClosedForm | None:
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         px, py = cast(XY, get(index, "position"))
+        margin, turn = options.tolerance.of(index, "position"), (1.0, 0.0)
         # into the frame of the offset
         for shift, exact in steps:
             if shift:
@@ -279,9 +298,13 @@ def _offset(item: Comparison) -> ClosedForm | None:
             else:
                 c, s = turned(cast(float, exact(get)))
                 px, py = px * c + py * s, py * c - px * s
+                turn = turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s
         a, b = x.known(get), y.known(get)
         u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
-        holds, fails = _close(u - px, v - py, options.tolerance.of(index, "position"))
+        holds, fails = _close(u - px, v - py, margin)
+        if margin.kind == "box" and holds is not True and fails is not True:
+            middle = a + (x.low + x.high) / 2 - px, b + (y.low + y.high) / 2 - py
+            fails |= _apart(middle, ((x.high - x.low) / 2, (y.high - y.low) / 2), turn, margin)
         if holds is False:
             return Evaluated(holds, fails, {})
         return Evaluated(holds, fails, spread(x, u - a) | spread(y, v - b))

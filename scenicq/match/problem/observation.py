@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cache
+from functools import lru_cache
 
 from scenicq.forest.nodes import Value
 from scenicq.store.labels import Label, LabelObject
@@ -36,18 +36,18 @@ def observe(thing: LabelObject) -> Mapping[str, Value]:
 
 def observed_names(thing: LabelObject) -> frozenset[str]:
     """The names of the properties that a label object has."""
-    if thing.attributes or thing.motion is not None:
-        return frozenset(observe(thing))
-    present = (thing.heading, thing.width, thing.length, thing.height, thing.velocity)
-    return _names(tuple([value is not None for value in present]))
+    motion, velocity = thing.motion, thing.velocity
+    parts: tuple[object, ...] = (thing.heading, thing.width, thing.length, thing.height, velocity)
+    if motion is not None:
+        parts = (*parts[:4], velocity or motion.velocity, motion.acceleration, motion.yaw_rate)
+    return _names(tuple([part is not None for part in parts]), tuple(thing.attributes))
 
 
-@cache
-def _names(present: tuple[bool, ...]) -> frozenset[str]:
-    parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"))
-    return frozenset(
-        ("position", *(name for names, there in zip(parts, present, strict=True) if there for name in names))
-    )
+@lru_cache(maxsize=4096)
+def _names(present: tuple[bool, ...], attributes: tuple[str, ...]) -> frozenset[str]:
+    parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"), ("acceleration",))
+    named = zip((*parts, ("angularSpeed",)), present, strict=False)
+    return frozenset(("position", *attributes, *(name for names, there in named if there for name in names)))
 
 
 def observe_params(label: Label) -> Mapping[str, Value]:

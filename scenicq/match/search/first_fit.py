@@ -294,9 +294,10 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
     """What is observed of all candidates, if it is the same for all of a role."""
     objects = label.objects
     numbers = {number for index, numbers in among.items() if index != ego for number in numbers}
-    seen = {number: observed_names(objects[number - 1]) for number in numbers}
+    wanted = _union(relevant)
+    seen = {number: observed_names(objects[number - 1]) & wanted for number in numbers}
     params = frozenset(observe_params(label)) if label.params else frozenset[str]()
-    own = observed_names(label.ego)
+    own = observed_names(label.ego) & wanted
     if len(set(seen.values())) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
         return _signature(relevant, ego, own, next(iter(seen.values())), params)
     kinds: list[frozenset[str]] = []
@@ -309,6 +310,12 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
             return None
         kinds.append(first)
     return (*kinds, params)
+
+
+@functools.lru_cache
+def _union(relevant: tuple[frozenset[str], ...]) -> frozenset[str]:
+    """All properties that matter of some object."""
+    return frozenset[str]().union(*relevant)
 
 
 @functools.lru_cache
