@@ -73,8 +73,8 @@ def test_a_clear_answer_is_that_of_the_ladder(name):
                 cast = find_candidates(scenario, label, 0, replace(options, radius=None), {})
                 disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
                 tried = LabelSearch(scenario, options, replace(cast, disc=disc), matcher.ask)
-                for signature, candidates in cast.signatures(matcher._relevant):
-                    for group in matcher.plan(signature).groups:
+                for signature, candidates in cast.signatures(matcher.plans.relevant):
+                    for group in matcher.plans.plan(signature).groups:
                         if group.closed_form is None:
                             continue
                         for _ in range(3):
