@@ -10,11 +10,11 @@ LINTED := scenicq cli tests sample_data
 FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/search/test_backtracking.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check test test-all golden bench bench-scale conformance fuzz mutate browser dreal clean
+.PHONY: help setup demo check test test-all golden bench bench-scale conformance conformance-time fuzz mutate browser dreal clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
-		printf '  make %-12s %s\n' "$$name" "$$text"; done
+		printf '  make %-16s %s\n' "$$name" "$$text"; done
 
 setup: $(READY) ## Make .venv with scenicq and all that its development needs
 
@@ -68,11 +68,17 @@ else
 	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(SEED)
 endif
 
+TRACES ?= 2
+conformance-time: $(READY) ## Match what Scenic 3.1.1 simulates over time (MAP=an OpenDRIVE file; or SCENIC=a checkout; TRACES= of each program)
+	$(BIN)/python tests/conformance/traces.py $(if $(SCENIC),--checkout $(SCENIC),--map $(MAP)) --seeds $(TRACES)
+
 MINUTES ?= 60
-fuzz: $(READY) ## Attack with hostile programs, datasets and kills, MINUTES=60 of each
+fuzz: $(READY) ## Attack with hostile programs, datasets, sources and kills, MINUTES=60 of each
 	$(BIN)/python tests/fuzz/hostile_programs.py --minutes $(MINUTES) --seed $(SEED)
 	$(BIN)/python tests/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/importers/fuzzing/fuzz.py --minutes $(MINUTES) --seed $(SEED)
 	$(BIN)/python tests/fuzz/kills.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/fuzz/differential.py --minutes $(MINUTES) --seed $(SEED)
 
 MUTATIONS ?= 200
 mutate: $(READY) ## Change the code in MUTATIONS=200 small ways and count which the fast tests notice

@@ -7,7 +7,10 @@ from collections.abc import Mapping
 
 import click
 
+from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Counts, Manifest
+from scenicq.store.motion import LONGEST_GAP_US
+from scenicq.store.observed_motion import observed_motion
 from scenicq.store.schema import SCHEMAS
 from scenicq.store.soundness import check_dataset
 from scenicq.store.verification import verify_computed
@@ -52,7 +55,33 @@ def _tables(manifest: Manifest) -> list[str]:
     return [*columns(rows, right=frozenset({1, 2, 3}), indent=""), "", f"{'TABLE'.ljust(width)}columns", *named, ""]
 
 
-def _lines(manifest: Manifest) -> list[str]:
+def _motion(dataset: Dataset) -> list[str]:
+    observed = observed_motion(dataset)
+    rows = [("MOTION", "labels' own", "from tracks", "unknown")]
+    for name, known in observed.known.items():
+        own, derived, unknown = (f"{each / known.total:.1%}" for each in (known.own, known.derived, known.unknown))
+        rows.append((name, own, derived, unknown))
+    found = columns(rows, right=frozenset({1, 2, 3}), indent="") if len(rows) > 1 else []
+    facts = dataset.manifest.provenance.get("facts")
+    if isinstance(facts, dict) and "velocity" in facts:
+        found.append(f"velocity of labels: {facts['velocity']}")
+    steps, gaps = observed.steps, observed.gaps
+    if steps is None:
+        found.append("no recording has two labels: nothing can be matched over time")
+    else:
+        between = f"{steps.median:.3g} s from one to the next ({steps.shortest:.3g} to {steps.longest:.3g})"
+        found.append(f"{1 / steps.median:.3g} labels a second: {between}")
+    found.append(
+        f"over {LONGEST_GAP_US / 1e6:g} s without a label: {count(gaps.recordings, 'gap')} in recordings, "
+        f"{count(gaps.tracks, 'gap')} in tracks"
+    )
+    if observed.without_track:
+        found.append(f"{count(observed.without_track, 'object')} without a track")
+    return [*found, ""]
+
+
+def _lines(dataset: Dataset) -> list[str]:
+    manifest = dataset.manifest
     span = manifest.span_us
     source, made = manifest.provenance.get("source", "unknown"), manifest.provenance.get("time", "unknown")
     versions = ", ".join(f"{name} {number}" for name, number in manifest.provenance.get("versions", {}).items())
@@ -69,6 +98,7 @@ def _lines(manifest: Manifest) -> list[str]:
         *_counted("MAP", manifest.by_map),
         *([f"no map for: {', '.join(without_map)}", ""] if without_map else []),
         *_counted("RECORDING", manifest.by_recording),
+        *_motion(dataset),
         *_tables(manifest),
         *(defects(manifest.left_out) or ["nothing was left out"]),
     ]
@@ -101,7 +131,7 @@ def info(dataset: str, *, verify: bool, format_: str) -> None:
             plain(
                 "\n".join(
                     [
-                        *_lines(opened.manifest),
+                        *_lines(opened),
                         *(["every checksum is right, and every value is sound"] if verify else []),
                     ]
                 )

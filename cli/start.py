@@ -18,9 +18,11 @@ _LEAST_GB = 2
 def main() -> None:
     """Run the command line of this process, and choose the exit code."""
     _fill_streams()
-    if _too_little_memory():
+    if (limit := _address_space()) is not None and limit < _LEAST_GB * 10**9:
         _end(f"error[resources-exhausted]: {_LEAST_GB} GB of address space are needed (see `ulimit -v`)", _ERROR)
     try:
+        if limit is not None:
+            _take_memory_of_linear_algebra()
         from .main import main as run  # noqa: PLC0415 - loading may fail, too
 
         run()
@@ -43,14 +45,24 @@ def _fill_streams() -> None:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
 
 
-def _too_little_memory() -> bool:
-    """Whether the caller limits the memory of this process below what loading alone takes."""
+def _address_space() -> int | None:
+    """To how many bytes of memory the caller limits this process; None where to none."""
     try:
         import resource  # noqa: PLC0415 - not everywhere
     except ImportError:
-        return False
+        return None
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    return limit != resource.RLIM_INFINITY and limit < _LEAST_GB * 10**9
+    return None if limit == resource.RLIM_INFINITY else limit
+
+
+def _take_memory_of_linear_algebra() -> None:
+    """Have OpenBLAS take its buffer now: where it finds no memory for it later, it ends the process with 1."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    import numpy as np  # noqa: PLC0415 - loading may fail, too
+
+    # larger than what it multiplies without a buffer
+    square = np.ones((256, 256))
+    _ = square @ square
 
 
 def _line(error: BaseException) -> str:

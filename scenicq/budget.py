@@ -3,8 +3,8 @@
 Whoever decides labels says how long one may take (`limited`). Loops that can be long, in whatever folder, look at the
 clock (`look`), and what waits for a solver gives it what is left (`waiting`). Without a limit nothing is ever too long.
 
-Our own work is counted in processor seconds of the thread, so that a busy machine changes no verdict; waiting for a
-solver is counted by the wall, as solvers are themselves.
+Work is counted in processor seconds, our own as that of a worker process, so that a busy machine changes no verdict. A
+solver that is a command of somebody else is counted by the wall.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from contextvars import ContextVar, Token
 
-__all__ = ["TimeIsUp", "limited", "look", "uncounted", "waiting"]
+__all__ = ["TimeIsUp", "clock", "leave_out", "limited", "look", "uncounted", "waiting"]
 
 
 class TimeIsUp(Exception):
@@ -24,6 +24,20 @@ class TimeIsUp(Exception):
 
 _UNTIL: ContextVar[float] = ContextVar("_UNTIL", default=math.inf)
 """When the time is up, on the clock of this thread; what solvers took is taken off beforehand."""
+
+
+_LEFT_OUT: ContextVar[float] = ContextVar("_LEFT_OUT", default=0.0)
+"""Seconds of the wall that were waited, but count for nothing."""
+
+
+def clock() -> float:
+    """Seconds from some moment on, without those that count for nothing."""
+    return time.perf_counter() - _LEFT_OUT.get()
+
+
+def leave_out(seconds: float) -> None:
+    """Within `waiting`: so much of the time that has passed counts for nothing."""
+    _LEFT_OUT.set(_LEFT_OUT.get() + seconds)
 
 
 class limited:  # noqa: N801 - read as a statement
@@ -70,11 +84,11 @@ def waiting(seconds: float) -> Generator[float]:
         TimeIsUp: Nothing is left.
     """
     look()
-    began = time.perf_counter()
+    began = clock()
     try:
         yield min(seconds, _UNTIL.get() - time.thread_time())
     finally:
-        _UNTIL.set(_UNTIL.get() - (time.perf_counter() - began))
+        _UNTIL.set(_UNTIL.get() - (clock() - began))
 
 
 @contextmanager
@@ -84,4 +98,4 @@ def uncounted() -> Generator[None]:
     try:
         yield
     finally:
-        _UNTIL.set(_UNTIL.get() + (time.perf_counter() - began))
+        leave_out(time.perf_counter() - began)

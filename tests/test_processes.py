@@ -168,12 +168,9 @@ def test_processes_that_never_start_are_no_endless_loop(monkeypatch):
 
 
 def test_an_interrupt_ends_the_processes_at_once():
-    began = time.monotonic()
-
     def interrupt(_):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt), Workers(1, patient, (0,)) as workers:
         list(workers.run([60], interrupt))
-    assert time.monotonic() - began < 30
     assert multiprocessing.active_children() == []

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, cast
 
 from scenicq.compiler.values import Choice, ModelValue, describe, fail, is_node
-from scenicq.errors import Span
+from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant
 
 __all__ = ["LARGEST", "check_weight", "hashed", "is_flat", "is_random", "plain_binary", "plain_unary"]
@@ -98,6 +98,11 @@ def check_weight(span: Span, *values: ModelValue, compared: bool = False) -> Non
     if held and _weigh(held, span, compared=compared) > LARGEST:
         raise fail("budget-exceeded", "this value is too large to go through", span, "nested or long beyond bounds",
                    (f"keep lists below {LARGEST:,} items and {_DEEPEST} levels",))  # fmt: skip
+
+
+def no_number(error: ArithmeticError, span: Span | None, label: str) -> ScenarioError:
+    """A runtime-error where arithmetic on known numbers has no result, or one that no float holds."""
+    return fail("runtime-error", f"a number is too large, or not one: {error}", span, label)
 
 
 def _check_size(op: str, left: Any, right: Any, span: Span) -> None:

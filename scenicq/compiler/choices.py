@@ -69,17 +69,19 @@ def each_existing(run: Runner, choice: Choice, function: Callable[[ModelValue], 
     missing: ScenarioError | None = None
     for number, option in enumerate(choice.options):
         try:
-            with run.assuming(choice.index, number, len(choice.options)):
+            with run.excluded.assuming(choice.index, number, len(choice.options)):
                 found[number] = function(option)
         except ScenarioError as error:
             if option is not None and error.diagnostics[0].code not in _LACKING:
                 raise
             missing = missing or error
+            if option is not None:
+                run.excluded.note_lacking(choice.index)
     if not found:
         assert missing is not None
         raise missing
     count = len(choice.options)
-    run.exclude(choice.index, [number for number in range(count) if number not in found], count, span)
+    run.excluded.add(choice.index, [number for number in range(count) if number not in found], count, span)
     spare = next(iter(found.values()))
     return make_choice(choice.index, [found.get(number, spare) for number in range(count)], span)
 
@@ -88,7 +90,7 @@ def each_option(run: Runner, choice: Choice, function: Callable[[ModelValue], Mo
     """Apply a function that runs the program to each option; what one of them lacks excludes that option alone."""
     options: list[ModelValue] = []
     for number, option in enumerate(choice.options):
-        with run.assuming(choice.index, number, len(choice.options)):
+        with run.excluded.assuming(choice.index, number, len(choice.options)):
             options.append(function(option))
     return make_choice(choice.index, options, span)
 

@@ -7,6 +7,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import replace
 from typing import cast
 
@@ -24,6 +27,7 @@ __all__ = [
     "PARTIAL",
     "kind_of_model",
     "property_node",
+    "read_over_time",
     "to_boolean",
     "to_field",
     "to_heading",
@@ -51,15 +55,29 @@ PARTIAL = frozenset({"parentOrientation", "yaw"})
 """Properties that only make up the heading: not features of their own."""
 
 
+_OVER_TIME: ContextVar[bool] = ContextVar("_OVER_TIME", default=False)
+"""Whether properties are read at each sample: see `Feature.current`."""
+
+
+@contextmanager
+def read_over_time() -> Generator[None]:
+    """While a condition over time is evaluated: what it reads of objects is read at each sample."""
+    token = _OVER_TIME.set(True)
+    try:
+        yield
+    finally:
+        _OVER_TIME.reset(token)
+
+
 def property_node(instance: Instance, name: str, span: Span | None) -> ModelValue:
     """The value of a property of an instance, by reference where a label may observe it."""
     value = instance.properties[name]
     if instance.index is None or name in PARTIAL:
         return value
     if name in OBSERVABLE:
-        return Feature(instance.index, name, OBSERVABLE[name], span=span)
+        return Feature(instance.index, name, OBSERVABLE[name], _OVER_TIME.get(), span=span)
     if is_node(value) and not isinstance(value, Constant):
-        return Feature(instance.index, name, kind_of(value), span=span)
+        return Feature(instance.index, name, kind_of(value), _OVER_TIME.get(), span=span)
     return value
 
 

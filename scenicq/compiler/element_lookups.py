@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
-from scenicq.compiler.occupancy import Layer, Occupancy, Ranked
+from shapely.geometry import Polygon
+
+from scenicq.compiler.occupancy import TOLERANCE, Layer, Occupancy, Ranked
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, Feature, Index, Node, Select
@@ -35,6 +37,22 @@ def _roads(network: Network) -> list[list[Entry]]:
     return [[(lane, lane.road, lane) for lane in network.lanes], own(network.allRoads)]
 
 
+def _lane_sections(network: Network) -> list[list[Entry]]:
+    """The sections of lanes, each with what of its lane lies within the tolerance of it and in none of them.
+
+    Scenic looks for the lane first, which holds more points than its sections where cracks are between these.
+    """
+    found: list[Entry] = []
+    for lane in network.lanes:
+        found += [(section, section, lane) for section in lane.sections]
+        cracks = shapes.difference(lane.polygon, shapes.union_all([section.polygon for section in lane.sections]))
+        for section in lane.sections if cracks.area > 0 else ():
+            beside = shapes.intersection(cracks, shapes.band(section.polygon, TOLERANCE))
+            parts = shapes.polygonal_part(beside)
+            found += [(NetworkElement(section.id, cast(Polygon, part)), section, lane) for part in parts]
+    return [found]
+
+
 def _elements(network: Network) -> list[list[Entry]]:
     kinds: tuple[Sequence[NetworkElement], ...] = (
         network.intersections, network.allRoads, network.lanes, network.shoulders, network.sidewalks,
@@ -45,7 +63,7 @@ def _elements(network: Network) -> list[list[Entry]]:
 
 LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[Entry]]]]] = {
     "laneAt": ("lane", lambda network: [own(network.lanes)]),
-    "laneSectionAt": ("lane", lambda network: [[(s, s, s.lane) for s in network.laneSections]]),
+    "laneSectionAt": ("lane", _lane_sections),
     "laneGroupAt": ("lane", _lane_groups),
     "roadAt": ("lane", _roads),
     "intersectionAt": ("intersection", lambda network: [own(network.intersections)]),

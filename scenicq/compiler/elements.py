@@ -127,7 +127,8 @@ def _way(lane: Lane | None) -> Any:
     """The centreline of a lane as one geometry; its area where there is none."""
     if lane is None:
         return None
-    return shapely.union_all(lane.centerline.lines) if lane.centerline else lane.polygon
+    # a union would make new nodes, and lines that meet at their ends would miss each other
+    return shapely.multilinestrings(lane.centerline.lines) if lane.centerline else lane.polygon
 
 
 def _type_of(maneuver: Maneuver) -> str:

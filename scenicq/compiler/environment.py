@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
 from difflib import get_close_matches
 from typing import Protocol
 
 from scenicq.budget import look
 from scenicq.compiler.element_lookups import Lookups
+from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.unavailable import unavailable_name
 from scenicq.compiler.values import Function, Instance, ModelValue, fail
 from scenicq.errors import Span
-from scenicq.forest.nodes import Node
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 
@@ -169,6 +168,7 @@ class Runner(Protocol):
         objects: The objects made so far.
         network: The road network that the program is compiled against.
         lookups: What the program asks about places of the map.
+        excluded: Outcomes of random choices that no scene has.
     """
 
     version: int
@@ -177,6 +177,7 @@ class Runner(Protocol):
     objects: list[Instance]
     network: Network
     lookups: Lookups
+    excluded: Exclusions
 
     def ego(self, span: Span) -> Instance:
         """The ego.
@@ -217,12 +218,4 @@ class Runner(Protocol):
 
     def dynamic(self, kind: str, span: Span) -> None:
         """Refuse what does not describe one instant, or note that it is ignored."""
-        ...
-
-    def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:
-        """Require that a choice between `count` options does not come out as one of some: they have no value."""
-        ...
-
-    def assuming(self, index: Node, option: int, count: int) -> AbstractContextManager[None]:
-        """What is excluded meanwhile is so only where a choice comes out as an option of `count`."""
         ...

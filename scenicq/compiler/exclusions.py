@@ -50,6 +50,7 @@ class Exclusions:
         """Start with none."""
         self._found: dict[_Key, _Choice] = {}
         self._assumed: list[tuple[Node, int, int]] = []
+        self._lacking: set[_Key] = set()
 
     @contextmanager
     def assuming(self, index: Node, option: int, count: int) -> Generator[None]:
@@ -76,6 +77,14 @@ class Exclusions:
         for around, (outer, option, width) in path.items():
             level = level.setdefault(around, _Choice(outer, width, span)).under.setdefault(option, {})
         level.setdefault(key, _Choice(index, count, span)).excluded.update(options)
+
+    def note_lacking(self, index: Node) -> None:
+        """Some option of a choice is there, but lacks a part that the program asks for."""
+        self._lacking.add(_key(index))
+
+    def may_lack(self, index: Node) -> bool:
+        """Whether that was noted of a choice."""
+        return _key(index) in self._lacking
 
     def conditions(self) -> list[tuple[Node, Span]]:
         """That the choices come out as something else, each with the place that needs it."""

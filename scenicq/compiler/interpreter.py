@@ -10,10 +10,10 @@ The interpreter collects objects, requirements and parameters; `program` turns t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import Any, assert_never, cast
 
+from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
@@ -138,14 +138,6 @@ class Interpreter:
         """The value of an expression; see `Runner`."""
         return evaluate(self, node, scope)
 
-    def exclude(self, index: Node, options: list[int], count: int, span: Span) -> None:
-        """Require that a choice does not come out as one of some options; see `Runner`."""
-        self.excluded.add(index, options, count, span)
-
-    def assuming(self, index: Node, option: int, count: int) -> AbstractContextManager[None]:
-        """Exclude only under an option of a choice; see `Runner`."""
-        return self.excluded.assuming(index, option, count)
-
     def demand(self, condition: Callable[[], Node], span: Span) -> None:
         """Require a condition; see `specifiers.Evaluator`."""
         self.requirements.append(Requirement(condition, span))
@@ -206,7 +198,9 @@ class Interpreter:
         self, cls: ScenicClass, specifiers: tuple[ast.Specifier, ...], scope: Environment, span: Span
     ) -> Instance:
         is_object = cls.derives_from("Object")
-        around = Surroundings(self.version, self.ego, lambda: self.workspace, self.budget, is_object=is_object)
+        around = Surroundings(
+            self.version, self.ego, lambda: self.workspace, self.budget, self.excluded.may_lack, is_object=is_object
+        )
         kept = [node for node in specifiers if not self._is_dynamic(node)]
         bound = tuple(bind(node, lambda part: evaluate(self, part, scope), around) for node in kept)
         if scope.library:
@@ -247,8 +241,7 @@ class Interpreter:
             try:
                 self._execute(statement, scope)
             except ArithmeticError as error:
-                told = f"a number is too large, or not one: {error}"
-                raise fail("runtime-error", told, statement.span, "in this statement") from None
+                raise no_number(error, statement.span, "in this statement") from None
 
     def _execute(self, node: ast.Statement, scope: Environment) -> None:
         self.budget.step(node.span)

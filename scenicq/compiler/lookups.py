@@ -85,5 +85,5 @@ def _at(
     run.budget.step(span, len(options) // run.budget.ITEMS_PER_STEP)
     index = run.lookups.index(key, table, place, span)
     if reject:
-        run.exclude(index, [len(table.options)], len(options), span)
+        run.excluded.add(index, [len(table.options)], len(options), span)
     return Choice(index, options, len(options))

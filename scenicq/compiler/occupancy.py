@@ -28,7 +28,7 @@ from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.regions import SLACK
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["Layer", "Occupancy", "Place", "Ranked"]
+__all__ = ["TOLERANCE", "Layer", "Occupancy", "Place", "Ranked"]
 
 TOLERANCE = 0.05
 """Metres beside an element that still count as in it where no element holds a point (Scenic's `tolerance`)."""

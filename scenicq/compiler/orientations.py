@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import cast
 
 from scenicq.errors import Span
@@ -20,7 +21,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.regions import PolygonSet, Region, orientation_of
 
-__all__ = ["orientation"]
+__all__ = ["is_always_there", "orientation"]
 
 
 def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
@@ -45,6 +46,32 @@ def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
             return orientation(region.base, point, span)
         case _:
             return None
+
+
+def is_always_there(region: Node, may_lack: Callable[[Node], bool]) -> bool:
+    """Whether a region is there in every outcome; an element that is chosen at random may lack the part asked for.
+
+    Scenic draws a random region once, while it compiles: only where that succeeds does the region give a heading.
+
+    Args:
+        region: The region.
+        may_lack: Whether some option of the choice with an index lacks a part.
+    """
+    todo = [region]
+    while todo:
+        part = todo.pop()
+        match part:
+            case Select():
+                if may_lack(part.index):
+                    return False
+                todo += part.options
+            case RegionIntersection() | RegionUnion():
+                todo += part.parts
+            case RegionDifference():
+                todo += [part.base, part.removed]
+            case _:
+                pass
+    return True
 
 
 def _any_heading(span: Span | None) -> Node:

@@ -16,7 +16,7 @@ from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to
 from scenicq.compiler.deviations import DEVIATIONS, deviation, leaves_the_plane
 from scenicq.compiler.environment import FIRST_NAMES, Budget
 from scenicq.compiler.following import follow
-from scenicq.compiler.orientations import orientation
+from scenicq.compiler.orientations import is_always_there, orientation
 from scenicq.compiler.specifiers import BoundSpecifier
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, lift
 from scenicq.errors import Span
@@ -38,18 +38,20 @@ class Surroundings:
         ego: Gives the ego, or fails where there is none yet.
         workspace: The workspace's region.
         budget: What the program may still use.
+        may_lack: Whether some option of the choice with an index lacks a part that the program asked for.
         is_object: Whether an object, rather than a point, is being placed.
     """
 
     def __init__(
-        self, version: int, ego: Callable[[Span], Instance], workspace: Callable[[], Node], budget: Budget, *,
-        is_object: bool,
+        self, version: int, ego: Callable[[Span], Instance], workspace: Callable[[], Node], budget: Budget,
+        may_lack: Callable[[Node], bool], *, is_object: bool,
     ) -> None:  # fmt: skip
         """Take what the interpreter knows."""
         self.version = version
         self.ego = ego
         self.workspace = workspace
         self.budget = budget
+        self.may_lack = may_lack
         self.is_object = is_object
 
 
@@ -101,7 +103,9 @@ def _own_position(instance: Instance, position: Node, span: Span) -> Node:
     return position if instance.index is None else Feature(instance.index, "position", "vector", span=span)
 
 
-def _in_region(span: Span, region: ModelValue, *, contained: bool = False, modifies: bool = False) -> BoundSpecifier:
+def _in_region(
+    span: Span, region: ModelValue, around: Surroundings, *, contained: bool = False, modifies: bool = False
+) -> BoundSpecifier:
     area = operators.existing(region, span)
     point = PointIn(area, span=span)
     has_heading = orientation(area, point, span) is not None
@@ -117,10 +121,12 @@ def _in_region(span: Span, region: ModelValue, *, contained: bool = False, modif
 
     gives = "position regionContainedIn" if contained else "position"
     optional = "heading" if has_heading else ""
+    perhaps = has_heading and not is_always_there(area, around.may_lack)
     if not modifies:
-        return _specifier(span, gives, evaluate, optionally=optional)
+        return replace(_specifier(span, gives, evaluate, optionally=optional), perhaps=perhaps)
     # in the plane, projecting a position that is given otherwise onto a region is to demand that it lies there
-    return _specifier(span, gives, evaluate, optionally=optional, rank=2, modifies="position", condition=inside)
+    bound = _specifier(span, gives, evaluate, optionally=optional, rank=2, modifies="position", condition=inside)
+    return replace(bound, perhaps=perhaps)
 
 
 _SIDES: dict[str, tuple[int, int]] = {"left": (-1, 0), "right": (1, 0), "ahead": (0, 1), "behind": (0, -1)}
@@ -180,7 +186,7 @@ def _visible(
     if around.version < 3:
         whole = around.workspace()
         return _in_region(span, fold(RegionDifference(whole, seen, span=span)) if hidden
-                          else operators.region_intersection(seen, whole, span))  # fmt: skip
+                          else operators.region_intersection(seen, whole, span), around)  # fmt: skip
 
     def place(instance: Instance) -> Mapping[str, ModelValue]:
         if not hidden:
@@ -339,11 +345,11 @@ def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Boun
                 raise fail("unsupported-construct", "a place on an object is not supported", span,
                            "labels are matched in 2D",
                            ("place it `at` the object's position, or `ahead of` it",))  # fmt: skip
-            return _in_region(span, region, modifies=around.version == 3)
+            return _in_region(span, region, around, modifies=around.version == 3)
         case ast.InSpecifier():
-            return _in_region(span, evaluate(node.region))
+            return _in_region(span, evaluate(node.region), around)
         case ast.ContainedInSpecifier():
-            return _in_region(span, evaluate(node.region), contained=True)
+            return _in_region(span, evaluate(node.region), around, contained=True)
         case ast.OffsetBySpecifier():
             ego = around.ego(span)
             position = lift(lambda by: operators.offset(ego, by, span), evaluate(node.offset))

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import PurePosixPath
-from typing import cast
+from typing import TypeVar, cast
 
 from scenicq.budget import TimeIsUp, limited
 from scenicq.compiler import operators
+from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.deviations import is_zero
@@ -157,6 +159,9 @@ def _on_map(error: ScenarioError, network: Network) -> ScenarioError:
     return ScenarioError(told)
 
 
+_Result = TypeVar("_Result")
+
+
 class _World:
     """The names and modules that a program sees, over one map."""
 
@@ -237,7 +242,9 @@ def _scenario(
         raise _no_ego(run, module, version)
     ego = run.current_ego
     hard, soft = ([each for each in run.requirements if (each.probability < 1) == low] for low in (False, True))
-    requirements = [_written(requirement.condition(), requirement.span) for requirement in hard]
+    requirements = [
+        _written(_at_the_end(requirement.condition, requirement.span), requirement.span) for requirement in hard
+    ]
     requirements += [_written(condition, span) for condition, span in run.excluded.conditions()]
     requirements = [requirement for requirement in requirements if requirement is not None]
     requirements += _built_in(run, ego)
@@ -245,7 +252,7 @@ def _scenario(
     names = _names(run.objects)
     objects = tuple(_object(instance, names[number]) for number, instance in enumerate(run.objects))
     params = {
-        name: Property(to_node(value, span), explicit=not library, span=span)
+        name: Property(_at_the_end(partial(to_node, value, span), span), explicit=not library, span=span)
         for name, (value, span, library) in run.params.items()
         if value is not None and _is_feature(value)
     }
@@ -253,10 +260,21 @@ def _scenario(
     return Scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
-        tuple(Requirement(each.condition(), each.span, probability=each.probability) for each in soft),
+        tuple(
+            Requirement(_at_the_end(each.condition, each.span), each.span, probability=each.probability)
+            for each in soft
+        ),
         tuple(run.ignored), (*warnings, *(run.timed.remarks() if run.timed is not None else ())),
         dynamics=run.timed.dynamics() if run.timed is not None else None,
     )  # fmt: skip
+
+
+def _at_the_end(work: Callable[[], _Result], span: Span | None) -> _Result:
+    """What is worked out when the program has run: its numbers may still be too large."""
+    try:
+        return work()
+    except ArithmeticError as error:
+        raise no_number(error, span, "of this") from None
 
 
 def _names(objects: list[Instance]) -> list[str]:
@@ -300,7 +318,7 @@ def _object(instance: Instance, name: str) -> ScenarioObject:
         if key in PARTIAL:
             continue
         span = instance.spans.get(key) or instance.span
-        node = _property(key, value, span)
+        node = _at_the_end(partial(_property, key, value, span), span)
         if key in ("width", "length") and isinstance(node, Constant) and cast(float, node.value) <= 0:
             raise fail("wrong-value", f"the {key} of an object must be positive", span, "not positive")
         if node is not None:

@@ -61,6 +61,8 @@ def _edges(group: LaneGroup) -> tuple[LineString, ...]:
 
 
 def _curb(network: Network, group: LaneGroup) -> ModelValue:
+    if named := network.curbs_of(group):
+        return _lines(named, f"curb of {group.id}")
     edges = _edges(group)
     if not edges:
         return None

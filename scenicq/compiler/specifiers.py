@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
+from scenicq.compiler.choices import make_choice
+from scenicq.compiler.coerce import to_node
 from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, ScenicClass, fail
 from scenicq.errors import Note, Span
-from scenicq.forest.nodes import Node
+from scenicq.forest.nodes import Constant, DirectionAt, Feature, Index, Node
 
 __all__ = ["BoundSpecifier", "Evaluator", "construct"]
 
@@ -32,6 +34,7 @@ class BoundSpecifier:
         rank: Of several optional specifiers of a property the one of the lowest rank counts (Scenic 3's priorities).
         modifies: A property that it gives only if no other specifier does; if one does, it adds a condition instead.
         condition: The condition: requires something of the finished object.
+        perhaps: Whether Scenic may take what it gives optionally or the class's default, as it happens.
     """
 
     gives: frozenset[str]
@@ -43,6 +46,7 @@ class BoundSpecifier:
     rank: int = 3
     modifies: str = ""
     condition: Callable[[Instance], Node] | None = None
+    perhaps: bool = False
 
 
 class Evaluator(Protocol):
@@ -134,8 +138,11 @@ def construct(
             raise fail("specifier-conflict", f"`{name}` is final in `{instance.cls.name}`", specifier.span,
                        "cannot be specified", ("remove this specifier",))  # fmt: skip
     for name, chain in definitions.items():
+        default = _default_specifier(name, chain, evaluator)
         if name not in chosen:
-            chosen[name] = _default_specifier(name, chain, evaluator)
+            chosen[name] = default
+        elif chosen[name].perhaps and name in chosen[name].optionally:
+            chosen[name] = _either(name, chosen[name], default)
     for name in _order(chosen, instance):
         specifier = chosen[name]
         if name in instance.properties:
@@ -150,6 +157,29 @@ def construct(
         replaced = specifier.modifies and chosen[specifier.modifies] is not specifier
         if specifier.condition is not None and specifier.span is not None and (replaced or not specifier.modifies):
             evaluator.demand(partial(specifier.condition, instance), specifier.span)
+
+
+def _either(name: str, given: BoundSpecifier, default: BoundSpecifier) -> BoundSpecifier:
+    """A property as a specifier gives it or as the class does."""
+
+    def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
+        options = [specifier.evaluate(instance)[name] for specifier in (given, default)]
+        one, other = (to_node(option, given.span) for option in options)
+        return {name: one if _is_same(one, other) else make_choice(Index((1.0, 1.0)), [one, other], given.span)}
+
+    needs = given.needs | default.needs
+    return BoundSpecifier(frozenset({name}), frozenset(), needs, evaluate, given.span, given.explicit)
+
+
+def _is_same(one: Node, other: Node) -> bool:
+    """Whether two headings are the same direction at the same place, as on a road."""
+    if not (isinstance(one, DirectionAt) and isinstance(other, DirectionAt)):
+        return False
+    fields = [field.value if isinstance(field, Constant) else field for field in (one.field, other.field)]
+    places = [
+        (place.object, place.property) if isinstance(place, Feature) else place for place in (one.point, other.point)
+    ]
+    return fields[0] is fields[1] and places[0] == places[1]
 
 
 def _order(chosen: Mapping[str, BoundSpecifier], instance: Instance) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
+from scenicq.compiler.coerce import read_over_time
 from scenicq.errors import Diagnostic, Span
 from scenicq.forest.nodes import Node
 from scenicq.forest.temporal import (
@@ -84,8 +85,10 @@ class TimedStatements:
         """What has been collected; None for a static program."""
         if not self.used:
             return None
+        with read_over_time():
+            conditions = tuple(condition() for condition in self._conditions)
         return Dynamics(
-            tuple(condition() for condition in self._conditions),
+            conditions,
             tuple(self._requirements),
             tuple(self._terminations),
             tuple(self._monitors),

@@ -15,13 +15,14 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.evaluate.expression_arrays import Array, ArrayValue, Pair, UncomputedError, evaluate_arrays
+from scenicq.evaluate.expression_arrays import UncomputedError, evaluate_arrays
 from scenicq.evaluate.variables import Draws, density_of, point_density
+from scenicq.forest.columns import Array, Coded, Data, Vectors, constant_column
 from scenicq.forest.groups import Comparison, Condition, Group
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -48,7 +49,7 @@ Observed = Mapping[tuple[int, str], Value]
 
 _CHUNK = 200
 _AFFINE = 1e-6
-_Draw = Callable[[Leaf, tuple[ArrayValue, ...]], ArrayValue]
+_Draw = Callable[[Leaf, tuple[Data, ...]], Data]
 
 _ANGLES = frozenset({"heading"})
 _SLACK = 1e-3
@@ -121,7 +122,7 @@ class GroupDensity:
 
     def _weights(self, columns: _Columns, dimension: int, turns: tuple[float, ...]) -> Array:
         """What is averaged, for headings that are whole turns off: shape broadcastable to (labels, draws)."""
-        solved: dict[Identity, ArrayValue] = {}
+        solved: dict[Identity, Data] = {}
         density: Array = np.ones((1, 1))
         if self._continuous:
             base, matrix = self._affine(columns, dimension)
@@ -139,27 +140,27 @@ class GroupDensity:
                 density = np.where(size > 0, 1 / size, 0.0)
         return density * self._chances(columns, solved)
 
-    def _assign(self, values: Sequence[Array]) -> dict[Identity, ArrayValue]:
-        found: dict[Identity, ArrayValue] = {}
+    def _assign(self, values: Sequence[Array]) -> dict[Identity, Data]:
+        found: dict[Identity, Data] = {}
         left = iter(values)
         for leaf in self._pivots:
             found[leaf.identity] = (next(left), next(left)) if isinstance(leaf, PointIn) else next(left)
         return found
 
-    def _chances(self, columns: _Columns, solved: Mapping[Identity, ArrayValue]) -> Array:
+    def _chances(self, columns: _Columns, solved: Mapping[Identity, Data]) -> Array:
         """Densities of the solved variables at their values, where all that must hold does."""
         density: list[Array] = [np.ones((1, 1))]
         whole = {leaf.identity: self._whole(leaf) for leaf in self._pivots}
 
-        def draw(leaf: Leaf, args: tuple[ArrayValue, ...]) -> ArrayValue:
+        def draw(leaf: Leaf, args: tuple[Data, ...]) -> Data:
             if leaf.identity not in solved:
                 return self.draws.draw(leaf, args)
             value = solved[leaf.identity]
             choices = whole[leaf.identity]
             if choices is not None:
-                density.append(_mixture(choices, cast(Pair, value)))
+                density.append(_mixture(choices, cast(Vectors, value)))
             elif isinstance(leaf, PointIn):
-                density.append(point_density(args[0], cast(Pair, value)))
+                density.append(point_density(args[0], cast(Vectors, value)))
             else:
                 density.append(density_of(leaf, args, cast(Array, value)))
             return value
@@ -209,7 +210,7 @@ class GroupDensity:
         """The coordinates of the features where solved variables have some values."""
         known = self._assign(values) if pivots is None else _assigned(pivots, values)
 
-        def draw(leaf: Leaf, args: tuple[ArrayValue, ...]) -> ArrayValue:
+        def draw(leaf: Leaf, args: tuple[Data, ...]) -> Data:
             return known[leaf.identity] if leaf.identity in known else self.draws.draw(leaf, args)
 
         roots = tuple(self._roots[id(each)] for each in self._continuous)
@@ -259,7 +260,7 @@ def _is_continuous(leaf: Leaf) -> bool:
     return isinstance(leaf, Range | Normal | TruncatedNormal | PointIn)
 
 
-def _assigned(pivots: Sequence[Leaf], values: Sequence[Array]) -> dict[Identity, ArrayValue]:
+def _assigned(pivots: Sequence[Leaf], values: Sequence[Array]) -> dict[Identity, Data]:
     left = iter(values)
     return {leaf.identity: (next(left), next(left)) if isinstance(leaf, PointIn) else next(left) for leaf in pivots}
 
@@ -274,7 +275,7 @@ def _turned(node: Node) -> Node:
     return node
 
 
-def _without_regions(roots: tuple[Node, ...], known: Mapping[Identity, ArrayValue]) -> tuple[Node, ...]:
+def _without_regions(roots: tuple[Node, ...], known: Mapping[Identity, Data]) -> tuple[Node, ...]:
     """The roots with points whose value is known no longer over their regions, which need not be computed."""
     memo: dict[int, Node] = {}
     for node in postorder(roots):
@@ -286,24 +287,24 @@ def _without_regions(roots: tuple[Node, ...], known: Mapping[Identity, ArrayValu
     return tuple(memo[id(root)] for root in roots)
 
 
-def _once(draw: _Draw, mixed: Sequence[Leaf], solved: Mapping[Identity, ArrayValue]) -> _Draw:
+def _once(draw: _Draw, mixed: Sequence[Leaf], solved: Mapping[Identity, Data]) -> _Draw:
     """As `draw`, but for points whose density has been counted already."""
     done = {leaf.identity for leaf in mixed}
 
-    def drawn(leaf: Leaf, args: tuple[ArrayValue, ...]) -> ArrayValue:
+    def drawn(leaf: Leaf, args: tuple[Data, ...]) -> Data:
         return solved[leaf.identity] if leaf.identity in done else draw(leaf, args)
 
     return drawn
 
 
-def _mixture(choices: Sequence[tuple[float, Node]], point: Pair) -> Array:
+def _mixture(choices: Sequence[tuple[float, Node]], point: Vectors) -> Array:
     total: Array = np.zeros((1, 1))
     for weight, option in choices:
-        total = total + weight * point_density(cast(Any, cast(Constant, option).value), point)
+        total = total + weight * point_density(constant_column(cast(Constant, option).value).data, point)
     return total
 
 
-def _coordinates(values: Sequence[ArrayValue]) -> list[Array]:
+def _coordinates(values: Sequence[Data]) -> list[Array]:
     found: list[Array] = []
     for value in values:
         if isinstance(value, tuple):
@@ -347,7 +348,7 @@ class _Columns:
 
     def __init__(self, labels: Sequence[Observed]) -> None:
         self._labels = labels
-        self.values: dict[tuple[int, str], ArrayValue] = {}
+        self.values: dict[tuple[int, str], Data] = {}
         for key in labels[0] if labels else ():
             self.values[key] = _column([label[key] for label in labels])
 
@@ -365,19 +366,19 @@ class _Columns:
             value = self.values[each.object, each.property]
             if isinstance(value, tuple):
                 yield from ((axis, False) for axis in value)
-            elif isinstance(value, np.ndarray) and value.dtype != object:
+            elif isinstance(value, np.ndarray):
                 yield value, each.property in _ANGLES
             else:
                 raise UncomputedError(f"`{each.property}` is no number")
 
-    def holds(self, each: Comparison, value: ArrayValue) -> Array:
+    def holds(self, each: Comparison, value: Data) -> Array:
         """Where a feature that hangs on finite choices has the label's value."""
         own = self.values[each.object, each.property]
         if isinstance(own, tuple) and isinstance(value, tuple):
             return np.hypot(own[0] - value[0], own[1] - value[1]) <= _SLACK
+        if isinstance(own, Coded) and isinstance(value, Coded):
+            return np.array([[one == other for other in value.options] for one in own.options])[own.which, value.which]
         if isinstance(own, np.ndarray) and isinstance(value, np.ndarray):
-            if own.dtype == object or value.dtype == object:
-                return own == value
             off = np.abs(own - value)
             if each.property in _ANGLES:
                 off = np.abs(np.mod(own - value + math.pi, math.tau) - math.pi)
@@ -385,10 +386,10 @@ class _Columns:
         raise UncomputedError(f"`{each.property}` is no number")
 
 
-def _column(values: list[Value]) -> ArrayValue:
+def _column(values: list[Value]) -> Data:
     if all(isinstance(value, tuple) for value in values):
         pairs = np.array(values, dtype=np.float64)
         return pairs[:, :1], pairs[:, 1:]
     if all(isinstance(value, bool | int | float) for value in values):
         return np.array(values, dtype=np.float64)[:, None]
-    return np.array(values, dtype=object)[:, None]
+    return Coded(np.arange(len(values))[:, None], tuple(values))

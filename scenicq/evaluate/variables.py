@@ -10,15 +10,8 @@ from typing import Any, assert_never, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.evaluate.expression_arrays import (
-    Array,
-    ArrayValue,
-    Pair,
-    RegionChoice,
-    RegionOf,
-    UncomputedError,
-    points_of,
-)
+from scenicq.evaluate.expression_arrays import UncomputedError, points_of
+from scenicq.forest.columns import Array, Coded, Data, Placed, Vectors, distances
 from scenicq.forest.draws import draw_point
 from scenicq.forest.nodes import (
     DiscAt,
@@ -36,7 +29,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.areas import area
 from scenicq.geometry.membership import contains_many
-from scenicq.geometry.regions import Region
+from scenicq.geometry.regions import SLACK, Region
 
 __all__ = ["Draws", "density_of", "point_density"]
 
@@ -55,7 +48,7 @@ class Draws:
         self.count = count
         self._rng = np.random.default_rng(seed)
         self._shares: dict[Identity, NDArray[np.float64]] = {}
-        self._points: dict[Identity, Pair] = {}
+        self._points: dict[Identity, Vectors] = {}
         self._seed = seed
 
     def _share(self, leaf: Leaf) -> NDArray[np.float64]:
@@ -66,7 +59,7 @@ class Draws:
             self._shares[leaf.identity] = (parts + self._rng.random((2, self.count))) / self.count
         return self._shares[leaf.identity][:, None, :]
 
-    def draw(self, leaf: Leaf, args: tuple[ArrayValue, ...]) -> ArrayValue:
+    def draw(self, leaf: Leaf, args: tuple[Data, ...]) -> Data:
         """Values of a variable.
 
         Args:
@@ -99,39 +92,37 @@ class Draws:
             case _:
                 assert_never(leaf)
 
-    def _point(self, leaf: PointIn, region: Any) -> ArrayValue:
-        first, second = self._share(leaf)
-        if not isinstance(region, RegionOf):
+    def _point(self, leaf: PointIn, region: Data) -> Data:
+        if not isinstance(region, Placed):
             if leaf.identity not in self._points:
-                chosen = isinstance(region, RegionChoice)
-                self._points[leaf.identity] = self._points_of(region) if chosen else self._points_in(region, self.count)
+                self._points[leaf.identity] = self._points_of(region)
             return self._points[leaf.identity]
-        args: tuple[Any, ...] = region.args
+        first, second = self._share(leaf)
+        (x, y), numbers = region.center, region.numbers
         match region.node:
             case DiscAt():
-                away, turn = args[1] * np.sqrt(first), math.tau * second
+                away, turn = numbers[0] * np.sqrt(first), math.tau * second
             case SectorAt():
-                away, turn = args[1] * np.sqrt(first), args[2] + args[3] * (second - 0.5)
+                away, turn = numbers[0] * np.sqrt(first), numbers[1] + numbers[2] * (second - 0.5)
             case RectangleAt():
-                right, ahead = args[2] * (first - 0.5), args[3] * (second - 0.5)
-                sine, cosine = np.sin(args[1]), np.cos(args[1])
-                return args[0][0] + cosine * right - sine * ahead, args[0][1] + sine * right + cosine * ahead
-            case _:
-                raise UncomputedError("a point of a region that hangs on what is hidden")
-        return args[0][0] - away * np.sin(turn), args[0][1] + away * np.cos(turn)
+                right, ahead = numbers[1] * (first - 0.5), numbers[2] * (second - 0.5)
+                sine, cosine = np.sin(numbers[0]), np.cos(numbers[0])
+                return x + cosine * right - sine * ahead, y + sine * right + cosine * ahead
+        return x - away * np.sin(turn), y + away * np.cos(turn)
 
-    def _points_of(self, region: RegionChoice) -> Pair:
+    def _points_of(self, regions: Data) -> Vectors:
         """Points of whichever region each draw has chosen."""
-        if region.which.shape != (1, self.count):
+        if not isinstance(regions, Coded) or any(size > 1 for size in regions.which.shape[:-1]):
             raise UncomputedError("a point of a region that hangs on the label")
         x, y = np.empty((1, self.count)), np.empty((1, self.count))
-        for number in cast("list[int]", np.unique(region.which).astype(np.int64).tolist()):
-            mine = region.which == number
-            found: Pair = self._points_in(region.options[number], int(mine.sum()))
+        which = np.broadcast_to(regions.which, (1, self.count))
+        for number in cast("list[int]", np.unique(which).tolist()):
+            mine = which == number
+            found: Vectors = self._points_in(cast(Region, regions.options[number]), int(mine.sum()))
             x[mine], y[mine] = found[0][0], found[1][0]
         return x, y
 
-    def _points_in(self, region: Region, count: int) -> Pair:
+    def _points_in(self, region: Region, count: int) -> Vectors:
         rng = random.Random(self._seed)
         draw = draw_point(region)
         points = [draw(rng) for _ in range(count)]
@@ -151,7 +142,7 @@ def _normal_quantile(shares: Array) -> Array:
     return np.array([_NORMAL.inv_cdf(share) for share in shares.ravel().tolist()]).reshape(shares.shape)
 
 
-def density_of(leaf: Leaf, args: tuple[ArrayValue, ...], value: Array) -> Array:
+def density_of(leaf: Leaf, args: tuple[Data, ...], value: Array) -> Array:
     """The density of a random number at some values.
 
     Args:
@@ -176,38 +167,31 @@ def density_of(leaf: Leaf, args: tuple[ArrayValue, ...], value: Array) -> Array:
                 raise UncomputedError("a variable without a density")
 
 
-def point_density(region: ArrayValue, point: Pair) -> Array:
+def point_density(region: Data, point: Vectors) -> Array:
     """The density of a uniform point of a region at some places.
 
     Raises:
         UncomputedError: The region has no area of its own, such as a line, or hangs on what is hidden.
     """
-    if isinstance(region, RegionOf):
-        return _density_in(region, point)
-    if region is None or isinstance(region, str | np.ndarray | tuple | RegionChoice):
+    if isinstance(region, Placed):
+        return np.where(distances(region, *point) <= SLACK, 1 / _area(region), 0.0)
+    only = region.options[0] if isinstance(region, Coded) and len(region.options) == 1 else None
+    if not isinstance(only, Region):
         raise UncomputedError("a point of what is no region")
-    measured = area(cast(Region, region))
+    measured = area(only)
     if not measured:
         raise UncomputedError("a point of a region without an area")
     xy, shape = points_of(point)
-    return contains_many(cast(Region, region), xy).reshape(shape) / measured
+    return contains_many(only, xy).reshape(shape) / measured
 
 
-def _density_in(region: RegionOf, point: Pair) -> Array:
-    args: tuple[Any, ...] = region.args
-    dx, dy = point[0] - args[0][0], point[1] - args[0][1]
-    with np.errstate(all="ignore"):
-        match region.node:
-            case DiscAt():
-                return np.where(np.hypot(dx, dy) <= args[1], 1 / (math.pi * args[1] ** 2), 0.0)
-            case SectorAt():
-                aside = np.abs(np.mod(np.arctan2(-dx, dy) - args[2] + math.pi, math.tau) - math.pi)
-                inside = (np.hypot(dx, dy) <= args[1]) & (aside <= args[3] / 2)
-                return np.where(inside, 2 / (np.minimum(args[3], math.tau) * args[1] ** 2), 0.0)
-            case RectangleAt():
-                sine, cosine = np.sin(args[1]), np.cos(args[1])
-                right, ahead = cosine * dx + sine * dy, -sine * dx + cosine * dy
-                inside = (np.abs(right) <= args[2] / 2) & (np.abs(ahead) <= args[3] / 2)
-                return np.where(inside, 1 / (args[2] * args[3]), 0.0)
-            case _:
-                raise UncomputedError("a point of a region that hangs on what is hidden")
+def _area(region: Placed) -> Array:
+    """Square metres."""
+    numbers = region.numbers
+    match region.node:
+        case DiscAt():
+            return math.pi * numbers[0] ** 2
+        case SectorAt():
+            return np.minimum(numbers[2], math.tau) * numbers[0] ** 2 / 2
+        case RectangleAt():
+            return numbers[1] * numbers[2]

@@ -127,11 +127,14 @@ class Feature(_Node):
         object: Index of the object in the scenario.
         property: Name of the property.
         kind: What kind of value the property has.
+        current: In a condition over time: whether it is read at each sample, as what the condition names itself is.
+            What was computed from objects before, such as the place of a point, is as it was at the first sample.
     """
 
     object: int
     property: str
     kind: Kind
+    current: bool = False
 
 
 # --- random variables (leaves): identity matters

@@ -34,12 +34,10 @@ class Nearer:
     Attributes:
         own: Segments, at least one.
         rivals: Segments, at least one.
-        inside: Where this is demanded; everywhere if None.
     """
 
     own: Segments
     rivals: Segments
-    inside: Shape | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +99,7 @@ def _narrowed(guard: Guard, bounds: Bounds, middle: NDArray[np.float64], reach: 
     """What is left of a guard for points within a reach of the middle; whether it holds if that is decided."""
     match guard:
         case Nearer():
-            return _nearer(guard, bounds, middle, reach)
+            return _nearer(guard, middle, reach)
         case Off():
             box = _box(bounds)
             if shapes.distance(guard.area, box) > _ROUNDING:
@@ -117,18 +115,12 @@ def _narrowed(guard: Guard, bounds: Bounds, middle: NDArray[np.float64], reach: 
             assert_never(guard)
 
 
-def _nearer(guard: Nearer, bounds: Bounds, middle: NDArray[np.float64], reach: float) -> Guard | bool:
-    everywhere = guard.inside is None
-    if guard.inside is not None:
-        box = _box(bounds)
-        if shapes.distance(guard.inside, box) > _ROUNDING:
-            return True
-        everywhere = shapes.covers(guard.inside, box)
+def _nearer(guard: Nearer, middle: NDArray[np.float64], reach: float) -> Guard | bool:
     own, rivals = segment_distances(middle, guard.own), segment_distances(middle, guard.rivals)
     # distances change by no more than the way: what is farther than this can be nearest nowhere in the box
     limit = 2 * reach + _ROUNDING
-    if everywhere and own.min() > rivals.min() + limit:
+    if own.min() > rivals.min() + limit:
         return False
     if own.min() + 2 * reach <= rivals.min():
         return True
-    return Nearer(guard.own[own <= own.min() + limit], guard.rivals[rivals <= rivals.min() + limit], guard.inside)
+    return Nearer(guard.own[own <= own.min() + limit], guard.rivals[rivals <= rivals.min() + limit])

@@ -30,8 +30,7 @@ def road_direction(features: Iterable[MapFeature]) -> RoadDirection:
     for feature in features:
         kept.setdefault(feature.id, feature)
     return RoadDirection(
-        tuple(DirectedLane(lane.shape, centerlines(lane)) for lane in kept.values() if lane.kind == "lane"),
-        tuple(feature.shape for feature in kept.values() if feature.kind == "intersection"),
+        tuple(DirectedLane(lane.shape, centerlines(lane)) for lane in kept.values() if lane.kind == "lane")
     )
 
 
@@ -45,5 +44,4 @@ def direction_along(features: Iterable[MapFeature], kind: str) -> RoadDirection 
     if not own or not all(lines):
         return None
     directed = tuple(DirectedLane(each.shape, along) for each, along in zip(own, lines, strict=True))
-    # where elements overlap, each has its say
-    return RoadDirection(directed, tuple(each.shape for each in own), kind)
+    return RoadDirection(directed, kind)

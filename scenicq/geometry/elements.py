@@ -295,10 +295,12 @@ class Curb:
     Attributes:
         id: The map's identifier.
         line: Where it runs, in metres.
+        group: The lane group whose curb it is, if the map says so.
     """
 
     id: str
     line: LineString
+    group: LaneGroup | None = None
 
 
 def keeps_left(section: LaneSection) -> bool:

@@ -31,6 +31,7 @@ REFERENCES: dict[str, dict[str, str]] = {
     "lane_group": {"road": "road", "opposite": "lane_group"},
     "road": {"forward": "lane_group", "backward": "lane_group", "intersection": "intersection"},
     "intersection": {"roads": "road"},
+    "curb": {"group": "lane_group"},
 }
 """Properties that refer to other features: kind -> property -> kind that it refers to."""
 

@@ -28,6 +28,7 @@ from scenicq.geometry.regions import (
     Sector,
     UnionOf,
 )
+from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 from scenicq.geometry.shapes import XY, Bounds
 from scenicq.geometry.terms import overlap, terms
 
@@ -77,10 +78,8 @@ def contains_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
     match region:
         case Everywhere() | Nowhere():
             return np.full(len(xy), isinstance(region, Everywhere))
-        case Disc():
-            return np.hypot(xy[:, 0] - region.center[0], xy[:, 1] - region.center[1]) <= region.radius + SLACK
-        case Sector() | Rectangle():
-            return np.array([contains(region, x, y) for x, y in xy.tolist()], dtype=bool)
+        case Disc() | Sector() | Rectangle():
+            return _to_shape(region, xy) <= SLACK
         case PolygonSet() | PolylineSet() | PointSet():
             result = np.zeros(len(xy), dtype=bool)
             result[shapes.tree_pairs_within(region.tree, shapes.points(xy), SLACK)[0]] = True
@@ -185,6 +184,17 @@ def bounds(region: Region) -> Bounds:
             return bounds(region.base)
         case _:
             assert_never(region)
+
+
+def _to_shape(region: Disc | Sector | Rectangle, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    dx, dy = (xy - np.array(region.center)).T
+    match region:
+        case Disc():
+            return to_discs(dx, dy, region.radius)
+        case Sector():
+            return to_sectors(dx, dy, region.radius, region.heading, region.angle)
+        case Rectangle():
+            return to_rectangles(dx, dy, region.heading, region.width, region.length)
 
 
 def _filtered(xy: NDArray[np.float64], parts: tuple[Region, ...], *, start: bool) -> NDArray[np.bool_]:

@@ -104,17 +104,31 @@ class Network:
 
     # --- regions
 
+    def curbs_of(self, group: LaneGroup) -> list[LineString]:
+        """The curbs that the map calls those of a lane group, in the direction of traffic."""
+        return self._curb_lines.get(group, [])
+
     def curbs_near(self, area: Shape) -> list[LineString]:
-        """The curbs of the map that meet an area, in the direction of traffic."""
-        return [self._curb_lines[number] for number in sorted(shapes.tree_query(self._curb_tree, area).tolist())]
+        """The curbs of the map outside of intersections that meet an area, in the direction of traffic."""
+        return [self._outer_curbs[number] for number in sorted(shapes.tree_query(self._curb_tree, area).tolist())]
 
     @cached_property
-    def _curb_lines(self) -> tuple[LineString, ...]:
-        return tuple(self.roadDirection.forward(curb.line) for curb in self.curbs)
+    def _curb_lines(self) -> dict[LaneGroup | None, list[LineString]]:
+        found: dict[LaneGroup | None, list[LineString]] = {}
+        for curb in self.curbs:
+            found.setdefault(curb.group, []).append(self.roadDirection.forward(curb.line))
+        return found
+
+    @cached_property
+    def _outer_curbs(self) -> tuple[LineString, ...]:
+        def is_inside(group: LaneGroup | None) -> bool:
+            return group is not None and group.road is not None and group.road.intersection is not None
+
+        return tuple(line for group, lines in self._curb_lines.items() if not is_inside(group) for line in lines)
 
     @cached_property
     def _curb_tree(self) -> STRtree:
-        return STRtree(self._curb_lines)
+        return STRtree(self._outer_curbs)
 
     @cached_property
     def laneRegion(self) -> PolygonSet:
@@ -153,7 +167,7 @@ class Network:
 
         Scenic makes its curbs so from its lane groups. Inside intersections there are none.
         """
-        lines = self._curb_lines
+        lines = self._outer_curbs
         if not lines:
             lines = right_edges(self.lanes, [crossing.polygon for crossing in self.intersections])
         return PolylineSet(lines, "curb", along_lines(lines, "curb"))

@@ -61,6 +61,7 @@ def link(features: Sequence[MapFeature], direction: VectorField) -> Elements:
     by_kind = {kind: [f for f in features if f.kind == kind] for kind in ("lane", "lane_section", "lane_group", "road")}
     _link_groups(by_kind["lane_group"], by_kind["lane"], elements)
     _link_roads(by_kind["road"], elements)
+    _make_curbs([f for f in features if f.kind == "curb"], elements)
     _link_sections(by_kind["lane_section"], by_kind["lane"], elements)
     _link_lanes(by_kind["lane"], elements)
     _link_intersections([f for f in features if f.kind == "intersection"], elements)
@@ -78,9 +79,6 @@ def link(features: Sequence[MapFeature], direction: VectorField) -> Elements:
 
 def _make(feature: MapFeature, direction: VectorField, elements: Elements) -> None:
     if feature.kind == "curb":
-        for number, line in enumerate(shapes.simple_parts([feature.shape])):
-            key = feature.id if number == 0 else f"{feature.id}:{number}"
-            elements.curbs[key] = Curb(key, cast(LineString, line))
         return
     area = cast("Polygon | MultiPolygon", feature.shape)
     plain = (feature.id, area, feature.properties)
@@ -109,6 +107,14 @@ def _make(feature: MapFeature, direction: VectorField, elements: Elements) -> No
 def _centerline(feature: MapFeature, direction: VectorField | None) -> PolylineSet | None:
     lines = tuple(LineString(line) for line in centerlines(feature))
     return PolylineSet(lines, f"centerline of {feature.id}", direction) if lines else None
+
+
+def _make_curbs(features: list[MapFeature], elements: Elements) -> None:
+    for feature in features:
+        group = _first(elements.groups, feature, "group")
+        for number, line in enumerate(shapes.simple_parts([feature.shape])):
+            key = feature.id if number == 0 else f"{feature.id}:{number}"
+            elements.curbs[key] = Curb(key, cast(LineString, line), group)
 
 
 def _found(table: dict[str, _Element], feature: MapFeature, key: str) -> tuple[_Element, ...]:

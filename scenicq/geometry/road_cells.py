@@ -15,39 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.geometry import shapes
-from scenicq.geometry.cell_guards import Guard, Nearer, segment_distances
+from scenicq.geometry.cell_guards import Nearer, segment_distances
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["Contest", "Outline", "convex_outlines", "segment_cells"]
+__all__ = ["Outline", "convex_outlines", "segment_cells"]
 
 _SMALLEST = 1e-10
 """Square metres below which a cell is a rounding error."""
 _ON_LINE = 1e-9
-_OVERLAP = 1e-6
-"""Square metres that a cell must share with another lane to be contested."""
 _LOST = 1e-5
 """Square metres that joining cells may lose or gain by rounding coordinates."""
 
 Outline = list[tuple[float, float]]
 """Corners of a convex piece, counter-clockwise."""
 _HalfPlane = tuple[float, float, float]  # a x + b y >= c
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Contest:
-    """Another lane that overlaps this one where the nearest segment of both decides.
-
-    Attributes:
-        shared: What lies in both.
-        segments: The other lane's centreline, (n, 4).
-        headings: Of these segments, (n,).
-    """
-
-    shared: Shape
-    segments: NDArray[np.float64]
-    headings: NDArray[np.float64]
 
 
 def convex_outlines(area: Shape) -> list[Outline]:
@@ -60,7 +43,6 @@ def segment_cells(
     segments: NDArray[np.float64],
     headings: NDArray[np.float64],
     index: int,
-    contests: Sequence[Contest] = (),
 ) -> list[FieldCell]:
     """The cells of a lane in which one segment is the nearest.
 
@@ -69,7 +51,6 @@ def segment_cells(
         segments: Its centreline, (n, 4) rows x0, y0, x1, y1 of positive length.
         headings: Of the segments, (n,).
         index: Which segment.
-        contests: The lanes that overlap it, outside of intersections.
     """
     # near segments cut most
     order = np.argsort(np.abs(np.arange(len(segments)) - index), kind="stable")
@@ -81,23 +62,8 @@ def segment_cells(
         outlines = [piece.outline for piece in pieces if (not piece.rivals) == exact]
         guards = () if exact else (Nearer(segments[index][None], segments[rivals]),)
         for part in _joined(outlines):
-            cells.append(_contested(part, float(headings[index]), guards, segments[index], contests))
+            cells.append(FieldCell(part, float(headings[index]), exact, guards))
     return cells
-
-
-def _contested(
-    polygon: NDArray[np.float64],
-    heading: float,
-    guards: tuple[Guard, ...],
-    segment: NDArray[np.float64],
-    contests: Sequence[Contest],
-) -> FieldCell:
-    """A cell with guards against the segments of lanes that overlap it."""
-    for contest in contests:
-        rivals = contest.segments[contest.headings != heading]
-        if len(rivals) and shapes.intersection(shapes.polygon(polygon), contest.shared).area > _OVERLAP:
-            guards = (*guards, Nearer(segment[None], rivals, contest.shared))
-    return FieldCell(polygon, heading, not guards, guards)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,8 @@
 """The direction of traffic as a vector field (`roadDirection` of Scenic's driving domain).
 
-At a point it is the direction of the nearest centreline segment of the lanes that contain the point; in an intersection
-each containing lane's nearest segment gives a direction of its own; off all lanes, the nearest lane within 20 m counts.
-What ties within a nanometre is all allowed.
+At a point it is the direction of the nearest segment of the centreline of the lane that holds it. Where lanes overlap,
+each gives a direction of its own: Scenic takes that of the first in its lists. Off all lanes, the nearest lane within
+20 m counts. What ties within a nanometre is all allowed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scenicq.geometry.angles import heading_of_array
 from scenicq.geometry.cell_guards import Guard, Nearer, Off, Within, segment_distances
 from scenicq.geometry.cells import joined_boxes
 from scenicq.geometry.fields import FieldCell
-from scenicq.geometry.road_cells import Contest, Outline, convex_outlines, segment_cells
+from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
 __all__ = ["DirectedLane", "RoadDirection", "along_lines"]
@@ -37,6 +37,8 @@ _MARGIN = 0.01
 """Metres by which a box of cells is grown."""
 _DIGITS = 9
 """Of a radian, to which headings are one."""
+_ONE_HEADING = 1e-6
+"""Radians by which a heading that was worked with may be off."""
 _LARGEST, _SMALLEST = 16.0, 2.0
 """Metres: sides of the squares that cover the surroundings of lanes, at first and where they are no longer split."""
 
@@ -75,12 +77,10 @@ class RoadDirection:
 
     Attributes:
         lanes: The lanes; those without a segment have no direction and are passed over.
-        intersections: Polygons of the intersections.
         name: What messages call the field.
     """
 
     lanes: tuple[DirectedLane, ...] = field(repr=False)
-    intersections: tuple[Shape, ...] = field(default=(), repr=False)
     name: str = "roadDirection"
 
     def values(self, x: float, y: float) -> tuple[float, ...]:
@@ -113,9 +113,16 @@ class RoadDirection:
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes stay whole."""
+        return self._cells_near(bounds, None)
+
+    def cells_of(self, heading: float, bounds: Bounds) -> list[FieldCell]:
+        """Those of one heading, and perhaps others off the lanes: cells of other segments need not be made."""
+        return self._cells_near(bounds, heading)
+
+    def _cells_near(self, bounds: Bounds, heading: float | None) -> list[FieldCell]:
         box = shapes.box(*bounds)
         near = np.sort(shapes.tree_query(self._tree, box)).tolist()
-        return [cell for lane in near for cell in self._lane_cells(lane, bounds)] + self._surroundings(bounds)
+        return [cell for lane in near for cell in self._lane_cells(lane, bounds, heading)] + self._surroundings(bounds)
 
     @cached_property
     def _directed(self) -> tuple[tuple[Shape, NDArray[np.float64]], ...]:
@@ -132,10 +139,6 @@ class RoadDirection:
         return STRtree(self._areas)
 
     @cached_property
-    def _crossroads(self) -> STRtree:
-        return STRtree(self.intersections)
-
-    @cached_property
     def _all(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
         """Segments of all lanes, their headings, and where each lane's begin (with the end of the last)."""
         segments = np.concatenate([np.empty((0, 4)), *(segments for _, segments in self._directed)])
@@ -144,13 +147,19 @@ class RoadDirection:
         return segments, heading_of_array(along[:, 0], along[:, 1]), starts
 
     @cached_property
+    def _distinct(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """The headings of all segments in order, rounded, and which of them each segment has."""
+        distinct, number = np.unique(np.round(self._all[1], _DIGITS), return_inverse=True)
+        return distinct, number.astype(np.intp)
+
+    @cached_property
     def _cells_of(self) -> dict[tuple[int, int], list[FieldCell]]:
         """Of each lane and segment that were asked for."""
         return {}
 
     @cached_property
-    def _lanes_known(self) -> dict[int, tuple[list[Outline], list[Contest]]]:
-        """Of each lane that was asked for the convex pieces, and what overlaps it."""
+    def _outlines(self) -> dict[int, list[Outline]]:
+        """Of each lane that was asked for the convex pieces."""
         return {}
 
     def _values(self, xy: Coordinates) -> list[tuple[float, ...]]:
@@ -159,34 +168,26 @@ class RoadDirection:
             return [()] * len(xy)
         points = shapes.points(xy)
         point, lane = shapes.tree_pairs_within(self._tree, points, _TIE)
-        # one nearest segment over all lanes, but in intersections and off the lanes one of each lane
-        group = point.copy()
         lanes = np.bincount(point, minlength=len(xy))
-        own = np.arange(len(point)) + len(xy)
-        if len(shared := np.nonzero(lanes > 1)[0]):
-            crossing = np.zeros(len(xy), dtype=bool)
-            crossing[shared[shapes.tree_pairs_within(self._crossroads, points[shared], _TIE)[0]]] = True
-            group[crossing[point]] = own[crossing[point]]
         off = np.nonzero(lanes == 0)[0]
         if len(off):
             off_point, off_lane = self._nearest_lanes(xy[off])
             point = np.concatenate([point, off[off_point]])
             lane = np.concatenate([lane, off_lane])
-            group = np.concatenate([group, np.arange(len(off_point)) + len(xy) + len(own)])
         counts = starts[lane + 1] - starts[lane]
         pair = np.repeat(np.arange(len(lane)), counts)
         segment = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[lane][pair]
         away = segment_distances(xy[point[pair]], segments[segment])
-        best = np.full(len(xy) + len(group), np.inf)
-        np.minimum.at(best, group[pair], away)
-        chosen = np.nonzero(away <= best[group[pair]] + _TIE)[0]
+        best = np.full(len(lane), np.inf)
+        np.minimum.at(best, pair, away)
+        chosen = np.nonzero(away <= best[pair] + _TIE)[0]
         found: list[dict[float, None]] = [{} for _ in range(len(xy))]
         for index, heading in zip(point[pair[chosen]].tolist(), headings[segment[chosen]].tolist(), strict=True):
             found[index][heading] = None
         return [tuple(sorted(values)) for values in found]
 
     def _headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        segments, headings, starts = self._all
+        segments, _, starts = self._all
         middle = (boxes[:, :2] + boxes[:, 2:]) / 2
         radius = np.hypot(*(boxes[:, 2:] - boxes[:, :2]).T) / 2 + _TIE
         centers = shapes.points(middle)
@@ -212,8 +213,10 @@ class RoadDirection:
         best = np.full(len(lane), np.inf)
         np.minimum.at(best, pair, gap)
         chosen = gap <= best[pair] + 2 * radius[box[pair]] + _TIE
-        found = np.unique(np.stack([box[pair[chosen]], np.round(headings[segment[chosen]], _DIGITS)]), axis=1)
-        return found[0].astype(np.intp), found[1]
+        distinct, number = self._distinct
+        # as one whole number a pair is found once much sooner than as two fractions
+        found = np.unique(box[pair[chosen]] * len(distinct) + number[segment[chosen]])
+        return found // max(1, len(distinct)), distinct[found % max(1, len(distinct))]
 
     def _nearest_lanes(self, xy: Coordinates) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Pairs (point, lane) of the lanes within reach that are nearest, ties included."""
@@ -225,38 +228,23 @@ class RoadDirection:
         nearest = (least[point] <= REACH) & (away <= least[point] + _TIE)
         return point[nearest], lane[nearest]
 
-    def _lane_cells(self, lane: int, bounds: Bounds) -> Iterator[FieldCell]:
-        """The cells of the segments of a lane that can be the nearest of it somewhere within the bounds."""
+    def _lane_cells(self, lane: int, bounds: Bounds, heading: float | None) -> Iterator[FieldCell]:
+        """The cells of a lane's segments, or those of a heading, that can be the nearest of it within the bounds."""
         _, headings, starts = self._all
         area, segments = self._directed[lane]
         west, south, east, north = bounds
         gap = segment_distances(np.array([(west + east) / 2, (south + north) / 2]), segments)
-        near = np.nonzero(gap <= gap.min() + math.hypot(east - west, north - south) + _TIE)[0].tolist()
-        for index in near:
+        near = gap <= gap.min() + math.hypot(east - west, north - south) + _TIE
+        if heading is not None:
+            near &= np.abs(headings[starts[lane] : starts[lane + 1]] - heading) <= _ONE_HEADING
+        for index in np.nonzero(near)[0].tolist():
             found = self._cells_of.get((lane, index))
             if found is None:
-                if lane not in self._lanes_known:
-                    self._lanes_known[lane] = convex_outlines(area), list(self._contests(lane))
-                outlines, contests = self._lanes_known[lane]
+                if lane not in self._outlines:
+                    self._outlines[lane] = convex_outlines(area)
                 own = headings[starts[lane] : starts[lane + 1]]
-                found = self._cells_of[lane, index] = segment_cells(outlines, segments, own, index, contests)
+                found = self._cells_of[lane, index] = segment_cells(self._outlines[lane], segments, own, index)
             yield from found
-
-    def _contests(self, lane: int) -> Iterator[Contest]:
-        """The lanes that overlap a lane outside of intersections: there, another lane's segment may be nearer."""
-        _, headings, starts = self._all
-        area = self._directed[lane][0]
-        touching: list[int] = shapes.tree_within(self._tree, area, 0.0).tolist()
-        crossing: list[int] = shapes.tree_query(self._crossroads, area).tolist()
-        for other in touching:
-            rival, segments = self._directed[other]
-            if other == lane or not _overlap(rival, area):
-                continue
-            shared = shapes.intersection(area, rival)
-            for index in crossing:
-                shared = shapes.difference(shared, self.intersections[index])
-            if shared.area > 0:
-                yield Contest(shared, segments, headings[starts[other] : starts[other + 1]])
 
     def _surroundings(self, bounds: Bounds) -> list[FieldCell]:
         """Squares over what lies off the lanes, split until one heading is left or they are small."""
@@ -339,10 +327,6 @@ class RoadDirection:
 def _corners(box: Bounds) -> NDArray[np.float64]:
     west, south, east, north = box
     return np.array([(west, south), (east, south), (east, north), (west, north)])
-
-
-def _overlap(a: Shape, b: Shape) -> bool:
-    return shapes.intersection(a, b).area > 1e-6
 
 
 def _segments(lines: Sequence[Coordinates]) -> NDArray[np.float64]:

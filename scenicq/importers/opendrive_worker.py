@@ -74,7 +74,7 @@ def _features(network: Any, left_hand: bool) -> list[dict[str, Any]]:
         links = {"road": group.road.uid, "opposite": _uid(group._opposite)}
         found.append(_feature(group.uid, "lane_group", group.polygon, links))
         if group.curb is not None:
-            found.append(_feature(f"{group.uid}_curb", "curb", _line(group.curb), {}))
+            found.append(_feature(f"{group.uid}_curb", "curb", _line(group.curb), {"group": group.uid}))
     for road in (*network.roads, *network.connectingRoads):
         directions = (_uid(road.forwardLanes), _uid(road.backwardLanes))
         forward, backward = reversed(directions) if left_hand else directions

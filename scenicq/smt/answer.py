@@ -75,7 +75,8 @@ class Solver(Protocol):
         Args:
             problem: What to decide.
             precision: The slack that a witness may need (δ), in the unit of each atom.
-            timeout_s: Wall-clock seconds after which the answer is `Unknown("timeout")`.
+            timeout_s: Seconds after which the answer is `Unknown("timeout")`: of the processor where the solver runs in
+                a worker of ours, else of the wall.
         """
         ...
 

@@ -5,8 +5,7 @@ A solver that gets lost among the cells of a map, or the directions at a point, 
 
 from __future__ import annotations
 
-import time
-
+from scenicq.budget import clock
 from scenicq.smt.answer import Answer, Sat, Solver, Unknown, Unsat
 from scenicq.smt.formula import And, Or, Problem, conjunction
 
@@ -44,10 +43,10 @@ def check_by_cases(solver: Solver, problem: Problem, *, precision: float, timeou
     waiting = cases(problem)
     if not waiting:
         return answer
-    deadline = time.monotonic() + timeout_s
+    deadline = clock() + timeout_s
     decided = True
     while waiting:
-        left_s = deadline - time.monotonic()
+        left_s = deadline - clock()
         if left_s <= 0:
             return answer
         case = waiting.pop(0)

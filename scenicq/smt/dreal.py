@@ -87,7 +87,7 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
     dReal takes a conjunction in less than a millisecond, but can take seconds for a disjunction of twenty together with
     equalities: hence the disjunctions are split here, one after the other.
     """
-    deadline = time.monotonic() + timeout_s
+    deadline = time.thread_time() + timeout_s
     related = without_inverses(problem)
     variables = {variable.name: dreal.Variable(variable.name) for variable in related.variables}
     fixed, choices = _cases(related.constraint)
@@ -102,7 +102,7 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
     waiting: list[list[Symbolic]] = [[]]
     while waiting:
         chosen = waiting.pop()
-        if time.monotonic() > deadline:
+        if time.thread_time() > deadline:
             return Unknown("timeout")
         if len(chosen) < len(options):
             # most alternatives contradict those that were chosen before, which a coarse look tells
@@ -112,7 +112,7 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
             continue
         # the box of an answer can be so wide that its middle is no solution: then finer, and close to the origin
         for bounds, delta in ((given, precision), (near, precision), (near, precision / 100)):
-            if time.monotonic() > deadline:
+            if time.thread_time() > deadline:
                 return Unknown("timeout")
             box = dreal.CheckSatisfiability(_all([bounds, common, *chosen]), delta)
             if box is None:

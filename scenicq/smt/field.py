@@ -75,8 +75,7 @@ def _misses(polygon: NDArray[np.float64], box: Bounds) -> bool:
 def _guard(guard: Guard, point: Vector) -> Formula:
     match guard:
         case Nearer():
-            nearer = compare("<=", _least(point, guard.own), _least(point, guard.rivals))
-            return nearer if guard.inside is None else disjunction([nearer, negation(_inside(point, guard.inside))])
+            return compare("<=", _least(point, guard.own), _least(point, guard.rivals))
         case Off():
             return negation(_inside(point, guard.area))
         case Within():

@@ -16,18 +16,19 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
-from scenicq.budget import uncounted
+from scenicq.budget import leave_out, uncounted
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.smt.answer import Answer, Sat, Unknown
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem
-from scenicq.smt.worker import Request, Setup, read_answer
+from scenicq.smt.worker import Request, Setup, read_answer, seconds_of
 
 __all__ = ["DREAL", "PORTABLE", "WorkerSolver", "end_group"]
 
@@ -36,6 +37,8 @@ DREAL = "scenicq.smt.dreal:check"
 
 GRACE_S = 0.5
 """Seconds that a worker has to answer after its timeout before it is killed."""
+BUSY = 8.0
+"""How many times the seconds of its work a worker may take by the wall: other work may hold the processor."""
 START_S = 60.0
 """Seconds that a worker has to start."""
 _STARTS = 3
@@ -198,15 +201,29 @@ class _Worker:
             if self._loads:
                 return Unknown("crash")
             raise
-        request = Request(problem, precision, timeout_s, timeout_s + 2 * GRACE_S)
-        line, expired = self._exchange(pickle.dumps(request), timeout_s + GRACE_S)
+        request = Request(problem, precision, timeout_s, timeout_s + GRACE_S)
+        began = time.perf_counter()
+        line, expired = self._exchange(pickle.dumps(request), BUSY * (timeout_s + GRACE_S))
+        waited = time.perf_counter() - began
         if not line.endswith(b"\n"):
+            expired = expired or self._ended_by_alarm()
             self.stop()
+            leave_out(max(0.0, waited - timeout_s) if expired else 0.0)
             return Unknown("timeout" if expired else "garbage" if len(line) > ANSWER_BYTES else "crash")
+        took = seconds_of(line)
+        leave_out(max(0.0, waited - took) if took is not None else 0.0)
         answer = read_answer(line)
         if isinstance(answer, Unknown) and answer.reason in ("garbage", "memory"):
             self.stop()
         return answer
+
+    def _ended_by_alarm(self) -> bool:
+        """Whether the process ended itself because its work took too long."""
+        process = self._process
+        assert process is not None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE_S)
+        return hasattr(signal, "SIGPROF") and process.returncode == -signal.SIGPROF
 
     def _exchange(self, message: bytes, timeout_s: float) -> tuple[bytes, bool]:
         """Send a message and read one line; the process is killed if that takes too long."""

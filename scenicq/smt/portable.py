@@ -66,7 +66,7 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         system = compile_system(problem.constraint, index)
     except TooDeepError:
         return Unknown("unsupported: conjunctions and disjunctions nested too deep")
-    return _Search(problem, system, index, precision).run(time.monotonic() + timeout_s)
+    return _Search(problem, system, index, precision).run(time.thread_time() + timeout_s)
 
 
 class _Search:
@@ -99,7 +99,7 @@ class _Search:
             for box in fresh:
                 count += 1
                 patience -= self._best is not None
-                if time.monotonic() > deadline:
+                if time.thread_time() > deadline:
                     return self._best or Unknown("timeout")
                 if not self._narrow(box):
                     continue

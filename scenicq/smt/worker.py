@@ -16,6 +16,7 @@ import queue
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO, Any, TypeGuard, cast
@@ -23,9 +24,10 @@ from typing import IO, Any, TypeGuard, cast
 from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
 from scenicq.smt.formula import Problem
 
-__all__ = ["Check", "Request", "Setup", "read_answer", "serve", "write_answer"]
+__all__ = ["Check", "Request", "Setup", "read_answer", "seconds_of", "serve", "write_answer"]
 
 Check = Callable[..., Answer]
+_TOOK = "took_s"
 """A function like `Solver.check`."""
 
 
@@ -50,7 +52,7 @@ class Request:
         problem: The problem.
         precision: See `Solver.check`.
         timeout_s: See `Solver.check`.
-        deadline_s: Seconds after which the process ends itself, should its parent not do so.
+        deadline_s: Seconds of the processor after which the process ends itself.
     """
 
     problem: Problem
@@ -76,10 +78,11 @@ def serve(setup: Setup, requests: IO[bytes]) -> None:
     threading.Thread(target=_receive, args=(requests, inbox), daemon=True).start()
     while True:
         request = inbox.get()
+        began = time.process_time()
         _set_alarm(request.deadline_s)
         answer = _answer(check, request)
         _set_alarm(0.0)
-        _send(answers, write_answer(answer))
+        _send(answers, {**write_answer(answer), _TOOK: time.process_time() - began})
 
 
 def _load(setup: Setup, answers: IO[bytes]) -> Check:
@@ -112,9 +115,9 @@ def _receive(requests: IO[bytes], inbox: queue.SimpleQueue[Request]) -> None:
 
 
 def _set_alarm(seconds: float) -> None:
-    """End the process by signal after a time; a library that holds the interpreter cannot prevent it."""
+    """End the process by signal after so much work; a library that holds the interpreter cannot prevent it."""
     if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, seconds)
+        signal.setitimer(signal.ITIMER_PROF, seconds)
 
 
 def _answer(check: Check, request: Request) -> Answer:
@@ -161,6 +164,16 @@ def read_answer(line: bytes) -> Answer:
             return Unknown(reason)
         case _:
             return Unknown("garbage")
+
+
+def seconds_of(line: bytes) -> float | None:
+    """The processor seconds that an answer took; None if the line does not say."""
+    try:
+        message: object = json.loads(line)
+    except ValueError:
+        return None
+    took = cast("dict[str, object]", message).get(_TOOK) if isinstance(message, dict) else None
+    return took if isinstance(took, float) and took >= 0 else None
 
 
 def _is_witness(value: Any) -> TypeGuard[dict[str, float]]:

@@ -35,10 +35,10 @@ ArrowTable: TypeAlias = Any
 ArrowArray: TypeAlias = Any
 """A `pyarrow.Array`."""
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 """Changes with every change of a table that a reader could notice."""
 
-UPGRADABLE = frozenset({2})
+UPGRADABLE = frozenset({2, 3})
 """Older versions whose labels, objects, sensors and maps are the same: `scenicq index` computes the rest anew."""
 
 MEMBERSHIP_RADIUS_M = 2.0

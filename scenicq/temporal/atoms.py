@@ -47,10 +47,10 @@ from scenicq.geometry.angles import heading_of_array, normalize_array
 from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.temporal.samples import MOVING, Samples
+from scenicq.temporal.samples import FIXED, MOVING, Samples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["AtomColumns", "HiddenVariable"]
+__all__ = ["AtomColumns", "HiddenVariable", "reads_start"]
 
 _DEFINED, _UNDEFINED, _UNKNOWN = np.int8(0), np.int8(1), np.int8(2)
 _MOST_CHOICES = 64
@@ -58,6 +58,12 @@ _MOST_CHOICES = 64
 
 Numbers: TypeAlias = NDArray[np.float64]
 _Data: TypeAlias = "Numbers | NDArray[np.bool_] | tuple[Numbers, Numbers] | list[Value]"
+
+
+def reads_start(condition: Node) -> bool:
+    """Whether an expanded condition over time hangs on what was observed at the first sample."""
+    nodes = postorder((condition,))
+    return any(isinstance(node, Feature) and not node.current and node.property not in FIXED for node in nodes)
 
 
 class HiddenVariable(Exception):
@@ -99,16 +105,22 @@ class AtomColumns:
         scenario: The scenario.
         samples: The samples.
         assignment: Values of random variables.
+        start: The first sample of a run, at which what is not current is read; None where each sample is one.
     """
 
     scenario: Scenario
     samples: Samples
     assignment: Mapping[Identity, Value] = field(default_factory=dict["Identity", "Value"])
+    start: int | None = None
     _features: dict[tuple[int, str], _Column | None] = field(default_factory=dict["tuple[int, str]", "_Column | None"])
 
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
         """The same with values of random variables; what is observed is shared."""
-        return AtomColumns(self.scenario, self.samples, assignment, self._features)
+        return AtomColumns(self.scenario, self.samples, assignment, self.start, self._features)
+
+    def started(self, start: int) -> AtomColumns:
+        """The same for runs from one sample."""
+        return AtomColumns(self.scenario, self.samples, self.assignment, start, self._features)
 
     def expanded(self, condition: Node) -> Node:
         """A condition with the program's own value of what no label observes and what does not change."""
@@ -181,7 +193,9 @@ class AtomColumns:
             case Feature():
                 found = self._feature(node)
                 n = len(self.samples)
-                return found if found is not None else _Column(np.full(n, np.nan), np.full(n, _UNKNOWN))
+                if found is None:
+                    return _Column(np.full(n, np.nan), np.full(n, _UNKNOWN))
+                return found if node.current or self.start is None else self._as_at(self.start, found)
             case DirectionAt():
                 return self._direction(node, args, chosen[id(node)])
             case Logic():
@@ -206,6 +220,12 @@ class AtomColumns:
             return _Column((np.full(n, value[0]), np.full(n, value[1])), status)
         values: list[Value] = [value] * n
         return _Column(values, status)
+
+    def _as_at(self, start: int, column: _Column) -> _Column:
+        """The value at one sample, at each sample."""
+        if column.status[start] != _DEFINED:
+            return _Column(column.data, np.full(len(self.samples), column.status[start]))
+        return self._constant(column.at(start))
 
     def _feature(self, node: Feature) -> _Column | None:
         """What is observed of a feature; None if no sample has it."""

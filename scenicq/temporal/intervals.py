@@ -27,7 +27,7 @@ from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.store.tracks import RecordingTracks, TrackKey
-from scenicq.temporal.atoms import AtomColumns, HiddenVariable
+from scenicq.temporal.atoms import AtomColumns, HiddenVariable, reads_start
 from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
 from scenicq.temporal.runs import Run, runs_from
 from scenicq.temporal.samples import Samples
@@ -178,6 +178,18 @@ class IntervalMatcher:
         assert dynamics is not None
         columns = AtomColumns(self.scenario, samples)
         expanded = [columns.expanded(condition) for condition in dynamics.conditions]
+        if any(map(reads_start, expanded)):
+            for start in starts:
+                from_it = columns.started(start.sample - samples.first)
+                yield from self._from_starts(dynamics, from_it, expanded, samples, binding, [start])
+        else:
+            yield from self._from_starts(dynamics, columns, expanded, samples, binding, starts)
+
+    def _from_starts(
+        self, dynamics: Dynamics, columns: AtomColumns, expanded: Sequence[Node], samples: Samples,
+        binding: tuple[tuple[int, TrackKey], ...], starts: Sequence[Start],
+    ) -> Iterator[Interval]:  # fmt: skip
+        """What becomes of runs that share the values of all conditions."""
         if not random_variables(expanded):
             for run, start in zip(_follow(dynamics, columns, expanded, samples, starts), starts, strict=True):
                 yield _interval(run, start, samples, binding)

@@ -10,10 +10,13 @@ import numpy as np
 from scenicq.forest.nodes import Value
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
-__all__ = ["MOVING", "Binding", "Samples"]
+__all__ = ["FIXED", "MOVING", "Binding", "Samples"]
 
 MOVING = frozenset({"position", "heading", "velocity", "speed", "angularSpeed", "acceleration"})
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
+
+FIXED = frozenset({"width", "length", "height"})
+"""Properties that are the same at each sample."""
 
 _COLUMNS = {
     "heading": "heading", "width": "width", "length": "length", "height": "height",

@@ -60,6 +60,22 @@ def test_too_little_memory_never_means_that_nothing_matched(command, crossroads)
     assert "resources-exhausted" in done.stderr
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")
+def test_linear_algebra_takes_its_memory_before_it_can_end_the_process_with_1():
+    code = (
+        "import resource, scenicq_cli.start as start\n"
+        "start._take_memory_of_linear_algebra()\n"
+        "import numpy as np\n"
+        "square, product = np.ones((900, 900)), np.ones((900, 900))\n"
+        "taken = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (taken + 2_000_000, taken + 2_000_000))\n"
+        "np.matmul(square, square, out=product)\n"
+        "print(product[0, 0])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "900.0\n"), done.stderr
+
+
 @pytest.mark.parametrize("module", ["failures", "main"])
 def test_a_program_that_cannot_be_loaded_ends_with_2(module):
     code = (

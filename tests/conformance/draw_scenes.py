@@ -7,7 +7,8 @@ Writes OUT/map.geojson (Scenic's own network of the map, as interchange features
 object a line on standard input and standard output: {"text": program, "count": scenes, "seed": number, "seconds":
 limit}, or "file" with a path in place of the text, with {"scenes": [...]}, each with its objects (the ego first,
 headings in Scenic's convention) and parameters, or with {"error": text} where Scenic refuses the program. No scenes at
-all means that none was found in time.
+all means that none was found in time. {"points": how many, "seed": number} and {"elements": true} ask the network, see
+`map_answers`.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any
 
 import numpy as np
 import scenic
+from map_answers import at_points, of_elements
 from network_features import features_of
 from patience import OutOfPatienceError, patience
 from scenic.core.distributions import RejectionException
@@ -86,11 +88,18 @@ def main(arguments: list[str]) -> None:
     chart, out = Path(arguments[0]), Path(arguments[1])
     importlib.metadata.version = lambda name: CARLA if name == "carla" else INSTALLED(name)
     Network.fromFile = functools.cache(Network.fromFile)  # one map for all programs
-    collection = {"type": "FeatureCollection", "features": features_of(Network.fromFile(str(chart)))}
+    network = Network.fromFile(str(chart))
+    collection = {"type": "FeatureCollection", "features": features_of(network)}
     (out / "map.geojson").write_text(json.dumps(collection), encoding="utf-8")
     answers, sys.stdout = sys.stdout, sys.stderr  # programs may print
     for line in sys.stdin:
-        print(json.dumps(draw(json.loads(line), chart)), file=answers, flush=True)
+        print(json.dumps(_answer(json.loads(line), chart, network)), file=answers, flush=True)
+
+
+def _answer(request: dict[str, Any], chart: Path, network: Any) -> dict[str, Any]:
+    if "points" in request:
+        return {"points": at_points(network, request["points"], request["seed"])}
+    return {"elements": of_elements(network)} if "elements" in request else draw(request, chart)
 
 
 if __name__ == "__main__":

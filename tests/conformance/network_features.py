@@ -33,7 +33,7 @@ def _curb(group: Any) -> dict[str, Any]:
     return {
         "type": "Feature",
         "geometry": {"type": "MultiLineString", "coordinates": lines},
-        "properties": {"id": f"{group.uid}-curb", "kind": "curb"},
+        "properties": {"id": f"{group.uid}-curb", "kind": "curb", "group": group.uid},
     }
 
 
@@ -59,7 +59,7 @@ def features_of(network: Any) -> list[dict[str, Any]]:
         found.append(_feature(road, "road", forward=forward, backward=backward, intersection=inside.get(road.uid)))
     for group in network.laneGroups:
         found.append(_feature(group, "lane_group", road=group.road.uid, opposite=_name(group._opposite)))
-    found += [_curb(group) for road in network.roads for group in (road.forwardLanes, road.backwardLanes) if group]
+    found += [_curb(group) for group in network.laneGroups]
     for lane in network.lanes:
         found.append(
             _feature(

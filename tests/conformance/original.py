@@ -41,19 +41,20 @@ class Original:
         map: Its road network, as features of the interchange format.
     """
 
-    def __init__(self, python: Path, chart: Path, work: Path) -> None:
+    def __init__(self, python: Path, chart: Path, work: Path, script: str = "draw_scenes.py") -> None:
         """Start the process.
 
         Args:
             python: The one that has Scenic.
             chart: An OpenDRIVE map.
             work: A folder for the map and for what Scenic keeps beside it.
+            script: What runs there.
         """
         work.mkdir(parents=True, exist_ok=True)
         copy = work / chart.name
         if not copy.exists():
             shutil.copy(chart, copy)  # Scenic writes its cache beside the map
-        command = [python, "-W", "ignore", HERE / "draw_scenes.py", copy, work]
+        command = [python, "-W", "ignore", HERE / script, copy, work]
         self._log = (work / "scenic.log").open("w", encoding="utf-8")
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True, encoding="utf-8"
@@ -76,7 +77,48 @@ class Original:
         """
         return self._ask({"file": str(file.resolve()), "count": count, "seed": seed, "seconds": seconds})
 
-    def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
+    def simulate(self, program: dict[str, str], seed: int, seconds: float, steps: int) -> dict[str, Any]:
+        """A trace of a program, by `simulate.py`, or the error that Scenic reports for it.
+
+        Args:
+            program: Its `text`, or the path of its `file`.
+            seed: Of the random numbers.
+            seconds: Processor time that it may take.
+            steps: How many there may be.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        return self._ask({**program, "seed": seed, "seconds": seconds, "steps": steps})
+
+    def replay(self, recordings: list[dict[str, Any]]) -> list[tuple[str, int]]:
+        """How the scene simulated last fares on recorded states, by `simulate.py`.
+
+        Args:
+            recordings: Each with its `states` and its `time_step`.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        return [(kind, step) for kind, step in self._ask({"replay": recordings})]
+
+    def at_points(self, count: int, seed: int) -> list[dict[str, Any]]:
+        """What the network says at random points, see `map_answers`.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        return self._ask({"points": count, "seed": seed})["points"]
+
+    def of_elements(self) -> dict[str, dict[str, Any]]:
+        """What its elements say of each other.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        return self._ask({"elements": True})["elements"]
+
+    def _ask(self, request: dict[str, Any]) -> Any:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         try:

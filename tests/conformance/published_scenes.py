@@ -14,9 +14,9 @@ from scenicq.compiler.named_map import named_map
 from scenicq.errors import Source
 
 FOLDERS = ("examples/driving", "examples/carla")
-SECOND = ("Town05", "Town10HD", "Town01")
-"""Towns on which programs are drawn besides their own: the first two that are not."""
-SECONDS = 15.0
+SECOND = ("Town05", "Town10HD", "Town03", "Town01")
+"""Towns on which programs are drawn besides their own, in this order."""
+SECONDS = 45.0
 """Processor time that Scenic may take for the scenes of one program on one town."""
 
 
@@ -46,17 +46,19 @@ def maps_of(folders: list[Path]) -> dict[str, Path]:
     return {path.stem: path for folder in folders for path in sorted(folder.rglob("*.xodr"))}
 
 
+def published_programs(checkout: Path) -> Iterator[tuple[str, str]]:
+    """The path in the checkout of every published program, and the name of its map."""
+    for path in sorted(path for folder in FOLDERS for path in (checkout / folder).rglob("*.scenic")):
+        named = named_map(Source(path.name, path.read_text(encoding="utf-8")))
+        if named is not None:  # else a library of the others
+            yield path.relative_to(checkout).as_posix(), Path(named.file).stem
+
+
 def drawings(checkout: Path, towns: dict[str, Path], count: int) -> list[Drawing]:
     """Every published program on its own town, if it is there, and on others up to `count` towns; town by town."""
     found: list[Drawing] = []
-    paths = [path for folder in FOLDERS for path in (checkout / folder).rglob("*.scenic")]
-    for path in sorted(paths):
-        named = named_map(Source(path.name, path.read_text(encoding="utf-8")))
-        if named is None:
-            continue  # a library of the others
-        own = Path(named.file).stem
+    for program, own in published_programs(checkout):
         names = [name for name in dict.fromkeys((own, *SECOND)) if name in towns]
-        program = path.relative_to(checkout).as_posix()
         found += [Drawing(program, name, name == own) for name in names[:count]]
     return sorted(found, key=lambda each: (not each.own, each.town, each.program))
 

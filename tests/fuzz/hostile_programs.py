@@ -25,7 +25,7 @@ _VALUES = (
     "network.lanes[0]", "network.laneAt(ego)", "CircularRegion((0, 0), 9)", "everywhere", "nowhere", "Car",
     "lambda x: x", "self", "10**19",
 )  # fmt: skip
-_CALLS = (
+CALLS = (
     "sin", "cos", "hypot", "max", "min", "abs", "round", "sum", "len", "sorted", "list", "str", "int", "float",
     "range", "filter", "map", "any", "all", "zip", "enumerate", "pow", "Range", "Normal", "Uniform", "Discrete",
     "TruncatedNormal", "Vector", "CircularRegion", "RectangularRegion", "SectorRegion", "PolygonalRegion",
@@ -36,12 +36,12 @@ _BINARY = (
     "+", "-", "*", "/", "//", "%", "**", "@", "==", "<", "in", "is", "and", "or", "relative to", "offset by", "at",
     "<<", "&", "can see", "deg relative to",
 )  # fmt: skip
-_FORMS = (
+FORMS = (
     "distance from {} to {}", "angle from {} to {}", "relative heading of {} from {}", "follow {} from {} for {}",
     "visible {}", "{} offset along {} by {}", "apparent heading of {} from {}", "{}[{}]", "{}.{}",
     "[{} for x in {}]", "{} if {} else {}", "not {}", "-{}", "f'{{{}}}'", "front of {}", "{} deg", "*{}",
 )  # fmt: skip
-_STATEMENTS = (
+STATEMENTS = (
     "x = {}", "require {}", "require[0.5] {}", "param p = {}", "new Car at {}", "new Car on {}",
     "new Car ahead of {} by {}", "new Car following {} from {} for {}", "new Car at {}, facing {}",
     "new Car at {}, with width {}", "mutate {}", "for x in {}:\n    y = {}", "if {}:\n    pass",
@@ -91,11 +91,11 @@ def expression(chance: random.Random, depth: int = 2) -> str:
     match chance.randrange(3):
         case 0:
             args = ", ".join(expression(chance, depth - 1) for _ in range(chance.randrange(4)))
-            return f"{chance.choice(_CALLS)}({args})"
+            return f"{chance.choice(CALLS)}({args})"
         case 1:
             return f"({expression(chance, depth - 1)}) {chance.choice(_BINARY)} ({expression(chance, depth - 1)})"
         case _:
-            form = chance.choice(_FORMS)
+            form = chance.choice(FORMS)
             return form.format(*(f"({expression(chance, depth - 1)})" for _ in range(form.count("{}"))))
 
 
@@ -103,7 +103,7 @@ def generated(chance: random.Random) -> str:
     """A program of statements put together by chance."""
     lines = ["model scenic.domains.driving.model", "ego = new Car"]
     for _ in range(chance.randint(1, 4)):
-        form = chance.choice(_STATEMENTS)
+        form = chance.choice(STATEMENTS)
         lines.append(form.format(*(expression(chance) for _ in range(form.count("{}")))))
     return "\n".join(lines) + "\n"
 
@@ -157,8 +157,10 @@ def main() -> None:
         try:
             outcomes[attempt(text)] += 1
         except (Exception, Hang) as error:
-            name = type(error).__name__
+            name = f"{type(error).__name__} {traceback.extract_tb(error.__traceback__)[-1].name}"
             outcomes[f"BAD {name}"] += 1
+            if outcomes[f"BAD {name}"] > 3:
+                continue
             print(f"--- {name}\n{text}\n{traceback.format_exc(limit=-3)}", flush=True)
         finally:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0)

@@ -3,7 +3,7 @@
 import random
 
 import pytest
-from hostile_programs import attempt, generated, mutated, sources
+from hostile_programs import CALLS, FORMS, STATEMENTS, attempt, generated, mutated, sources
 
 from scenicq.errors import CODES
 
@@ -23,4 +23,28 @@ def test_mutated_programs_end_with_an_answer(seed):
     chance, known = random.Random(seed), sources()
     for _ in range(15):
         text = mutated(chance.choice(known), known, chance)
+        assert attempt(text) in ENDS, text
+
+
+HARD = ("10**400", "-1e308", "float('nan')", "10**19", "lambda x: x", "None")
+
+
+def _places(form):
+    count = form.count("{}")
+    for place in range(count):
+        for hard in HARD:
+            yield form.format(*(hard if number == place else "(1, 2)" for number in range(count)))
+
+
+@pytest.mark.parametrize("form", STATEMENTS)
+def test_hard_values_in_every_place_of_every_statement(form):
+    for line in _places(form):
+        text = f"model scenic.domains.driving.model\nego = new Car\n{line}\n"
+        assert attempt(text) in ENDS, text
+
+
+@pytest.mark.parametrize("form", [*FORMS, *(f"{call}({{}})" for call in CALLS)])
+def test_hard_values_in_every_place_of_every_expression(form):
+    for expression in _places(form):
+        text = f"model scenic.domains.driving.model\nego = new Car\nrequire {expression} < 5\n"
         assert attempt(text) in ENDS, text

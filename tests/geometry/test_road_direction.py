@@ -35,8 +35,6 @@ def expected(field: RoadDirection, x: float, y: float) -> list[float]:
         if found:
             directed.append((one.area, found))
     holding = [found for area, found in directed if area.distance(here) <= 1e-9]
-    if holding and not any(area.distance(here) <= 1e-9 for area in field.intersections):
-        holding = [[pair for found in holding for pair in found]]
     if not holding:
         nearest = min((area.distance(here) for area, _ in directed), default=math.inf)
         if nearest <= 20:
@@ -53,7 +51,7 @@ def same(found: tuple[float, ...], wanted: list[float]) -> bool:
 
 @st.composite
 def fields(draw: st.DrawFn) -> RoadDirection:
-    """A few bent lanes, some of which overlap, and perhaps an intersection."""
+    """A few bent lanes, some of which overlap."""
     number = st.integers(-12, 12).map(float)
     lanes = []
     for _ in range(draw(st.integers(1, 4))):
@@ -63,8 +61,7 @@ def fields(draw: st.DrawFn) -> RoadDirection:
         )
         if area.geom_type == "Polygon" and area.is_valid and area.area > 0.1:
             lanes.append(lane(area, line))
-    crossing = (box(-4, -4, 4, 4),) if draw(st.booleans()) else ()
-    return RoadDirection(tuple(lanes), crossing)
+    return RoadDirection(tuple(lanes))
 
 
 @settings(max_examples=120, deadline=None)
@@ -123,11 +120,12 @@ def test_a_bend_ties_on_its_outer_side_only() -> None:
     assert field.values(-3, 7) == (NORTH, WEST), "on the bisector"
 
 
-def test_overlapping_lanes_in_and_out_of_an_intersection() -> None:
+def test_each_of_the_lanes_that_overlap_has_its_say() -> None:
     up = lane(box(-2, -10, 2, 10), [(0, -10), (0, 10)])
     across = lane(box(-10, -2, 10, 2), [(-10, 0), (10, 0)])
-    assert RoadDirection((up, across)).values(0.5, 1) == (NORTH,)
-    assert RoadDirection((up, across), (box(-2, -2, 2, 2),)).values(0.5, 1) == (EAST, NORTH)
+    field = RoadDirection((up, across))
+    assert field.values(0.5, 1) == (EAST, NORTH)
+    assert field.values(0.5, 3) == (NORTH,)
 
 
 def test_off_the_lanes_the_nearest_lane_within_reach() -> None:

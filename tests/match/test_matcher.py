@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -106,9 +105,7 @@ def test_a_property_that_the_label_lacks_is_unobserved():
 def test_objects_that_observe_different_things_do_not_multiply():
     text = "ego = new Car\nfor i in range(12):\n    new Car"
     things = [car(f"{i}", 1.75, 60.0 + i, attributes={f"a{i % 3}": True}) for i in range(14)]
-    started = time.perf_counter()
-    assert isinstance(verdict(text, frame(*things)), Match)
-    assert time.perf_counter() - started < 1.0
+    assert isinstance(verdict(text, frame(*things), budget=2000), Match)
 
 
 # --- who may play whom

@@ -197,14 +197,14 @@ def test_pictures_beside_the_page_are_loaded_as_they_are_seen(chromium, report):
     chromium.open(report[1])
     loaded = "const i = document.querySelector(arguments[0]); return i.complete && i.naturalWidth > 0"
     while not chromium.run(loaded, "#run-1 img.picture"):
-        assert time.monotonic() - started < 5
+        assert time.monotonic() - started < 120
     run = _long_run(chromium)
     source = "return document.querySelector(arguments[0]).getAttribute('src')"
     before = chromium.run(source, f"{run} img.picture")
     chromium.click(f"{run} .on")
     assert chromium.run(source, f"{run} img.picture") != before
     while not chromium.run(loaded, f"{run} img.picture"):
-        assert time.monotonic() - started < 10
+        assert time.monotonic() - started < 120
     assert chromium.console() == []
 
 

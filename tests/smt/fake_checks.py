@@ -6,6 +6,7 @@ import ctypes
 import os
 import sys
 import time
+from pathlib import Path
 
 from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
 from scenicq.smt.formula import Problem
@@ -48,6 +49,11 @@ def behave(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
             return Sat({"pid": float(os.getpid())})
         case "slow":
             time.sleep(0.3)
+        case "first" | "second":
+            here = Path(os.environ["FAKE_CHECKS"])
+            (here / name).touch()
+            while not all((here / each).exists() for each in ("first", "second")):
+                time.sleep(0.01)
         case _:
             pass
     return Unsat()

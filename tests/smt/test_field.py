@@ -25,9 +25,6 @@ HAIRPIN = bend(box(-9, -6, 9, 9), (-3, -6), (-3, 5), (2, 6), (4, -6))
 FIELDS = {
     "hairpin": RoadDirection((HAIRPIN,)),
     "two lanes that overlap": RoadDirection((HAIRPIN, bend(box(-2, -12, 12, 3), (12, -2), (-2, -1), (-2, -12)))),
-    "overlap in an intersection": RoadDirection(
-        (HAIRPIN, bend(box(-2, -12, 12, 3), (12, -2), (-2, -1))), (box(-2, -6, 3, 3),)
-    ),
     "beside lanes": RoadDirection(
         (bend(box(-9, -6, -5, 6), (-7, -6), (-7, 6)), bend(box(3, -9, 7, 2), (5, 2), (4, -9)))
     ),

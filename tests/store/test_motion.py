@@ -104,7 +104,7 @@ def test_an_older_dataset_is_brought_up_to_date(tmp_path):
     write_dataset(tmp_path / "d", [recording([0, 0.5, 1.0], along([(0, 0), (0, 2), (0, 8)]))], {}, name="d")
     manifest = tmp_path / "d" / "dataset.json"
     before = manifest.read_text()
-    manifest.write_text(before.replace('"schema": 3', '"schema": 2'))
+    manifest.write_text(before.replace('"schema": 4', '"schema": 2'))
     with pytest.raises(DataError, match="version 2") as refused:
         open_dataset(tmp_path / "d")
     assert "scenicq index" in refused.value.diagnostics[0].hints[0]

@@ -1,6 +1,7 @@
 """Temporal formulas on random traces against a recursive evaluator; unknown values never contradict a completion."""
 
 import random
+from itertools import product
 
 import numpy as np
 
@@ -73,3 +74,24 @@ def test_what_is_unknown_never_contradicts_a_completion():
             assert (found[over] == completed[over]).all()
             decided += int(over.sum())
     assert decided > 10_000
+
+
+def test_no_completion_of_few_gaps_contradicts():
+    draw = random.Random(9)
+    decided = 0
+    for _ in range(300):
+        formula = random_formula(draw, 3)
+        trace = [[draw.choice([FALSE, TRUE]) for _ in range(ATOMS)] for _ in range(draw.randint(1, 4))]
+        gaps = draw.sample([(n, atom) for n in range(len(trace)) for atom in range(ATOMS)], min(5, ATOMS * len(trace)))
+        for n, atom in gaps:
+            trace[n][atom] = UNKNOWN
+        found = values_of(formula, trace)[0]
+        for values in product((False, True), repeat=len(gaps)):
+            whole = [[value == TRUE for value in sample] for sample in trace]
+            for (n, atom), value in zip(gaps, values, strict=True):
+                whole[n][atom] = value
+            for end in range(len(trace)):
+                if found[end] != UNKNOWN:
+                    assert (found[end] == TRUE) == recursive(formula, whole[: end + 1], 0)
+                    decided += 1
+    assert decided > 3_000

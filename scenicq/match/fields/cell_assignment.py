@@ -19,6 +19,7 @@ from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn, Value
 from scenicq.geometry.fields import FieldCell, VectorField
+from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.linear.affine_forms import Affine, AffineVector, affine_scalar, affine_vector
@@ -207,7 +208,7 @@ def _cells(
     field = cast(VectorField, cast(Constant, node.field).value)
     found: Alternative = []
     sharp = True
-    for whole in field.cells_of(heading, box) if isinstance(field, Ranked) else field.cells(box):
+    for whole in field.cells_of(heading, box) if isinstance(field, Ranked | RoadDirection) else field.cells(box):
         cell = whole.part(box) if abs(whole.heading - heading) <= SAME and _meets(whole, box) else None
         if cell is None:
             continue

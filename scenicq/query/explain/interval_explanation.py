@@ -185,7 +185,7 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: Interval) ->
     if dynamics is None:
         return ()
     samples = Samples(tracks, dict(interval.binding), interval.start, interval.end + 1)
-    columns = AtomColumns(scenario, samples)
+    columns = AtomColumns(scenario, samples, start=0)
     known: dict[int, Truth] = {}
     for number, condition in enumerate(dynamics.conditions):
         try:

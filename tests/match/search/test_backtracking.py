@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import time
 
 import pytest
 from hypothesis import given, settings
@@ -116,14 +115,12 @@ def test_matchable_agrees_with_enumeration(domains):
 
 @pytest.mark.parametrize("spare", [-1, 0, 1])
 @pytest.mark.parametrize("paired", [False, True])
-def test_many_equal_slots_are_instant(spare, paired):
+def test_many_equal_slots_take_few_steps(spare, paired):
     count = 48
     slots = [Slot(name, tuple(range(count + spare))) for name in range(count)]
     forbidden = {(name, name + 1): {(0, 1)} for name in range(count - 1)} if paired else {}
-    started = time.perf_counter()
     found = next(find_assignments(slots, checker(forbidden), budget=20_000), None)
     assert (found is None) == (spare < 0)
-    assert time.perf_counter() - started < 1.0
 
 
 def test_a_shortage_that_appears_late_is_seen_at_once():
