@@ -47,12 +47,12 @@ class Row:
     """A label of a batch.
 
     Attributes:
-        place: Its number among the labels that were asked about.
+        number: Its number among the labels that were asked about.
         label: The label.
         candidates: Who may play whom.
     """
 
-    place: int
+    number: int
     label: Label
     candidates: Candidates
     _seen: dict[int, Mapping[str, Value]] = field(default_factory=dict["int", "Mapping[str, Value]"])
@@ -93,14 +93,14 @@ class FirstFit:
     Attributes:
         plan: The plan.
         order: The ego, then the other objects in program order.
-        places: Where in the order each object is.
+        ranks: Where in the order each object is.
         due: For each of them, the groups that can be decided once it has a candidate.
         most_decisions: After how many decisions a label is given up.
     """
 
     plan: MatchPlan
     order: tuple[int, ...]
-    places: Mapping[int, int]
+    ranks: Mapping[int, int]
     due: tuple[tuple[GroupPlan, ...], ...]
     most_decisions: int
 
@@ -235,19 +235,19 @@ class _Batch:
         witnesses = list(zip(*columns, strict=True)) if columns else [()] * size
         return FilledBatch(self.rows, self.numbers, tuple(variables), witnesses)
 
-    def _get(self, place: int) -> Get:
+    def _get(self, number: int) -> Get:
         """The observed values of one label."""
-        observed, numbers, places = self.rows[place].observed, self.numbers[place], self.fit.places
+        observed, numbers, ranks = self.rows[number].observed, self.numbers[number], self.fit.ranks
 
         def get(index: int, name: str) -> Value:
-            return observed(numbers[places[index]])[name]
+            return observed(numbers[ranks[index]])[name]
 
         return get
 
     def _column(self, index: int, name: str) -> Column | tuple[Column, Column]:
         """The values of a property of the label objects that play an object."""
-        place = self.fit.places[index]
-        objects = [row.label_object(numbers[place]) for row, numbers in zip(self.rows, self.numbers, strict=True)]
+        rank = self.fit.ranks[index]
+        objects = [row.label_object(numbers[rank]) for row, numbers in zip(self.rows, self.numbers, strict=True)]
         if name == "position":
             return np.array([each.x for each in objects]), np.array([each.y for each in objects])
         if name in _SCALARS:
@@ -282,12 +282,12 @@ def first_fit_of(plan: MatchPlan, scenario: Scenario) -> FirstFit | None:
     if any(group.closed_form is None for group in plan.groups):
         return None
     order = (scenario.ego, *(each.index for each in scenario.objects if each.index != scenario.ego))
-    places = {index: place for place, index in enumerate(order)}
+    ranks = {index: rank for rank, index in enumerate(order)}
     due: list[list[GroupPlan]] = [[] for _ in order]
     for group in sorted(plan.groups, key=lambda each: len(each.roles)):
-        due[max((places[index] for index in group.roles), default=0)].append(group)
+        due[max((ranks[index] for index in group.roles), default=0)].append(group)
     most = _MOST_DECISIONS + _MORE_DECISIONS * (len(order) - 1)
-    return FirstFit(plan, order, places, tuple(map(tuple, due)), most)
+    return FirstFit(plan, order, ranks, tuple(map(tuple, due)), most)
 
 
 def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[frozenset[str], ...]) -> Signature | None:
