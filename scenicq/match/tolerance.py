@@ -133,16 +133,16 @@ class Tolerance:
         """
         if not self.rules:
             return self
-        names = {thing.name for thing in scenario.objects}
-        known = {*_COMPARED, *scenario.params}.union(*(thing.properties for thing in scenario.objects))
+        names = {owner.name for owner in scenario.objects}
+        known = {*_COMPARED, *scenario.params}.union(*(owner.properties for owner in scenario.objects))
         for scope, name, _ in self.rules:
             if scope and scope not in names and not is_class(scope):
                 raise _unknown(scope, "no object of the scenario and no class", {*names, *subclasses(ROOT)})
             if name not in known:
                 raise _unknown(name, "no property of the scenario's objects", known)
         lines = tuple(
-            (thing.name, *(ancestors(thing.category) if is_class(thing.category) else (ROOT,)))
-            for thing in scenario.objects
+            (owner.name, *(ancestors(owner.category) if is_class(owner.category) else (ROOT,)))
+            for owner in scenario.objects
         )
         return replace(self, scopes=lines)
 

@@ -30,7 +30,7 @@ from scenicq.match.problem.observation import observe, observe_params, observed_
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["FilledBatch", "FirstFit", "Row", "first_fit_of", "signature_of"]
+__all__ = ["FilledBatch", "FirstFit", "LabelRow", "first_fit_of", "signature_of"]
 
 _MOST_DECISIONS = 64
 _MORE_DECISIONS = 16
@@ -43,7 +43,7 @@ Values: TypeAlias = "Value | Column | list[Value]"
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class LabelRow:
     """A label of a batch.
 
     Attributes:
@@ -80,7 +80,7 @@ class FilledBatch:
         witnesses: Of each label, their values.
     """
 
-    rows: Sequence[Row]
+    rows: Sequence[LabelRow]
     numbers: Sequence[tuple[int, ...]]
     variables: tuple[Leaf, ...]
     witnesses: Sequence[tuple[Value, ...]]
@@ -104,7 +104,7 @@ class FirstFit:
     due: tuple[tuple[GroupPlan, ...], ...]
     most_decisions: int
 
-    def fill(self, rows: Sequence[Row], options: MatchOptions, lookups: MapLookups) -> Iterator[FilledBatch]:
+    def fill(self, rows: Sequence[LabelRow], options: MatchOptions, lookups: MapLookups) -> Iterator[FilledBatch]:
         """The labels whose roles can be filled, in batches; the others are left out.
 
         Args:
@@ -150,7 +150,7 @@ class _Batch:
     """
 
     fit: FirstFit
-    rows: Sequence[Row]
+    rows: Sequence[LabelRow]
     numbers: Sequence[tuple[int, ...]]
     values: dict[GroupPlan, Mapping[Identity, Values]] = field(
         default_factory=dict["GroupPlan", "Mapping[Identity, Values]"]
@@ -214,7 +214,7 @@ class _Batch:
             found.append(batch)
         return found
 
-    def _next(self, row: Row, numbers: tuple[int, ...]) -> tuple[int, ...]:
+    def _next(self, row: LabelRow, numbers: tuple[int, ...]) -> tuple[int, ...]:
         """Who plays the objects next; nobody, if all has been tried."""
         for length in range(len(numbers) - 1, 0, -1):
             options = row.candidates[self.fit.order[length]]

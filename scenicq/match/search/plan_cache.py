@@ -9,7 +9,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates, candidates_of
 from scenicq.match.problem.constraints import Signature
-from scenicq.match.search.first_fit import FirstFit, Row, first_fit_of, signature_of
+from scenicq.match.search.first_fit import FirstFit, LabelRow, first_fit_of, signature_of
 from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
 from scenicq.store.labels import Label
 
@@ -46,14 +46,14 @@ class PlanCache:
 
     def first_fits(
         self, labels: Iterable[tuple[Label, Candidates | None]], given: Mapping[str, str]
-    ) -> dict[FirstFit, list[Row]]:
+    ) -> dict[FirstFit, list[LabelRow]]:
         """The labels that first fit can decide, by their plans.
 
         Args:
             labels: Labels, each with what is known of who may play whom.
             given: Ids of label objects that are known to play objects, by the objects' names.
         """
-        options, found = self.options, dict[FirstFit, list[Row]]()
+        options, found = self.options, dict[FirstFit, list[LabelRow]]()
         if options.method != "auto" or options.exact or options.ego != "label":
             return found
         for number, (label, among) in enumerate(labels):
@@ -64,7 +64,7 @@ class PlanCache:
                 signature = signature_of(label, self.scenario.ego, roles, self.relevant)
                 fit = None if signature is None else self._first_fit(self.plan(signature))
                 if fit is not None:
-                    found.setdefault(fit, []).append(Row(number, label, roles))
+                    found.setdefault(fit, []).append(LabelRow(number, label, roles))
         return found
 
     def _first_fit(self, plan: MatchPlan) -> FirstFit | None:
