@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import InitVar, dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from scenicq.budget import TimeIsUp, limited
 from scenicq.forest.scenario import Scenario
@@ -31,8 +32,10 @@ from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.search.plan_cache import PlanCache
 from scenicq.match.search.verdict_builder import Ended, VerdictBuilder
 from scenicq.match.verdict import Cause, Match, Unknown, Verdict
-from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
+
+if TYPE_CHECKING:  # takes long to load
+    from scenicq.smt.answer import Solver
 
 __all__ = ["Matcher"]
 
