@@ -13,7 +13,7 @@ import math
 import time
 from collections.abc import Generator
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import ContextVar, Token
 
 __all__ = ["TimeIsUp", "clock", "leave_out", "limited", "look", "uncounted", "waiting"]
 
@@ -40,19 +40,27 @@ def leave_out(seconds: float) -> None:
     _LEFT_OUT.set(_LEFT_OUT.get() + seconds)
 
 
-@contextmanager
-def limited(seconds: float) -> Generator[None]:
-    """Let what happens in the block take so long at most, or less where a block around it says so.
+class limited:  # noqa: N801 - read as a statement
+    """Let what happens in the block take so long at most, or less where a block around it says so."""
 
-    Args:
-        seconds: The time.
-    """
-    before = _UNTIL.get()
-    token = _UNTIL.set(min(before, time.thread_time() + seconds))
-    try:
-        yield
-    finally:
-        _UNTIL.reset(token)
+    __slots__ = ("_seconds", "_token")
+    _token: Token[float]
+
+    def __init__(self, seconds: float) -> None:
+        """Take the time, which begins with the block.
+
+        Args:
+            seconds: The time.
+        """
+        self._seconds = seconds
+
+    def __enter__(self) -> None:
+        """Set the clock."""
+        self._token = _UNTIL.set(min(_UNTIL.get(), time.thread_time() + self._seconds))
+
+    def __exit__(self, *_: object) -> None:
+        """Go back to the clock of the block around."""
+        _UNTIL.reset(self._token)
 
 
 def look() -> None:

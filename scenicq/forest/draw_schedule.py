@@ -2,7 +2,7 @@
 
 Rejection must keep the distribution: whatever shares a random variable with a failed condition, directly or through
 another condition, is drawn anew. But parts of a scene that share none are independent: each is drawn until its own
-conditions hold, and only a condition over several of them sends all of these back. So the steps stand on a tape,
+conditions hold, and only a condition over several of them sends all of these back. So the steps stand on a schedule,
 parts one after the other, and a failed condition goes back to the first step of its part.
 """
 
@@ -21,7 +21,7 @@ from scenicq.forest.proximity_pruning import Window
 from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.geometry.regions import Region
 
-__all__ = ["Tape", "lay_out"]
+__all__ = ["DrawSchedule", "lay_out"]
 
 _Values = list[Value]
 
@@ -118,7 +118,7 @@ class _Part:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tape:
+class DrawSchedule:
     """The steps that draw a scene.
 
     Attributes:
@@ -140,8 +140,8 @@ class Tape:
         return tuple(step.check if isinstance(step, _Test) else None for step in self.steps)
 
 
-def lay_out(roots: tuple[Node, ...], checks: Iterable[Check], windows: Mapping[Identity, Window]) -> Tape:
-    """The tape that draws what expressions and conditions depend on.
+def lay_out(roots: tuple[Node, ...], checks: Iterable[Check], windows: Mapping[Identity, Window]) -> DrawSchedule:
+    """The schedule that draws what expressions and conditions depend on.
 
     Args:
         roots: Expressions whose values are wanted; evaluated last, once all conditions hold.
@@ -171,7 +171,7 @@ def _masks(roots: tuple[Node, ...]) -> dict[int, int]:
 
 
 class _Layout:
-    """A tape in the making."""
+    """A schedule in the making."""
 
     def __init__(self, windows: Mapping[Identity, Window]) -> None:
         self.windows = windows
@@ -197,15 +197,15 @@ class _Layout:
         self.parts = [part for part in self.parts if not part.mask & mask]
         self.parts.append(whole)
 
-    def finish(self, roots: tuple[Node, ...]) -> Tape:
-        """The whole tape."""
+    def finish(self, roots: tuple[Node, ...]) -> DrawSchedule:
+        """The whole schedule."""
         rest: list[Step] = []
         for root in roots:
             rest += self._needed(root)
         steps = [step for part in self.parts for step in part.steps] + rest
         index = {id(step): number for number, step in enumerate(steps)}
         restarts = tuple(index[id(self.restart.get(id(step), steps[0]))] for step in steps)
-        return Tape(
+        return DrawSchedule(
             tuple(steps), restarts, self.slots, self.constants, tuple(self.slot_of[id(root)] for root in roots)
         )  # fmt: skip
 

@@ -2,8 +2,8 @@
 
 Scenes come with the distribution of the program: that of its random variables, given that every requirement holds. A
 requirement of probability p below 1 is in force in a share p of the scenes. What makes rejection quick keeps the
-distribution: conditions are tested as soon as they can be, independent parts are drawn apart (`tape`), and random
-points are not drawn where conditions exclude them (`containers`, `windows`).
+distribution: conditions are tested as soon as they can be, independent parts are drawn apart (`draw_schedule`), and
+random points are not drawn where conditions exclude them (`containment_pruning`, `proximity_pruning`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.containment_pruning import shrink_regions
-from scenicq.forest.draw_schedule import Tape, lay_out
+from scenicq.forest.draw_schedule import DrawSchedule, lay_out
 from scenicq.forest.inline import Check, assemble
 from scenicq.forest.nodes import Constant, Encloses, Identity, Undefined, Value
 from scenicq.forest.proximity_pruning import Window, close_points
@@ -43,9 +43,9 @@ class Scene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Plan:
-    """A tape with the condition that each step tests, and the conditions that no scene meets."""
+    """A schedule with the condition that each step tests, and the conditions that no scene meets."""
 
-    tape: Tape
+    schedule: DrawSchedule
     tested: tuple[int | None, ...]
     impossible: tuple[int, ...]
 
@@ -90,7 +90,7 @@ class Improviser:
             if check.probability < 1.0 and rng.random() >= check.probability
         }  # fmt: skip
         values, place, failures = self._blank(), 0, 0
-        while place < len(self._plan.tape.steps):
+        while place < len(self._plan.schedule.steps):
             if self._plan.impossible:
                 self.rejected.update(self._plan.impossible)
                 return None
@@ -101,14 +101,14 @@ class Improviser:
             failures += 1
             if failures > attempts:
                 return None
-            place = self._plan.tape.restarts[place]
+            place = self._plan.schedule.restarts[place]
             if number is not None:
                 self.rejected[number] += 1
                 if self._prune and not self._shrunk and self._contained_failures() >= _PATIENCE:
                     self._shrunk, place = True, 0
                     self._plan = self._planned()
                     values = self._blank()
-        found = [values[slot] for slot in self._plan.tape.places]
+        found = [values[slot] for slot in self._plan.schedule.places]
         count = len(self._keys)
         return Scene(
             dict(zip(self._keys, found[:count], strict=True)), dict(zip(self._params, found[count:], strict=True))
@@ -116,14 +116,14 @@ class Improviser:
 
     def _step(self, place: int, values: list[Value], rng: random.Random) -> bool:
         try:
-            return self._plan.tape.steps[place].run(values, rng)
+            return self._plan.schedule.steps[place].run(values, rng)
         except CannotEvaluate as error:
             self.undecided = str(error)
             return False
 
     def _blank(self) -> list[Value]:
-        tape = self._plan.tape
-        return [tape.constants.get(slot) for slot in range(tape.slots)]
+        schedule = self._plan.schedule
+        return [schedule.constants.get(slot) for slot in range(schedule.slots)]
 
     def _contained_failures(self) -> int:
         return sum(
@@ -141,9 +141,9 @@ class Improviser:
         checks = [replace(check, condition=root) for check, root in zip(self.checks, roots, strict=False)]
         false = (number for number, check in enumerate(checks) if check.probability == 1.0 and _never(check))
         numbers = {id(check): number for number, check in enumerate(checks)}
-        tape = lay_out(roots[len(checks) :], checks, windows)
-        tested = tuple(None if check is None else numbers[id(check)] for check in tape.checks())
-        return _Plan(tape, tested, (*barren, *false))
+        schedule = lay_out(roots[len(checks) :], checks, windows)
+        tested = tuple(None if check is None else numbers[id(check)] for check in schedule.checks())
+        return _Plan(schedule, tested, (*barren, *false))
 
     @property
     def impossible(self) -> Check | None:

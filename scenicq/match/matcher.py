@@ -11,9 +11,9 @@ that nothing decides leaves the label undecided unless another correspondence ma
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from scenicq.budget import TimeIsUp, limited
@@ -21,17 +21,15 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.solver_step import ask
 from scenicq.match.explanation import Finding
 from scenicq.match.options import Exhausted, MatchOptions
-from scenicq.match.problem.candidates import Candidates, candidates_of, egos, find_candidates
+from scenicq.match.problem.candidates import Candidates, egos, find_candidates
 from scenicq.match.problem.conditioned import Item
-from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.search.backtracking import Reporter
 from scenicq.match.search.batch_lookups import look_up_positions
-from scenicq.match.search.first_fit import FirstFit, Row, first_fit_of, signature_of
-from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
 from scenicq.match.search.label_search import LabelSearch
+from scenicq.match.search.plan_cache import PlanCache
 from scenicq.match.search.verdict_builder import Ended, VerdictBuilder
 from scenicq.match.verdict import Cause, Match, Unknown, Verdict
 from scenicq.store.labels import Label
@@ -40,6 +38,9 @@ if TYPE_CHECKING:  # takes long to load
     from scenicq.smt.answer import Solver
 
 __all__ = ["Matcher"]
+
+Asked = tuple[Label, Candidates | None]
+"""A label, of the map that the scenario was compiled for, with what is known of who may play whom."""
 
 
 @dataclass(eq=False)
@@ -50,22 +51,21 @@ class Matcher:
         scenario: The scenario, made ready to be matched.
         options: The options.
         solver: Decides what the cascade does not; None makes those groups unknown.
+        plans: The analysis of the scenario, made for the first label of a kind and kept.
     """
 
     scenario: Scenario
     options: MatchOptions = MatchOptions()
     solver: Solver | None = None
-    _plans: dict[Signature, MatchPlan] = field(default_factory=dict["Signature", "MatchPlan"], repr=False)
-    _kinds: dict[Hashable, int] = field(default_factory=dict["Hashable", int], repr=False)
-    _fits: dict[MatchPlan, FirstFit | None] = field(default_factory=dict["MatchPlan", "FirstFit | None"], repr=False)
-    _relevant: tuple[frozenset[str], ...] = field(init=False, repr=False)
+    known: InitVar[PlanCache | None] = None
+    plans: PlanCache = field(init=False, repr=False)
     _verdicts: VerdictBuilder = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        """Rewrite the scenario, tie the tolerance to its objects, and find out what matters of a label."""
+    def __post_init__(self, known: PlanCache | None) -> None:
+        """Rewrite the scenario and tie the tolerance to its objects."""
         self.scenario = ready(self.scenario)
         self.options = replace(self.options, tolerance=self.options.tolerance.for_scenario(self.scenario))
-        self._relevant = relevant_properties(self.scenario, self.options)
+        self.plans = known or PlanCache(self.scenario, self.options)
         self._verdicts = VerdictBuilder(self.scenario, self.options)
 
     def match(
@@ -86,37 +86,22 @@ class Matcher:
         """
         return next(self._decided([(label, among)], MapLookups(), reporter, given or {}))
 
-    def match_all(self, labels: Sequence[tuple[Label, Candidates | None]]) -> Iterator[Verdict]:
-        """Decide labels, each as `match` does.
-
-        Args:
-            labels: Labels, each with what is known of who may play whom.
-        """
-        return self._decided(labels, look_up_positions(self._plans.values(), self.scenario.ego, labels), None, {})
+    def match_all(self, labels: Sequence[Asked]) -> Iterator[Verdict]:
+        """Decide labels, each as `match` does."""
+        lookups = look_up_positions(self.plans.plans.values(), self.scenario.ego, labels)
+        return self._decided(labels, lookups, None, {})
 
     def matches(self, label: Label, *, among: Candidates | None = None) -> Iterator[Match]:
         """Every correspondence by which a label matches; of interchangeable objects, one order only.
 
         Stops early where the budget of the options is used up, or one takes too long to be found.
-
-        Args:
-            label: The label.
-            among: As of `match`.
         """
         found = (finding.verdict for finding in self.findings(label, among=among))
         return (verdict for verdict in found if isinstance(verdict, Match))
 
     def findings(self, label: Label, *, among: Candidates | None = None) -> Iterator[Finding]:
-        """Every correspondence by which a label matches; of interchangeable objects, one order only.
-
-        Then, or where there is none, what is not a match: one finding for each choice of the ego that leaves something
-        undecided, and where nothing matches the one finding of `examine`.
-
-        Args:
-            label: The label.
-            among: As of `match`.
-        """
-        found = self._findings(label, MapLookups(), None, {}, among)
+        """The matches of `matches`, then what is undecided with each ego; without either the one `examine` gives."""
+        found = self._findings((label, among), MapLookups())
         while True:
             with limited(self.options.timeout_s):
                 finding = next(found, None)
@@ -127,7 +112,7 @@ class Matcher:
     def examine(self, label: Label) -> Finding:
         """Decide one label and keep what the verdict rests on."""
         with limited(self.options.timeout_s):
-            return next(self._findings(label, MapLookups(), None, {}, None))
+            return next(self._findings((label, None), MapLookups()))
 
     def relaxed(self, options: MatchOptions) -> Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
@@ -135,85 +120,49 @@ class Matcher:
         Raises:
             DataError: option-invalid: the tolerance names what the scenario does not have.
         """
-        if not options.tolerance.for_scenario(self.scenario).same_scopes(self.options.tolerance):
-            # what may be swapped or decided once for many is what one scope compares
-            return Matcher(self.scenario, options, self.solver)
-        return Matcher(self.scenario, options, self.solver, self._plans, self._kinds, self._fits)
-
-    def plan(self, signature: Signature) -> MatchPlan:
-        """The groups for a signature, analysed once."""
-        if signature not in self._plans:
-            self._plans[signature] = make_plan(self.scenario, signature, self.options, self._kinds)
-        return self._plans[signature]
+        # what may be swapped or decided once for many is what one scope compares
+        alike = options.tolerance.for_scenario(self.scenario).same_scopes(self.options.tolerance)
+        return Matcher(self.scenario, options, self.solver, self.plans if alike else None)
 
     def ask(self, items: Sequence[Sequence[Item]]) -> Outcome:
         """Decide groups together by the solver."""
         return ask(items, self.options, self.solver)
 
     def _decided(
-        self,
-        labels: Sequence[tuple[Label, Candidates | None]],
-        lookups: MapLookups,
-        reporter: Reporter | None,
-        given: Mapping[str, str],
+        self, labels: Sequence[Asked], lookups: MapLookups, reporter: Reporter | None, given: Mapping[str, str]
     ) -> Iterator[Verdict]:
         """The verdicts of labels: by first fit side by side, else each by a search of its own."""
         found: dict[int, Match] = {}
         with suppress(TimeIsUp), limited(self.options.timeout_s * len(labels)):
-            for fit, rows in self._batches(labels, given).items():
+            for fit, rows in self.plans.first_fits(labels, given).items():
                 for batch in fit.fill(rows, self.options, lookups):
                     found.update(self._verdicts.matches(fit, batch))
-        for place, (label, among) in enumerate(labels):
-            verdict: Verdict | None = found.get(place)
+        for number, label in enumerate(labels):
+            verdict: Verdict | None = found.get(number)
             if verdict is None:
                 with limited(self.options.timeout_s):
-                    verdict = next(self._findings(label, lookups, reporter, given, among)).verdict
+                    verdict = next(self._findings(label, lookups, reporter, given)).verdict
             yield verdict
-
-    def _batches(
-        self, labels: Iterable[tuple[Label, Candidates | None]], given: Mapping[str, str]
-    ) -> dict[FirstFit, list[Row]]:
-        """The labels that first fit can decide, by their plans."""
-        options, batches = self.options, dict[FirstFit, list[Row]]()
-        if options.method != "auto" or options.exact or options.ego != "label":
-            return batches
-        for place, (label, among) in enumerate(labels):
-            if label.has_ego:
-                roles = among
-                if roles is None or given:
-                    roles = candidates_of(self.scenario, label, 0, options, given, among)
-                signature = signature_of(label, self.scenario.ego, roles, self._relevant)
-                fit = None if signature is None else self._fit(self.plan(signature))
-                if fit is not None:
-                    batches.setdefault(fit, []).append(Row(place, label, roles))
-        return batches
-
-    def _fit(self, plan: MatchPlan) -> FirstFit | None:
-        if plan not in self._fits:
-            self._fits[plan] = first_fit_of(plan, self.scenario)
-        return self._fits[plan]
 
     def _findings(
         self,
-        label: Label,
+        asked: Asked,
         lookups: MapLookups,
-        reporter: Reporter | None,
-        given: Mapping[str, str],
-        among: Candidates | None,
+        reporter: Reporter | None = None,
+        given: Mapping[str, str] | None = None,
     ) -> Iterator[Finding]:
         """Matches and what else is undecided, or else the one verdict that there is (algorithm 1)."""
-        matched = False
-        rest: list[tuple[int, Finding]] = []
+        (label, among), matched, rest = asked, False, list[tuple[int, Finding]]()
         for ego in egos(self.scenario, label, self.options):
-            roles = find_candidates(self.scenario, label, ego, self.options, given, among)
+            roles = find_candidates(self.scenario, label, ego, self.options, given or {}, among)
             if isinstance(roles, Cause):
                 rest.append((0, Finding(self._verdicts.excluded(label, ego, roles))))
                 continue
             search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups)
             ended: Ended | None = None
             try:
-                for signature, candidates in roles.signatures(self._relevant):
-                    plan = self.plan(signature)
+                for signature, candidates in roles.signatures(self.plans.relevant):
+                    plan = self.plans.plan(signature)
                     for solution in search.solutions(plan, candidates):
                         matched = True
                         yield Finding(self._verdicts.match(label, solution), search, plan, solution.assignment)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -47,21 +47,20 @@ class Margin:
         kind: "disc" and "box" for vectors, "arc" for headings, "interval" for other numbers.
         size: The disc's radius, the half width of the arc or interval, or half the box along the map's x axis.
         y: Half the box along the map's y axis; `size` for the other kinds.
+        reach: The furthest that a value may be off, in any direction.
+        sure: How far off a value may be whatever the direction and the rounding.
     """
 
     kind: Literal["disc", "box", "arc", "interval"]
     size: float
     y: float
+    reach: float = field(init=False, repr=False)
+    sure: float = field(init=False, repr=False)
 
-    @property
-    def reach(self) -> float:
-        """The furthest that a value may be off, in any direction."""
-        return math.hypot(self.size, self.y) if self.kind == "box" else self.size
-
-    @property
-    def sure(self) -> float:
-        """How far off a value may be whatever the direction."""
-        return min(self.size, self.y)
+    def __post_init__(self) -> None:
+        """Work out what is asked for every comparison of every label."""
+        object.__setattr__(self, "reach", math.hypot(self.size, self.y) if self.kind == "box" else self.size)
+        object.__setattr__(self, "sure", max(0.0, min(self.size, self.y) - SLACK))
 
     def allows(self, value: Value, observed: Value, slack: float) -> bool:
         """Whether a value is close enough to the label's; what is no number must be equal.
@@ -134,16 +133,16 @@ class Tolerance:
         """
         if not self.rules:
             return self
-        names = {thing.name for thing in scenario.objects}
-        known = {*_COMPARED, *scenario.params}.union(*(thing.properties for thing in scenario.objects))
+        names = {owner.name for owner in scenario.objects}
+        known = {*_COMPARED, *scenario.params}.union(*(owner.properties for owner in scenario.objects))
         for scope, name, _ in self.rules:
             if scope and scope not in names and not is_class(scope):
                 raise _unknown(scope, "no object of the scenario and no class", {*names, *subclasses(ROOT)})
             if name not in known:
                 raise _unknown(name, "no property of the scenario's objects", known)
         lines = tuple(
-            (thing.name, *(ancestors(thing.category) if is_class(thing.category) else (ROOT,)))
-            for thing in scenario.objects
+            (owner.name, *(ancestors(owner.category) if is_class(owner.category) else (ROOT,)))
+            for owner in scenario.objects
         )
         return replace(self, scopes=lines)
 

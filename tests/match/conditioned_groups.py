@@ -27,9 +27,9 @@ def groups(text, seed):
     right = {
         thing.index: 0 if thing.index == scenario.ego else found[f"object-{thing.index}"] for thing in scenario.objects
     }
-    for signature, candidates in cast.signatures(matcher._relevant):
+    for signature, candidates in cast.signatures(matcher.plans.relevant):
         wrong = {index: rng.choice(numbers) for index, numbers in candidates.items()}
-        for each in matcher.plan(signature).groups:
+        for each in matcher.plans.plan(signature).groups:
             for assignment, true in ((right, True), (wrong | {scenario.ego: 0}, False)):
                 yield attempt.items(each.group, assignment), true
                 for part in each.parts:

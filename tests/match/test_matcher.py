@@ -333,7 +333,7 @@ def test_thinning_never_removes_a_right_candidate(name):
         cast = find_candidates(scenario, label, 0, matcher.options, {})
         ((signature, candidates),) = cast.signatures(relevant_properties(scenario, matcher.options))
         wanted = {index: numbers for index, numbers in candidates.items() if index != scenario.ego}
-        left, failed = thinned(matcher.plan(signature), wanted, cast, scenario.ego, Tolerance())
+        left, failed = thinned(matcher.plans.plan(signature), wanted, cast, scenario.ego, Tolerance())
         assert failed is None
         for index, numbers in left.items():
             assert f"object-{index}" in [label.objects[number - 1].id for number in numbers]

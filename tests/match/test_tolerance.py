@@ -14,7 +14,7 @@ from scenicq.errors import DataError
 from scenicq.forest.groups import PARAMS
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import EXACT, Margin, Tolerance, parse_tolerance
+from scenicq.match.tolerance import EXACT, SLACK, Margin, Tolerance, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
@@ -50,7 +50,7 @@ def test_units_and_properties():
     given = parse_tolerance("x=0.25m, y=0.5 m,heading=0.1rad,speed=0.5m/s,viewAngle=90deg")
     assert given.of(1, "position") == Margin("box", 0.25, 0.5)
     assert given.of(1, "position").reach == math.hypot(0.25, 0.5)
-    assert given.of(1, "position").sure == 0.25
+    assert given.of(1, "position").sure == 0.25 - SLACK
     assert given.of(1, "heading").size == 0.1
     assert given.of(1, "speed").size == 0.5
     assert given.of(1, "viewAngle").size == math.pi / 2

@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias, cast
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -55,10 +55,11 @@ from scenicq.match.tolerance import SLACK, Margin
 __all__ = ["ClosedForm", "Evaluated", "closed_form_of"]
 
 _MOST_CHOICES = 8
+_STRAIGHT = (0.0,)
+"""The direction that is added where no field is asked."""
 
 
-@dataclass(frozen=True, slots=True)
-class Evaluated:
+class Evaluated(NamedTuple):
     """A group under one assignment of label objects, or under many.
 
     Attributes:
@@ -72,6 +73,7 @@ class Evaluated:
     values: Mapping[Identity, Value | Column | list[Value]]
 
 
+_UNCLEAR = Evaluated(False, False, {})
 Evaluate: TypeAlias = Callable[[Get, MatchOptions, MapLookups], Evaluated]
 
 
@@ -107,20 +109,27 @@ class ClosedForm:
         Returns:
             None where it is not clear.
         """
-        try:
-            found = self.evaluate(get, options, lookups)
-            if found.holds:
-                return Satisfied(cast("Mapping[Identity, Value]", found.values))
-            if found.fails:
+        found = self.evaluate_one(get, options, lookups)
+        if found.holds:
+            return Satisfied(cast("Mapping[Identity, Value]", found.values))
+        if found.fails:
+            try:
                 return Refuted(self.constraint, "" if self.detail is None else self.detail(get, lookups))
-        except (UnclearError, CannotEvaluate):
-            pass
+            except (UnclearError, CannotEvaluate):
+                pass
         return None
 
-    def decide_many(
+    def evaluate_one(self, get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        """The same without words; nothing is said where an expression has no value."""
+        try:
+            return self.evaluate(get, options, lookups)
+        except (UnclearError, CannotEvaluate):
+            return _UNCLEAR
+
+    def evaluate_many(
         self, row: Callable[[int], Get], columns: Columns, options: MatchOptions, lookups: MapLookups
     ) -> Evaluated:
-        """Decide many assignments, each as `decide` does.
+        """Evaluate many assignments, each as `evaluate_one` does.
 
         Args:
             row: The observed values of each, by its number.
@@ -188,7 +197,7 @@ def _known_position(item: Comparison) -> ClosedForm | None:
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, "position"))
-        return _close(x - px, y - py, options.tolerance.of(index, "position"), {})
+        return Evaluated(*_close(x - px, y - py, options.tolerance.of(index, "position")), {})
 
     def detail(get: Get, lookups: MapLookups) -> str:
         return unlike("position", cast(XY, exact(get)), cast(XY, get(index, "position")))
@@ -196,15 +205,28 @@ def _known_position(item: Comparison) -> ClosedForm | None:
     return ClosedForm(item, evaluate, detail=detail)
 
 
-def _close(dx: float, dy: float, margin: Margin, values: Mapping[Identity, Value]) -> Evaluated:
-    """Whether a position that is off by a vector is within tolerance, whatever the direction; of columns, each."""
+def _close(dx: float, dy: float, margin: Margin) -> tuple[bool, bool]:
+    """Whether a position that is off by a vector is surely within tolerance, or surely not; of columns, each."""
     off = _length(dx, dy)
-    return Evaluated(off <= _sure(margin), (off > margin.reach + SLACK) & (off < math.inf), values)
+    return off <= margin.sure, (off > margin.reach + SLACK) & (off < math.inf)
 
 
-def _sure(margin: Margin) -> float:
-    """How far off a value is within tolerance whatever the direction and the rounding."""
-    return max(0.0, margin.sure - SLACK)
+def _apart(middle: XY, half: XY, turn: XY, margin: Margin) -> bool:
+    """Whether a rectangle surely misses a box of tolerance: some side of either separates them; of columns, each.
+
+    Args:
+        middle: The rectangle's, from the box's, along the rectangle's sides.
+        half: Half its sides; of unbounded ones nothing is said.
+        turn: Cosine and sine of the angle from the box's sides to the rectangle's.
+        margin: The box.
+    """
+    (u, v), (w, h), (c, s), across, along = middle, half, turn, margin.size + SLACK, margin.y + SLACK
+    return (
+        (abs(u) > w + abs(c) * across + abs(s) * along)
+        | (abs(v) > h + abs(s) * across + abs(c) * along)
+        | (abs(u * c - v * s) > abs(c) * w + abs(s) * h + across)
+        | (abs(u * s + v * c) > abs(s) * w + abs(c) * h + along)
+    )
 
 
 def _length(x: float, y: float) -> float:
@@ -267,6 +289,7 @@ def _offset(item: Comparison) -> ClosedForm | None:
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         px, py = cast(XY, get(index, "position"))
+        margin, turn = options.tolerance.of(index, "position"), (1.0, 0.0)
         # into the frame of the offset
         for shift, exact in steps:
             if shift:
@@ -275,10 +298,16 @@ def _offset(item: Comparison) -> ClosedForm | None:
             else:
                 c, s = turned(cast(float, exact(get)))
                 px, py = px * c + py * s, py * c - px * s
+                turn = turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s
         a, b = x.known(get), y.known(get)
         u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
-        margin = options.tolerance.of(index, "position")
-        return _close(u - px, v - py, margin, {**spread(x, u - a), **spread(y, v - b)})
+        holds, fails = _close(u - px, v - py, margin)
+        if margin.kind == "box" and holds is not True and fails is not True:
+            middle = a + (x.low + x.high) / 2 - px, b + (y.low + y.high) / 2 - py
+            fails |= _apart(middle, ((x.high - x.low) / 2, (y.high - y.low) / 2), turn, margin)
+        if holds is False:
+            return Evaluated(holds, fails, {})
+        return Evaluated(holds, fails, spread(x, u - a) | spread(y, v - b))
 
     return ClosedForm(item, evaluate)
 
@@ -287,15 +316,16 @@ def _heading(item: Comparison) -> ClosedForm | None:
     indices = [node for node in postorder((item.expression,)) if isinstance(node, Index)]
     if math.prod(len(node.weights) for node in indices) > _MOST_CHOICES:
         return None
-    choices: list[tuple[dict[Identity, Value], Form]] = []
+    choices: list[tuple[dict[Identity, Value], Form, float, float]] = []
     for picked in itertools.product(*(range(len(node.weights)) for node in indices)):
         chosen = {node.identity: float(option) for node, option in zip(indices, picked, strict=True)}
         form = CompiledExpressions(chosen).form(item.expression)
         if form is None:
             return None
-        choices.append((cast("dict[Identity, Value]", chosen), form))
-    fields = {id(node): node for _, form in choices for node in form.fields}
-    if len(fields) > 1 or any(len(form.fields) != len(fields) for _, form in choices):
+        middle = 0.0 if form.unbounded else (form.low + form.high) / 2
+        choices.append((cast("dict[Identity, Value]", chosen), form, middle, (form.high - form.low) / 2))
+    fields = {id(node): node for _, form, *_ in choices for node in form.fields}
+    if len(fields) > 1 or any(len(form.fields) != len(fields) for _, form, *_ in choices):
         return None
     along = next(iter(fields.values()), None)
     if along is not None and not _asks_for_roads(along):
@@ -304,30 +334,29 @@ def _heading(item: Comparison) -> ClosedForm | None:
     flow = cast(RoadDirection, cast(Constant, along.field).value) if along is not None else None
     where = cast(Feature, along.point).object if along is not None else -1
 
-    def directions(get: Get, lookups: MapLookups, size: int) -> list[tuple[float, ...]]:
-        if flow is None:
-            return [(0.0,)] * size
-        return [lookups.allowed(flow, place) for place in _each(get(where, "position"))]
+    def directions(get: Get, lookups: MapLookups) -> list[tuple[float, ...]]:
+        return [lookups.allowed(cast(RoadDirection, flow), place) for place in _each(get(where, "position"))]
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
-        many, margin = isinstance(get, Columns), options.tolerance.of(index, "heading")
+        margin, seen = options.tolerance.of(index, "heading"), cast(float, get(index, "heading"))
+        many, fails = isinstance(get, Columns), True
         if many and len(choices) > 1:
             raise UnclearError
-        fails = True
-        allowed = directions(get, lookups, get.size if isinstance(get, Columns) else 1)
-        for chosen, form in choices:
-            middle = 0.0 if form.unbounded else (form.low + form.high) / 2
-            half = (form.high - form.low) / 2
-            rest = cast(float, get(index, "heading")) - form.known(get) - middle
-            rests: list[float] = cast(Column, rest).tolist() if isinstance(rest, np.ndarray) else [rest]
-            sure = _sure(margin)
-            offs = [_turn(*each, half, sure) for each in zip(rests, allowed, strict=True)]
-            off = cast(float, np.array(offs)) if many else offs[0]
+        allowed = None if flow is None else directions(get, lookups)
+        for chosen, form, middle, half in choices:
+            rest = seen - form.known(get) - middle
+            if isinstance(rest, np.ndarray):
+                rests: list[float] = cast(Column, rest).tolist()
+                each = [_STRAIGHT] * len(rests) if allowed is None else allowed
+                offs = [_turn(*pair, half, margin.sure) for pair in zip(rests, each, strict=True)]
+                off = cast(float, np.array(offs))
+            else:
+                off = _turn(rest, _STRAIGHT if allowed is None else allowed[0], half, margin.sure)
             beyond = abs(off) - half
-            holds, misses = beyond <= sure, beyond > margin.reach + SLACK
+            holds, misses = beyond <= margin.sure, beyond > margin.reach + SLACK
             if many or holds:
                 values = spread(form, middle + clipped(off, -half, half))
-                return Evaluated(holds, misses, {**chosen, **values})
+                return Evaluated(holds, misses, chosen | values if chosen else values)
             fails = fails and misses
         return Evaluated(False, fails, {})
 
@@ -335,7 +364,8 @@ def _heading(item: Comparison) -> ClosedForm | None:
         # what the cascade tries first is what it words
         if first.terms:
             return ""
-        direction, seen = directions(get, lookups, 1)[0][0], cast(float, get(index, "heading"))
+        direction = 0.0 if flow is None else directions(get, lookups)[0][0]
+        seen = cast(float, get(index, "heading"))
         return unlike("heading", first.known(get) + direction, seen)
 
     return ClosedForm(item, evaluate, field=flow, index=where, detail=detail)

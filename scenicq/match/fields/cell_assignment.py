@@ -78,7 +78,7 @@ def solved(
         known: Values that some of its random numbers are to have.
     """
     fixed = [Row(Affine(0.0, {(key, 0): 1.0}), value, value) for key, value in known.items()]
-    items = list(way.case.tape.items)
+    items = list(way.case.network.items)
     open_ended = Undecided(items[0][0], "nonlinear")
     values: dict[Identity, Value] = {**way.middles, **way.given}
     # a solution on the border of two cells may count to the other one: the second time it keeps away from borders
@@ -132,19 +132,19 @@ def way_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssign
         number: Which of them.
         shared: The random number that several parts share, if any.
     """
-    tape = cases.tape
+    network = cases.network
     given: dict[Identity, Value] = {}
     headings: dict[int, float] = {}
     memo: dict[int, Node] = {}
-    for node in tape.choices:
+    for node in network.choices:
         chosen = float(cases.chosen[id(node)][..., number].mean())
         if isinstance(node, Index):
             given[node.identity] = chosen
         else:
             headings[id(node)] = chosen
             memo[id(node)] = Constant(chosen, span=node.span)
-    items = conditioned(tape.items, given, memo=memo)
-    if any(isinstance(node, Constant) and not holds(c, node.value, seen, tape.tolerance) for c, node, seen in items):
+    items = conditioned(network.items, given, memo=memo)
+    if any(isinstance(node, Constant) and not holds(c, node.value, seen, network.tolerance) for c, node, seen in items):
         return None
     exact = all(_is_affine(node, seen) for c, node, seen in items if isinstance(c, Comparison))
     cells: list[Alternative] = []
@@ -154,7 +154,7 @@ def way_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssign
     ]
     places: list[Node] = []
     sharp = True
-    for node in tape.choices:
+    for node in network.choices:
         if isinstance(node, Index):
             continue
         place = condition(condition(node.point, {}, given, memo), {}, None, pinned)
@@ -167,10 +167,10 @@ def way_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssign
         cells.append(options[0])
         sharp = sharp and options[1]
     limits = (-math.inf, math.inf)
-    if shared in tape.leaves:
+    if shared in network.leaves:
         low, high = cases.ranges[shared][:, number].tolist()
         limits = (low, high)
-    middles = {identity: _middle(leaf, cases, number) for identity, leaf in tape.leaves.items()}
+    middles = {identity: _middle(leaf, cases, number) for identity, leaf in network.leaves.items()}
     case = cases.take(np.array([number]))
     return HeadingAssignment(case, straight, places, cells, given, headings, limits, middles, exact, sharp)
 
@@ -182,7 +182,7 @@ def _is_affine(node: Node, seen: Value) -> bool:
 def _pinned(cases: BoxSet, number: int, items: list[Item], cells: list[Alternative]) -> dict[int, Node]:
     """Headings that the label observes, taken to be as observed: what hangs on them is then affine, too."""
     pinned: dict[int, Node] = {}
-    for (constraint, node, seen), (_, whole, _) in zip(items, cases.tape.items, strict=True):
+    for (constraint, node, seen), (_, whole, _) in zip(items, cases.network.items, strict=True):
         if not (isinstance(constraint, Comparison) and constraint.property == "heading" and isinstance(seen, float)):
             continue
         form = affine_scalar(node)

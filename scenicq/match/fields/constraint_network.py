@@ -15,11 +15,11 @@ from scenicq.match.fields.interval_domain import Enclosure
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["Tape"]
+__all__ = ["ConstraintNetwork"]
 
 
 @dataclass(frozen=True, eq=False)
-class Tape:
+class ConstraintNetwork:
     """Constraints that are narrowed together.
 
     Attributes:

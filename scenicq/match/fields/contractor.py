@@ -40,7 +40,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import conjuncts, is_leaf
-from scenicq.match.fields.constraint_network import Tape
+from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.interval_affine import Multiples, interval_affine_of, solved
 from scenicq.match.fields.interval_domain import (
     Enclosure,
@@ -72,7 +72,7 @@ class BoxSet:
     """Cases.
 
     Attributes:
-        tape: What they are cases of.
+        network: What they are cases of.
         size: How many there are.
         ranges: Where each random number or point can be.
         chosen: For each choice that was made, by the node's id, the number of the option (n,), or of a field the range
@@ -80,7 +80,7 @@ class BoxSet:
         asked: By the id of a field's use, how large the box of its point was when its headings were last looked up.
     """
 
-    tape: Tape
+    network: ConstraintNetwork
     size: int
     ranges: dict[Identity, Enclosure]
     chosen: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
@@ -90,23 +90,23 @@ class BoxSet:
     _forms: dict[int, Multiples] = field(default_factory=dict[int, Multiples])
 
     @classmethod
-    def start(cls, tape: Tape, ranges: Mapping[Identity, Sequence[Interval]]) -> BoxSet:
+    def start(cls, network: ConstraintNetwork, ranges: Mapping[Identity, Sequence[Interval]]) -> BoxSet:
         """One case for each of the intervals that some numbers are kept in, in order; else a single one."""
         size = len(next(iter(ranges.values()))) if ranges else 1
         known: dict[Identity, Enclosure] = {}
-        for identity, leaf in tape.leaves.items():
+        for identity, leaf in network.leaves.items():
             if identity in ranges:
                 known[identity] = np.array(ranges[identity], dtype=float).T.copy()
             elif isinstance(leaf, PointIn):
                 known[identity] = np.repeat(np.array(vector_bounds(leaf))[..., None], size, axis=2)
             else:
                 known[identity] = np.repeat(np.array(scalar_bounds(leaf))[:, None], size, axis=1)
-        return cls(tape, size, known)
+        return cls(network, size, known)
 
     @classmethod
-    def around(cls, tape: Tape, near: Mapping[Identity, Value], reach: float) -> BoxSet:
+    def around(cls, network: ConstraintNetwork, near: Mapping[Identity, Value], reach: float) -> BoxSet:
         """One case, in which no random number or coordinate is farther than a reach from a value, if it has one."""
-        found = cls.start(tape, {})
+        found = cls.start(network, {})
         for identity, own in found.ranges.items():
             if identity not in near:
                 continue
@@ -118,7 +118,7 @@ class BoxSet:
         """Some of the cases, possibly several times."""
         look()
         return BoxSet(
-            self.tape,
+            self.network,
             len(cases),
             {key: value[..., cases] for key, value in self.ranges.items()},
             {key: value[..., cases] for key, value in self.chosen.items()},
@@ -167,21 +167,21 @@ class BoxSet:
     def _upward(self) -> None:
         # overlaps of ends and of nothing are settled where they are met
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            for node in self.tape.nodes:
+            for node in self.network.nodes:
                 self._forward(node)
-            for item in self.tape.items:
+            for item in self.network.items:
                 self._compare(item)
 
     def _downward(self) -> None:
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             self._forms = {}
-            for node in self.tape.nodes:
+            for node in self.network.nodes:
                 self._forms[id(node)] = interval_affine_of(node, self._forms, self._bounds, self._turns)
-            for item in self.tape.items:
+            for item in self.network.items:
                 root = item[1]
                 if isinstance(item[0], Comparison) and id(root) in self._bounds:
                     solved(self._forms[id(root)], self._bounds[id(root)], self.ranges)
-            for node in reversed(self.tape.nodes):
+            for node in reversed(self.network.nodes):
                 self._backward(node)
 
     def _lost(self) -> NDArray[np.bool_]:
@@ -229,7 +229,7 @@ class BoxSet:
             case Scale():
                 return times(self._vector(node.vector), self._scalar(node.factor))
             case Rotate():
-                angle = self.tape.headings.get(id(node.angle), self._scalar(node.angle))
+                angle = self.network.headings.get(id(node.angle), self._scalar(node.angle))
                 turn = self._turns[id(node)] = turning(np.broadcast_to(angle, (2, self.size)))
                 return rotate(self._vector(node.vector), turn)
             case Coordinate():
@@ -290,14 +290,14 @@ class BoxSet:
             for part in conjuncts(node):
                 self._hold(part)
         elif isinstance(seen, tuple) and constraint.property == "position":
-            margin = self.tape.tolerance.of(constraint.object, "position")
+            margin = self.network.tolerance.of(constraint.object, "position")
             a, b = margin.size + SLACK, margin.y + SLACK
             off = np.array([[[-a], [a]], [[-b], [b]]])
             self._meet(node, np.array(seen, dtype=float)[:, None, None] + off)
-        elif id(node) in self.tape.headings:
-            self._meet(node, turns_near(self.tape.headings[id(node)], self._scalar(node)))
+        elif id(node) in self.network.headings:
+            self._meet(node, turns_near(self.network.headings[id(node)], self._scalar(node)))
         elif isinstance(seen, float):
-            allowed = self.tape.tolerance.of(constraint.object, constraint.property).size + SLACK
+            allowed = self.network.tolerance.of(constraint.object, constraint.property).size + SLACK
             self._meet(node, np.array([[seen - allowed], [seen + allowed]]))
 
     def _hold(self, node: Node) -> None:

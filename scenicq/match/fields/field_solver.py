@@ -20,7 +20,7 @@ from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import leaves, postorder
 from scenicq.match.fields.cell_assignment import HeadingAssignment, solved, way_of
-from scenicq.match.fields.constraint_network import Tape
+from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.heading_propagation import LimitError, directed, halved, settled
 from scenicq.match.fields.shared_variable import find_shared_value, joined
@@ -52,15 +52,15 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     if shared is None or len(parts) == 1:
         return _whole(parts[0], tolerance)
     first = parts[0][0][0]
-    tapes = [Tape(part, tolerance) for part in parts]
+    networks = [ConstraintNetwork(part, tolerance) for part in parts]
     chosen: list[list[BoxSet]] = []
     limits: list[Interval] = []
     try:
-        for tape in tapes:
-            known = {shared: limits} if limits and shared in tape.leaves else {}
-            found = list(directed(BoxSet.start(tape, known)))
+        for network in networks:
+            known = {shared: limits} if limits and shared in network.leaves else {}
+            found = list(directed(BoxSet.start(network, known)))
             if not found:
-                return Refuted(tape.items[0][0])
+                return Refuted(network.items[0][0])
             chosen.append(found)
             limits = _joined(found, shared)
         # what a later part excludes of the shared number excludes ways of the earlier ones
@@ -71,7 +71,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     if not all(ways):
         return Refuted(first)
     found = find_shared_value(ways, shared, tolerance, lambda way: _divided(way, shared))
-    choices = [id(node) for tape in tapes for node in tape.choices]
+    choices = [id(node) for network in networks for node in network.choices]
     if isinstance(found, Undecided) and len(set(choices)) < len(choices):
         # fields that several parts ask for at one point have one direction there
         return decide_directions([[item for part in parts for item in part]], None, tolerance)
@@ -94,7 +94,7 @@ def _whole(items: Sequence[Item], tolerance: Tolerance) -> Outcome:
         left = [item for item in fixed if not isinstance(item[1], Constant)]
         if not left:
             return Satisfied(given)
-        found = _alone(_one_by_one(directed(BoxSet.start(Tape(left, tolerance), {}))), first, tolerance)
+        found = _alone(_one_by_one(directed(BoxSet.start(ConstraintNetwork(left, tolerance), {}))), first, tolerance)
         if isinstance(found, Satisfied):
             return Satisfied({**given, **found.values})
         blamed = found if isinstance(found, Undecided) else blamed
@@ -154,7 +154,7 @@ def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAss
     """What is left of a way in cells that cover too much over either half of its widest range."""
     case = way.case
     try:
-        halves = [settled(half) for half in halved(case, tuple(case.tape.leaves.values()))]
+        halves = [settled(half) for half in halved(case, tuple(case.network.leaves.values()))]
     except LimitError:
         return None
     return _ways([half for half in halves if half.size], shared)
@@ -173,8 +173,8 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
     given = {identity: near[identity] for identity in discrete if identity in near}
     if len(given) < len(set(discrete)):
         return None
-    tape = Tape(conditioned(items, given), tolerance)
-    ways = _one_by_one(directed(BoxSet.around(tape, near, _CLOSE)))
+    network = ConstraintNetwork(conditioned(items, given), tolerance)
+    ways = _one_by_one(directed(BoxSet.around(network, near, _CLOSE)))
     found = _alone(ways, items[0][0], tolerance)
     return Satisfied({**given, **found.values}) if isinstance(found, Satisfied) else None
 

@@ -88,7 +88,7 @@ def settled(cases: BoxSet) -> BoxSet:
     for _ in range(_PASSES):
         cases = _placed(cases.narrowed())
         gained = False
-        for node in cases.tape.choices:
+        for node in cases.network.choices:
             if isinstance(node, DirectionAt) and cases.size:
                 cases, less = _turned(cases, node)
                 gained = gained or less
@@ -142,7 +142,7 @@ def _divided(cases: BoxSet, identity: Identity, axis: int, count: int) -> list[B
 
 def _placed(cases: BoxSet) -> BoxSet:
     """The cases in which random points can lie in their regions, of which narrowing knows the bounds alone."""
-    for identity, leaf in cases.tape.leaves.items():
+    for identity, leaf in cases.network.leaves.items():
         region = leaf.region.value if isinstance(leaf, PointIn) and isinstance(leaf.region, Constant) else None
         if not (isinstance(region, PolygonSet | PolylineSet | PointSet) and cases.size):
             continue
@@ -203,12 +203,12 @@ def _hull(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _parted(cases: BoxSet) -> list[BoxSet] | None:
     """The cases with one more choice made; None if there is none left to make."""
-    for node in cases.tape.choices:
+    for node in cases.network.choices:
         if isinstance(node, Index) and id(node) not in cases.chosen:
             count = len(node.weights)
             options = np.tile(np.arange(count, dtype=float), cases.size)
             return _split(cases, node, np.repeat(np.arange(cases.size), count), options)
-    vague = [node for node in cases.tape.choices if isinstance(node, DirectionAt) and _is_vague(cases, node)]
+    vague = [node for node in cases.network.choices if isinstance(node, DirectionAt) and _is_vague(cases, node)]
     if not vague:
         return None
     sizes = {id(node): float(_extent(cases, node).max()) for node in vague}

@@ -52,7 +52,7 @@ def find_shared_value(
         tolerance: Per feature.
         divided: Makes ways of one over smaller ranges that have all of its solutions; None where that is no use.
     """
-    first = parts[0][0].case.tape.items[0][0]
+    first = parts[0][0].case.network.items[0][0]
     stretches = [[_Stretch(way, *way.limits) for way in ways] for ways in parts]
     sure = True
     tried: dict[int, tuple[float, Satisfied, HeadingAssignment]] = {}
@@ -152,6 +152,6 @@ def _all(
         values |= outcome.values
         headings |= way.headings
     values[shared] = value
-    items = [item for _, way in found for item in way.case.tape.items]
+    items = [item for _, way in found for item in way.case.network.items]
     good = replay(items, values, tolerance, SLACK, headings)
     return Satisfied(values) if good else Undecided(items[0][0], "nonlinear")

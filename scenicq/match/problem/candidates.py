@@ -94,7 +94,7 @@ def find_candidates(
     given: Mapping[str, str],
     among: Candidates | None = None,
 ) -> LabelProblem | Cause:
-    """The cast for one choice of ego, or what is lacking.
+    """Who may play whom for one choice of ego, or what is lacking.
 
     Args:
         scenario: The scenario.

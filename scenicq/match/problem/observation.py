@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cache
+from functools import lru_cache
 
 from scenicq.forest.nodes import Value
 from scenicq.store.labels import Label, LabelObject
@@ -12,15 +12,15 @@ from scenicq.store.labels import Label, LabelObject
 __all__ = ["observe", "observe_params", "observed_names"]
 
 
-def observe(thing: LabelObject) -> Mapping[str, Value]:
+def observe(label_object: LabelObject) -> Mapping[str, Value]:
     """The properties that a label object has, by Scenic's names; what the source lacks is left out."""
-    seen: dict[str, Value] = {"position": (thing.x, thing.y)}
+    seen: dict[str, Value] = {"position": (label_object.x, label_object.y)}
     for name in ("heading", "width", "length", "height"):
-        value = getattr(thing, name)
+        value = getattr(label_object, name)
         if value is not None:
             seen[name] = float(value)
-    motion = thing.motion
-    velocity = thing.velocity if thing.velocity is not None or motion is None else motion.velocity
+    motion = label_object.motion
+    velocity = label_object.velocity if label_object.velocity is not None or motion is None else motion.velocity
     if velocity is not None:
         seen["velocity"] = (float(velocity[0]), float(velocity[1]))
         seen["speed"] = math.hypot(*velocity)
@@ -29,25 +29,31 @@ def observe(thing: LabelObject) -> Mapping[str, Value]:
             seen["acceleration"] = motion.acceleration
         if motion.yaw_rate is not None:
             seen["angularSpeed"] = motion.yaw_rate
-    for name, value in thing.attributes.items():
+    for name, value in label_object.attributes.items():
         seen.setdefault(name, value if isinstance(value, str | bool) else float(value))
     return seen
 
 
-def observed_names(thing: LabelObject) -> frozenset[str]:
+def observed_names(label_object: LabelObject) -> frozenset[str]:
     """The names of the properties that a label object has."""
-    if thing.attributes or thing.motion is not None:
-        return frozenset(observe(thing))
-    present = (thing.heading, thing.width, thing.length, thing.height, thing.velocity)
-    return _names(tuple([value is not None for value in present]))
-
-
-@cache
-def _names(present: tuple[bool, ...]) -> frozenset[str]:
-    parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"))
-    return frozenset(
-        ("position", *(name for names, there in zip(parts, present, strict=True) if there for name in names))
+    motion, velocity = label_object.motion, label_object.velocity
+    parts: tuple[object, ...] = (
+        label_object.heading,
+        label_object.width,
+        label_object.length,
+        label_object.height,
+        velocity,
     )
+    if motion is not None:
+        parts = (*parts[:4], velocity or motion.velocity, motion.acceleration, motion.yaw_rate)
+    return _names(tuple([part is not None for part in parts]), tuple(label_object.attributes))
+
+
+@lru_cache(maxsize=4096)
+def _names(present: tuple[bool, ...], attributes: tuple[str, ...]) -> frozenset[str]:
+    parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"), ("acceleration",))
+    named = zip((*parts, ("angularSpeed",)), present, strict=False)
+    return frozenset(("position", *attributes, *(name for names, there in named if there for name in names)))
 
 
 def observe_params(label: Label) -> Mapping[str, Value]:

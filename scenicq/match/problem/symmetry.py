@@ -15,11 +15,11 @@ from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["Shape", "interchangeable", "shape_of"]
+__all__ = ["GroupShape", "interchangeable", "shape_of"]
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class GroupShape:
     """A group up to the names of its objects and random variables.
 
     Attributes:
@@ -33,7 +33,7 @@ class Shape:
     symmetric: bool = False
 
 
-def shape_of(group: Group, ego: int, tolerance: Tolerance) -> Shape:
+def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
     """The shape of a group; the ego plays itself in every group, and what is compared more or less strictly differs."""
     roles: dict[int, int] = {}
     leaves: dict[Identity, int] = {}
@@ -78,21 +78,21 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> Shape:
         not isinstance(item, Comparison) and item.requirement.built_in is BuiltIn.COLLISION
         for item in group.constraints
     )
-    return Shape((tuple(rows), tuple(heads)), tuple(roles), symmetric)
+    return GroupShape((tuple(rows), tuple(heads)), tuple(roles), symmetric)
 
 
-def _signed(shape: Shape, swap: Mapping[int, int]) -> tuple[Hashable, tuple[int, ...]]:
+def _signed(shape: GroupShape, swap: Mapping[int, int]) -> tuple[Hashable, tuple[int, ...]]:
     roles = tuple(swap.get(index, index) for index in shape.roles)
     return shape.key, tuple(sorted(roles)) if shape.symmetric else roles
 
 
-def interchangeable(scenario: Scenario, shapes: Sequence[Shape]) -> Mapping[int, int]:
+def interchangeable(scenario: Scenario, shapes: Sequence[GroupShape]) -> Mapping[int, int]:
     """Interchangeable objects: for each, the one before it that swapping with changes nothing.
 
     Two objects are interchangeable if they are of one class and swapping them maps the shapes of all groups onto
     themselves.
     """
-    involved: dict[int, list[Shape]] = {}
+    involved: dict[int, list[GroupShape]] = {}
     for shape in shapes:
         for index in shape.roles:
             involved.setdefault(index, []).append(shape)
@@ -110,7 +110,7 @@ def interchangeable(scenario: Scenario, shapes: Sequence[Shape]) -> Mapping[int,
     return found
 
 
-def _swappable(one: int, other: int, shapes: Sequence[Shape]) -> bool:
+def _swappable(one: int, other: int, shapes: Sequence[GroupShape]) -> bool:
     plain = sorted(map(hash, (_signed(shape, {}) for shape in shapes)))
     swapped = [_signed(shape, {one: other, other: one}) for shape in shapes]
     if plain != sorted(map(hash, swapped)):

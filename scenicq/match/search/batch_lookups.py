@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
+from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.search.group_plan import MatchPlan
@@ -15,7 +15,7 @@ __all__ = ["look_up_positions"]
 
 
 def look_up_positions(
-    plans: Iterable[MatchPlan], ego: int, labels: Iterable[tuple[Label, Candidates | None]]
+    plans: Iterable[MatchPlan], ego: int, labels: Sequence[tuple[Label, Candidates | None]]
 ) -> MapLookups:
     """What the closed forms of plans will ask the map about labels.
 
@@ -24,28 +24,29 @@ def look_up_positions(
         ego: Index of the ego in the scenario.
         labels: Labels, each with what is known of who may play whom.
     """
-    asked: dict[int, list[ClosedForm]] = {}
+    asked: dict[int, tuple[set[RoadDirection], dict[int, Region]]] = {}
     for plan in plans:
         for group in plan.groups:
             form = group.closed_form
             if form is not None and form.index >= 0:
-                asked.setdefault(form.index, []).append(form)
-    positions: dict[int, list[tuple[float, float]]] = {index: [] for index in asked}
-    for label, among in labels:
-        for index, found in positions.items():
+                fields, regions = asked.setdefault(form.index, (set(), {}))
+                if form.field is not None:
+                    fields.add(form.field)
+                if form.region is not None:
+                    regions[id(form.region)] = form.region
+    lookups = MapLookups()
+    of_fields: dict[RoadDirection, list[tuple[float, float]]] = {}
+    for index, (fields, regions) in asked.items():
+        found: list[tuple[float, float]] = []
+        for label, among in labels:
             if index == ego:
                 found.append((label.ego.x, label.ego.y))
             else:
                 numbers = range(1, len(label.objects) + 1) if among is None else among.get(index, ())
                 found += [(label.objects[number - 1].x, label.objects[number - 1].y) for number in numbers]
-    lookups = MapLookups()
-    fields: dict[RoadDirection, list[tuple[float, float]]] = {}
-    for index, forms in asked.items():
-        for form in forms:
-            if form.field is not None:
-                fields.setdefault(form.field, []).extend(positions[index])
-            if form.region is not None:
-                lookups.look_up((), (form.region,), positions[index])
-    for field, found in fields.items():
+        for field in fields:
+            of_fields.setdefault(field, []).extend(found)
+        lookups.look_up((), regions.values(), found)
+    for field, found in of_fields.items():
         lookups.look_up((field,), (), found)
     return lookups

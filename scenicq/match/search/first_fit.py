@@ -13,25 +13,24 @@ import functools
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar, cast
+from typing import TypeAlias, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.match.decide.closed_form import Evaluated
 from scenicq.match.decide.compiled_expressions import Column, Columns, Get, UnclearError
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.observation import observe, observe_params, observed_names
-from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["FilledBatch", "FirstFit", "Row", "first_fit_of", "signature_of"]
+__all__ = ["FilledBatch", "FirstFit", "LabelRow", "first_fit_of", "signature_of"]
 
 _MOST_DECISIONS = 64
 _MORE_DECISIONS = 16
@@ -39,19 +38,21 @@ _MORE_DECISIONS = 16
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 T = TypeVar("T")
+Values: TypeAlias = "Value | Column | list[Value]"
+"""Of many labels: one each, or the one that all have."""
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class LabelRow:
     """A label of a batch.
 
     Attributes:
-        place: Its number among the labels that were asked about.
+        number: Its number among the labels that were asked about.
         label: The label.
         candidates: Who may play whom.
     """
 
-    place: int
+    number: int
     label: Label
     candidates: Candidates
     _seen: dict[int, Mapping[str, Value]] = field(default_factory=dict["int", "Mapping[str, Value]"])
@@ -79,7 +80,7 @@ class FilledBatch:
         witnesses: Of each label, their values.
     """
 
-    rows: Sequence[Row]
+    rows: Sequence[LabelRow]
     numbers: Sequence[tuple[int, ...]]
     variables: tuple[Leaf, ...]
     witnesses: Sequence[tuple[Value, ...]]
@@ -92,18 +93,18 @@ class FirstFit:
     Attributes:
         plan: The plan.
         order: The ego, then the other objects in program order.
-        places: Where in the order each object is.
+        ranks: Where in the order each object is.
         due: For each of them, the groups that can be decided once it has a candidate.
         most_decisions: After how many decisions a label is given up.
     """
 
     plan: MatchPlan
     order: tuple[int, ...]
-    places: Mapping[int, int]
+    ranks: Mapping[int, int]
     due: tuple[tuple[GroupPlan, ...], ...]
     most_decisions: int
 
-    def fill(self, rows: Sequence[Row], options: MatchOptions, lookups: MapLookups) -> Iterator[FilledBatch]:
+    def fill(self, rows: Sequence[LabelRow], options: MatchOptions, lookups: MapLookups) -> Iterator[FilledBatch]:
         """The labels whose roles can be filled, in batches; the others are left out.
 
         Args:
@@ -118,18 +119,21 @@ class FirstFit:
         while todo:
             look()
             batch = todo.pop()
-            for group in self.due[batch.depth]:
-                found, size = batch.decide(group, options, lookups), len(batch.rows)
-                holds, fails = _listed(found.holds, size), _listed(found.fails, size)
-                if not all(holds):
+            depth = len(batch.numbers[0])
+            for group in self.due[depth - 1]:
+                holds, fails = batch.decide(group, options, lookups)
+                if all(holds):
+                    continue
+                if any(fails):
                     todo += batch.where(fails).with_next_candidate()
-                    batch = batch.where(holds)
-                    if not batch.rows:
-                        break
-            if batch.rows and batch.depth + 1 == len(self.order):
-                yield batch.filled()
-            elif batch.rows:
-                todo += batch.with_next_role()
+                if not any(holds):
+                    break
+                batch = batch.where(holds)
+            else:
+                if depth == len(self.order):
+                    yield batch.filled()
+                else:
+                    todo += batch.with_next_role()
 
 
 @dataclass(slots=True)
@@ -140,128 +144,131 @@ class _Batch:
         fit: The plan.
         rows: The labels.
         numbers: Of each, who plays the first objects of the order.
-        values: By group, the values of its random variables, a column each.
+        values: By group, the values of its random variables: a column each, or what all labels have.
         decisions: How many groups were decided for these labels.
         columns: What is observed of the label objects in the roles.
     """
 
     fit: FirstFit
-    rows: Sequence[Row]
+    rows: Sequence[LabelRow]
     numbers: Sequence[tuple[int, ...]]
-    values: dict[GroupPlan, Mapping[Identity, Column | list[Value]]] = field(
-        default_factory=dict["GroupPlan", "Mapping[Identity, Column | list[Value]]"]
+    values: dict[GroupPlan, Mapping[Identity, Values]] = field(
+        default_factory=dict["GroupPlan", "Mapping[Identity, Values]"]
     )
     decisions: int = 0
     columns: Columns | None = None
 
-    @property
-    def depth(self) -> int:
-        """The place of the newest role in the order."""
-        return len(self.numbers[0]) - 1
-
-    def decide(self, group: GroupPlan, options: MatchOptions, lookups: MapLookups) -> Evaluated:
-        """Decide a group for all labels, and keep its witness."""
+    def decide(
+        self, group: GroupPlan, options: MatchOptions, lookups: MapLookups
+    ) -> tuple[Sequence[bool], Sequence[bool]]:
+        """For which labels a group surely holds, and for which it surely fails; keeps the witness."""
         form, size = group.closed_form, len(self.rows)
         assert form is not None
         self.decisions += 1
         if self.decisions > self.fit.most_decisions:
-            return Evaluated([False] * size, [False] * size, {})
+            return [False] * size, [False] * size
         if size == 1:
-            outcome = form.decide(self._get(0), options, lookups)
-            if not isinstance(outcome, Satisfied):
-                return Evaluated(False, outcome is not None, {})
-            self.values[group] = {identity: [value] for identity, value in outcome.values.items()}
-            return Evaluated(True, False, outcome.values)
+            holds, fails, self.values[group] = form.evaluate_one(self._get(0), options, lookups)
+            return [cast(bool, holds)], [cast(bool, fails)]
         if self.columns is None:
             self.columns = Columns(size, self._column)
-        found = form.decide_many(self._get, self.columns, options, lookups)
-        self.values[group] = {
-            identity: column if isinstance(column, np.ndarray | list) else [cast(Value, column)] * size
-            for identity, column in found.values.items()
-        }
-        return found
+        holds, fails, self.values[group] = form.evaluate_many(self._get, self.columns, options, lookups)
+        return _listed(holds, size), _listed(fails, size)
 
     def where(self, kept: Sequence[bool]) -> _Batch:
-        """The labels of which something is true."""
+        """The labels of which something is true: at least one."""
         if all(kept):
             return self
         mask = np.array(kept, dtype=bool)
-        values: dict[GroupPlan, Mapping[Identity, Column | list[Value]]] = {}
-        if mask.any():
-            for group, found in self.values.items():
-                values[group] = {
-                    identity: column[mask] if isinstance(column, np.ndarray) else list(itertools.compress(column, kept))
-                    for identity, column in found.items()
-                }
+        values: dict[GroupPlan, Mapping[Identity, Values]] = {
+            group: {identity: _kept(column, mask, kept) for identity, column in found.items()}
+            for group, found in self.values.items()
+        }
         rows, numbers = itertools.compress(self.rows, kept), itertools.compress(self.numbers, kept)
         return _Batch(self.fit, [*rows], [*numbers], values, self.decisions)
 
     def with_next_role(self) -> list[_Batch]:
         """The labels with the first free candidate for the next role; without one, with the next for an earlier one."""
-        index = self.fit.order[self.depth + 1]
+        index = self.fit.order[len(self.numbers[0])]
         numbers = [
-            next(((*taken, one) for one in row.candidates[index] if one not in taken), None)
-            for row, taken in zip(self.rows, self.numbers, strict=True)
+            _with_first_free(taken, row.candidates[index]) for row, taken in zip(self.rows, self.numbers, strict=True)
         ]
-        kept = [each is not None for each in numbers]
-        stuck = [] if all(kept) else self.where([not each for each in kept]).with_next_candidate()
-        batch = self.where(kept)
-        # the columns of the roles before stay what they are
-        batch.numbers = [each for each in numbers if each is not None]
-        return [*stuck, batch] if batch.numbers else stuck
+        if all(numbers):
+            # the columns of the roles before stay what they are
+            self.numbers = numbers
+            return [self]
+        found = self.where([not each for each in numbers]).with_next_candidate()
+        if any(numbers):
+            batch = self.where([bool(each) for each in numbers])
+            batch.numbers = [each for each in numbers if each]
+            found.append(batch)
+        return found
 
     def with_next_candidate(self) -> list[_Batch]:
         """The labels with the next free candidate for the newest role that has one left, by how many are filled."""
         numbers = [self._next(row, taken) for row, taken in zip(self.rows, self.numbers, strict=True)]
-        lengths = [0 if each is None else len(each) for each in numbers]
         found: list[_Batch] = []
-        for length in sorted(set(lengths) - {0}):
-            kept = [each == length for each in lengths]
-            batch = self.where(kept)
-            batch.numbers, batch.columns = [each for each in numbers if each is not None and len(each) == length], None
+        for length in sorted({len(each) for each in numbers} - {0}):
+            batch = self.where([len(each) == length for each in numbers])
+            batch.numbers, batch.columns = [each for each in numbers if len(each) == length], None
             found.append(batch)
         return found
 
-    def _next(self, row: Row, numbers: Sequence[int]) -> tuple[int, ...] | None:
-        taken = list(numbers)
-        while len(taken) > 1:
-            tried = taken.pop()
-            options = row.candidates[self.fit.order[len(taken)]]
-            for one in options[options.index(tried) + 1 :]:
-                if one not in taken:
-                    return (*taken, one)
-        return None
+    def _next(self, row: LabelRow, numbers: tuple[int, ...]) -> tuple[int, ...]:
+        """Who plays the objects next; nobody, if all has been tried."""
+        for length in range(len(numbers) - 1, 0, -1):
+            options = row.candidates[self.fit.order[length]]
+            following = _with_first_free(numbers[:length], options[options.index(numbers[length]) + 1 :])
+            if following:
+                return following
+        return ()
 
     def filled(self) -> FilledBatch:
         """The labels with their witnesses."""
-        variables: list[Leaf] = []
-        columns: list[Sequence[Value]] = []
+        size, variables, columns = len(self.rows), list[Leaf](), list[Sequence[Value]]()
         for group in self.fit.plan.groups:
-            for leaf in group.group.variables:
-                if leaf.identity in self.values[group]:
+            found = self.values[group]
+            for leaf in group.group.variables if found else ():
+                if leaf.identity in found:
                     variables.append(leaf)
-                    columns.append(_listed(self.values[group][leaf.identity], len(self.rows)))
-        witnesses = list(zip(*columns, strict=True)) if columns else [()] * len(self.rows)
+                    columns.append(_listed(found[leaf.identity], size))
+        witnesses = list(zip(*columns, strict=True)) if columns else [()] * size
         return FilledBatch(self.rows, self.numbers, tuple(variables), witnesses)
 
-    def _get(self, place: int) -> Get:
+    def _get(self, number: int) -> Get:
         """The observed values of one label."""
-        row, numbers, places = self.rows[place], self.numbers[place], self.fit.places
+        observed, numbers, ranks = self.rows[number].observed, self.numbers[number], self.fit.ranks
 
         def get(index: int, name: str) -> Value:
-            return row.observed(numbers[places[index]])[name]
+            return observed(numbers[ranks[index]])[name]
 
         return get
 
     def _column(self, index: int, name: str) -> Column | tuple[Column, Column]:
         """The values of a property of the label objects that play an object."""
-        place = self.fit.places[index]
-        objects = [row.label_object(numbers[place]) for row, numbers in zip(self.rows, self.numbers, strict=True)]
+        rank = self.fit.ranks[index]
+        objects = [row.label_object(numbers[rank]) for row, numbers in zip(self.rows, self.numbers, strict=True)]
         if name == "position":
             return np.array([each.x for each in objects]), np.array([each.y for each in objects])
         if name in _SCALARS:
             return np.array([getattr(each, name) for each in objects], dtype=np.float64)
         raise UnclearError
+
+
+def _with_first_free(taken: tuple[int, ...], options: Sequence[int]) -> tuple[int, ...]:
+    """Those who play objects and the first of some who does not; nobody, if all of them do."""
+    used = set(taken)
+    for one in options:
+        if one not in used:
+            return (*taken, one)
+    return ()
+
+
+def _kept(values: Values, mask: NDArray[np.bool_], kept: Sequence[bool]) -> Column | list[Value]:
+    """The values of some of the labels."""
+    return (
+        values[mask] if isinstance(values, np.ndarray) else list(itertools.compress(_listed(values, len(kept)), kept))
+    )
 
 
 def _listed(values: Column | Sequence[T] | T, size: int) -> list[T]:
@@ -275,21 +282,22 @@ def first_fit_of(plan: MatchPlan, scenario: Scenario) -> FirstFit | None:
     if any(group.closed_form is None for group in plan.groups):
         return None
     order = (scenario.ego, *(each.index for each in scenario.objects if each.index != scenario.ego))
-    places = {index: place for place, index in enumerate(order)}
+    ranks = {index: rank for rank, index in enumerate(order)}
     due: list[list[GroupPlan]] = [[] for _ in order]
     for group in sorted(plan.groups, key=lambda each: len(each.roles)):
-        due[max((places[index] for index in group.roles), default=0)].append(group)
+        due[max((ranks[index] for index in group.roles), default=0)].append(group)
     most = _MOST_DECISIONS + _MORE_DECISIONS * (len(order) - 1)
-    return FirstFit(plan, order, places, tuple(map(tuple, due)), most)
+    return FirstFit(plan, order, ranks, tuple(map(tuple, due)), most)
 
 
 def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[frozenset[str], ...]) -> Signature | None:
     """What is observed of all candidates, if it is the same for all of a role."""
     objects = label.objects
     numbers = {number for index, numbers in among.items() if index != ego for number in numbers}
-    seen = {number: observed_names(objects[number - 1]) for number in numbers}
+    wanted = _union(relevant)
+    seen = {number: observed_names(objects[number - 1]) & wanted for number in numbers}
     params = frozenset(observe_params(label)) if label.params else frozenset[str]()
-    own = observed_names(label.ego)
+    own = observed_names(label.ego) & wanted
     if len(set(seen.values())) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
         return _signature(relevant, ego, own, next(iter(seen.values())), params)
     kinds: list[frozenset[str]] = []
@@ -302,6 +310,12 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
             return None
         kinds.append(first)
     return (*kinds, params)
+
+
+@functools.lru_cache
+def _union(relevant: tuple[frozenset[str], ...]) -> frozenset[str]:
+    """All properties that matter of some object."""
+    return frozenset[str]().union(*relevant)
 
 
 @functools.lru_cache

@@ -13,7 +13,7 @@ from scenicq.match.decide.closed_form import ClosedForm, closed_form_of
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import Signature, build_groups
 from scenicq.match.problem.subgroups import parts_of
-from scenicq.match.problem.symmetry import Shape, interchangeable, shape_of
+from scenicq.match.problem.symmetry import GroupShape, interchangeable, shape_of
 
 __all__ = ["GroupPlan", "MatchPlan", "make_plan", "relevant_properties"]
 
@@ -77,7 +77,7 @@ def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[froz
     return tuple(frozenset(used[owner.index]) for owner in scenario.objects)
 
 
-def _over_time(scenario: Scenario, options: MatchOptions) -> list[Shape]:
+def _over_time(scenario: Scenario, options: MatchOptions) -> list[GroupShape]:
     """The shape of all that is said about time together, so that objects it tells apart are not interchangeable."""
     if scenario.dynamics is None or not scenario.dynamics.conditions:
         return []
@@ -94,7 +94,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         options: Which built-in requirements are in force, which parameters are ignored, the scopes of the tolerance.
         kinds: Numbers of shapes, extended as new ones are met.
     """
-    shapes: list[Shape] = []
+    shapes: list[GroupShape] = []
     groups: list[GroupPlan] = []
     links: dict[int, set[int]] = {}
     for group in build_groups(scenario, signature, options):

@@ -1,8 +1,7 @@
 """One label with one of its label objects as the ego: the body of algorithm 1.
 
 Conditions about one object and the ego leave each object its candidates; necessary conditions of pairs thin them out;
-the search then finds correspondences that satisfy the groups about several objects. Where there is little to try, it is
-tried before anything is thinned out.
+the search then finds correspondences that satisfy the groups about several objects.
 """
 
 from __future__ import annotations
@@ -30,8 +29,6 @@ from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 _FEW = 64
 """Decisions in closed form that cost less than arrays; steps of a search that cost hardly anything."""
 _FEW_SLOTS = 8
-_FEW_TRIES = 128
-"""Candidates, counted once for each condition on them, that are looked at before anything is thinned out."""
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
 
@@ -89,6 +86,7 @@ class LabelSearch:
     lookups: MapLookups = field(default_factory=MapLookups)
     failure: Failure | None = None
     undecided: Failure | None = None
+    _open: bool = field(default=False, repr=False)
     _decisions: GroupCache = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -130,6 +128,7 @@ class LabelSearch:
         if isinstance(decided[1], Satisfied):
             return Consistency.YES
         if isinstance(decided[1], Undecided):
+            self._open = True
             return Consistency.UNKNOWN
         if self.failure is None or depth > self.failure.depth:
             self.failure = Failure(
@@ -156,42 +155,20 @@ class LabelSearch:
         if Consistency.NO in answers:
             return
         wanted = {index: numbers for index, numbers in candidates.items() if index != self.scenario.ego}
-        firm = Consistency.UNKNOWN not in answers
-        given: list[dict[int, int]] = []
-        if firm and self.options.method == "auto" and _little(plan, wanted):
-            failure = self.failure
-            for assignment in self._at_once(plan, wanted, ego):
-                given.append(assignment)
-                yield self._solution(plan, assignment)
-            # what excludes a label is told by all of the conditions
-            self.failure = failure
         judged = self._filter(plan, wanted, ego)
         if judged is None:
             return
         slots, doubtful = judged
-        found = bool(given)
-        if firm:
+        found = False
+        if Consistency.UNKNOWN not in answers:
             for assignment in self._firm(plan, _without(slots, doubtful), ego):
-                if assignment not in given:
-                    found = True
-                    yield self._solution(plan, assignment)
-        if not found and self.undecided is None:
+                found = True
+                yield self._solution(plan, assignment)
+        if self._open and not found and self.undecided is None:
             # nothing matches; if some correspondence fails nowhere either, it may match
             open_one = next(self._search(plan, slots, ego, accept_unknown=True), None)
             if open_one is not None:
                 self.undecided = self._first_open(plan, open_one)
-
-    def _at_once(
-        self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
-    ) -> Iterator[dict[int, int]]:
-        """The first correspondences in the order of the program, as far as few steps lead to them."""
-        judged = self._judged(plan, wanted, ego)
-        if judged is None:
-            return
-        try:
-            yield from self._search(plan, _without(*judged), ego, accept_unknown=False, budget=_FEW)
-        except Exhausted:
-            return
 
     def _filter(
         self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
@@ -203,16 +180,10 @@ class LabelSearch:
             if failed is not None:
                 self._blame_thinning(*failed, wanted, ego)
                 return None
-        return self._judged(plan, left, ego)
-
-    def _judged(
-        self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
-    ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
-        """The same, candidate by candidate."""
         slots: list[Slot] = []
         doubtful: set[tuple[int, int]] = set()
         known: dict[tuple[tuple[int, ...], tuple[int, ...]], tuple[tuple[int, ...], tuple[int, ...]]] = {}
-        for index, numbers in wanted.items():
+        for index, numbers in left.items():
             groups = plan.unary.get(index, ())
             # of objects about which the same is asked one is enough
             key = tuple([group.kind for group in groups]), numbers
@@ -370,14 +341,6 @@ def _easy(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
             return False
         pairs += math.prod(len(candidates[index]) for index in group.roles)
     return pairs <= _FEW
-
-
-def _little(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
-    """Whether there is little to try, all of it in closed form, in the order of the program."""
-    if len(candidates) > _FEW_SLOTS or any(group.closed_form is None for group in plan.groups):
-        return False
-    tries = {(group.kind, tuple([candidates[index] for index in group.roles])) for group in plan.groups if group.roles}
-    return sum(len(numbers) for _, options in tries for numbers in options) <= _FEW_TRIES
 
 
 def _without(slots: list[Slot], doubtful: set[tuple[int, int]]) -> list[Slot]:

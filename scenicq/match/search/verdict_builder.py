@@ -55,7 +55,7 @@ class VerdictBuilder:
         keys = self._named(batch.variables)
         for row, numbers, values in zip(batch.rows, batch.numbers, batch.witnesses, strict=True):
             names = self.names(row.label, dict(zip(fit.order, numbers, strict=True)))
-            yield row.place, Match(names, _witness(keys, values))
+            yield row.number, Match(names, _witness(keys, values))
 
     def without_match(self, label: Label, search: LabelSearch, ended: Ended | None) -> tuple[int, Verdict]:
         """The verdict of a search without a match, and its weight: an unknown outweighs every no.

@@ -18,10 +18,9 @@ from scenicq.match.problem.candidates import find_candidates
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Refuted, Satisfied
-from scenicq.match.search import label_search
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.tolerance import EXACT, Tolerance
-from scenicq.match.verdict import Match, NoMatch
+from scenicq.match.verdict import Match
 
 OPTIONS = (
     MatchOptions(tolerance=EXACT),
@@ -73,8 +72,8 @@ def test_a_clear_answer_is_that_of_the_ladder(name):
                 cast = find_candidates(scenario, label, 0, replace(options, radius=None), {})
                 disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
                 tried = LabelSearch(scenario, options, replace(cast, disc=disc), matcher.ask)
-                for signature, candidates in cast.signatures(matcher._relevant):
-                    for group in matcher.plan(signature).groups:
+                for signature, candidates in cast.signatures(matcher.plans.relevant):
+                    for group in matcher.plans.plan(signature).groups:
                         if group.closed_form is None:
                             continue
                         for _ in range(3):
@@ -133,18 +132,3 @@ def test_a_label_with_known_candidates_has_the_verdict_that_a_search_finds(name)
                 (short,) = matcher.match_all([(label, among)])
                 assert type(short) is type(full)
                 assert getattr(short, "correspondence", None) == getattr(full, "correspondence", None)
-
-
-@pytest.mark.parametrize("name", ["ahead", "normal", "requirement", "row", "crowd"])
-def test_what_is_tried_at_once_changes_neither_matches_nor_reasons(name, monkeypatch):
-    scenario = compiled(HEADER + PROGRAMS[name], STREET)
-    given = [(label, options) for seed in range(2) for label in labels(scenario, seed) for options in OPTIONS]
-
-    def decided():
-        matchers = {options: Matcher(scenario, options) for options in OPTIONS}
-        return [(matchers[options].match(label), [*matchers[options].matches(label)]) for label, options in given]
-
-    at_once = decided()
-    monkeypatch.setattr(label_search, "_FEW_TRIES", -1)
-    assert decided() == at_once
-    assert {type(verdict) for verdict, _ in at_once} == {Match, NoMatch}

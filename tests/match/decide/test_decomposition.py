@@ -8,7 +8,7 @@ from programs import PROGRAMS
 
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.fields.constraint_network import Tape
+from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
@@ -41,7 +41,7 @@ def test_parts_lose_no_solution(name):
             whole = decide(items, tolerance)
             if true:
                 assert not isinstance(outcome, Refuted)
-                assert BoxSet.start(Tape(items, tolerance), {}).narrowed().size == 1
+                assert BoxSet.start(ConstraintNetwork(items, tolerance), {}).narrowed().size == 1
             if not isinstance(outcome, Undecided) and not isinstance(whole, Undecided):
                 assert type(outcome) is type(whole)
             if isinstance(outcome, Satisfied):

@@ -1,0 +1,73 @@
+"""What is worked out once for a scenario, however many labels are matched: plans by signature, and their first fits."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+from scenicq.forest.scenario import Scenario
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.candidates import Candidates, candidates_of
+from scenicq.match.problem.constraints import Signature
+from scenicq.match.search.first_fit import FirstFit, LabelRow, first_fit_of, signature_of
+from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
+from scenicq.store.labels import Label
+
+__all__ = ["PlanCache"]
+
+
+@dataclass(eq=False)
+class PlanCache:
+    """The plans of one scenario.
+
+    Attributes:
+        scenario: The scenario, made ready to be matched.
+        options: What holds of all labels, of the tolerance its scopes alone.
+        relevant: For each object, the properties for which it matters whether a label observes them.
+        plans: By what is observed.
+    """
+
+    scenario: Scenario
+    options: MatchOptions
+    relevant: tuple[frozenset[str], ...] = field(init=False)
+    plans: dict[Signature, MatchPlan] = field(default_factory=dict["Signature", "MatchPlan"])
+    _kinds: dict[Hashable, int] = field(default_factory=dict["Hashable", int])
+    _fits: dict[MatchPlan, FirstFit | None] = field(default_factory=dict["MatchPlan", "FirstFit | None"])
+
+    def __post_init__(self) -> None:
+        """Find out what matters of a label."""
+        self.relevant = relevant_properties(self.scenario, self.options)
+
+    def plan(self, signature: Signature) -> MatchPlan:
+        """The groups for a signature, analysed once."""
+        if signature not in self.plans:
+            self.plans[signature] = make_plan(self.scenario, signature, self.options, self._kinds)
+        return self.plans[signature]
+
+    def first_fits(
+        self, labels: Iterable[tuple[Label, Candidates | None]], given: Mapping[str, str]
+    ) -> dict[FirstFit, list[LabelRow]]:
+        """The labels that first fit can decide, by their plans.
+
+        Args:
+            labels: Labels, each with what is known of who may play whom.
+            given: Ids of label objects that are known to play objects, by the objects' names.
+        """
+        options, found = self.options, dict[FirstFit, list[LabelRow]]()
+        if options.method != "auto" or options.exact or options.ego != "label":
+            return found
+        for number, (label, among) in enumerate(labels):
+            if label.has_ego:
+                roles = among
+                if roles is None or given:
+                    roles = candidates_of(self.scenario, label, 0, options, given, among)
+                signature = signature_of(label, self.scenario.ego, roles, self.relevant)
+                fit = None if signature is None else self._first_fit(self.plan(signature))
+                if fit is not None:
+                    found.setdefault(fit, []).append(LabelRow(number, label, roles))
+        return found
+
+    def _first_fit(self, plan: MatchPlan) -> FirstFit | None:
+        if plan not in self._fits:
+            self._fits[plan] = first_fit_of(plan, self.scenario)
+        return self._fits[plan]
