@@ -53,6 +53,7 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/bench/ingest.py
 	$(BIN)/python tests/bench/pictures.py
 	$(BIN)/python tests/bench/steps.py
+	$(BIN)/python tests/bench/by_hand.py
 
 FRAMES ?= 10000 100000
 bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=1000000 is the largest bar)
