@@ -22,6 +22,7 @@ from scenicq.evaluate.matched import Matched, read_matched
 from scenicq.evaluate.resampling import holm, resamples
 from scenicq.evaluate.simulation import Simulated, read_simulated, verdict
 from scenicq.evaluate.slices import Slice, slices
+from scenicq.evaluate.weighting import Weighted, weighted
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
 from scenicq.query.execution.result_files import read_records
@@ -32,6 +33,7 @@ from scenicq.store.dataset import Dataset
 __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
 
 Bools = NDArray[np.bool_]
+Reals = NDArray[np.float64]
 
 Results: TypeAlias = Path | str | Iterable[Result | Mapping[str, Any]]
 """A file of results, results as a query gives them, or records of them."""
@@ -66,6 +68,8 @@ class ScenarioEvaluation:
         roles: How often the objects of each role are missed, against others of their classes that are alike in
             distance and visibility.
         all_objects: The same of all objects of frames that match, against those of the other frames.
+        weighted: How often the objects of each role (all objects without roles) are missed where frames are spread as
+            the program spreads its scenes; empty where the results are not ranked.
         classes: Figures of each class, on frames that match and on the others.
         slices: Shares missed by what objects and frames are like.
         worst: Frames that match, the worst first.
@@ -79,6 +83,7 @@ class ScenarioEvaluation:
     other: int
     roles: tuple[Comparison, ...]
     all_objects: Comparison
+    weighted: tuple[Weighted, ...]
     classes: tuple[ClassFigures, ...]
     slices: tuple[Slice, ...]
     worst: tuple[WorstFrame, ...]
@@ -170,7 +175,7 @@ def evaluate(
         distance_m,
         least_score,
         tuple(found),
-        (*doubts, *_warnings(found)),
+        (*doubts, *_warnings(found, detection)),
         detection,
     )
 
@@ -216,7 +221,13 @@ def _corrected(found: list[ScenarioEvaluation]) -> list[ScenarioEvaluation]:
     return done
 
 
-def _warnings(found: Iterable[ScenarioEvaluation]) -> Iterator[Diagnostic]:
+def _warnings(found: Iterable[ScenarioEvaluation], detection: Detection) -> Iterator[Diagnostic]:
+    if detection.flat:
+        message = (
+            "the benchmark takes distances in space, and the dataset does not know all heights: the plane is taken"
+        )
+        hint = "a dataset that was made before heights were kept gets them when its source is ingested again"
+        yield Diagnostic("heights-unknown", message, severity="warning", hints=(hint,))
     for one in found:
         for each in one.headline:
             if each.share.of and each.few:
@@ -255,11 +266,13 @@ class _Judge:
         here, there = self._counted & matching[frame], self._counted & other[frame]
         in_roles = np.zeros(len(frame), dtype=np.bool_)
         roles: list[Comparison] = []
+        asked: list[tuple[str, Bools]] = []
         for role in matched.roles:
             mine = np.zeros(len(frame), dtype=np.bool_)
             mine[role.objects] = True
             mine &= here
             in_roles |= mine
+            asked.append((f"role {role.name}", mine))
             others = (here | there) & ~mine & self._of_classes(mine)
             roles.append(self._compare(f"role {role.name}", mine, others, self._alike))
         of_all = self._compare("all objects", here, there, self._class)
@@ -271,6 +284,7 @@ class _Judge:
             other=int(other.sum()),
             roles=tuple(roles),
             all_objects=of_all,
+            weighted=tuple(self._weighted(matched.log_weight, asked or [("all objects", here)])),
             classes=tuple(
                 figures
                 for group, frames in (("matching", matching), ("other", other))
@@ -282,6 +296,13 @@ class _Judge:
             missed=self._missed,
             mine=mine,
         )
+
+    def _weighted(self, log_weight: Reals | None, asked: Iterable[tuple[str, Bools]]) -> Iterator[Weighted]:
+        if log_weight is not None:
+            for about, mine in asked:
+                numbers = np.flatnonzero(mine)
+                of_frame = log_weight[self._detection.objects.frame[numbers]]
+                yield weighted(about, self._missed[numbers], of_frame, self._recording[numbers], self._weights)
 
     def _of_classes(self, mine: Bools) -> Bools:
         return np.isin(self._class, np.unique(self._class[mine]))

@@ -13,6 +13,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.exporters.export import EXPORTS, Exporter
+from scenicq.exporters.forms import FORMS
 from scenicq.importers.ingest import ingest
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.results import Result
@@ -277,3 +278,7 @@ def test_what_cannot_be_exported(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert code("paths", tmp_path / "file" / "out") == "target-unwritable"
     assert not (tmp_path / "out").exists()
+
+
+def test_the_command_offers_the_forms_that_there_are():
+    assert tuple(EXPORTS) == FORMS

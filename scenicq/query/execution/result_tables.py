@@ -31,7 +31,7 @@ def roles_of(records: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(("ego", *(role for each in records for role in each["correspondence"]))))
 
 
-DENSITY_COLUMNS = ("log_density", "log_density_error", "no_density")
+DENSITY_COLUMNS = ("log_density", "log_density_error", "log_weight", "no_density")
 """Columns of results that are ranked: numbers, and why there is none."""
 
 
@@ -47,7 +47,7 @@ def result_schema(
         over_time: Whether the results are intervals.
     """
     text = pa.string()
-    kinds = (pa.float64(), pa.float64(), text)
+    kinds = (pa.float64(), pa.float64(), pa.float64(), text)
     more = list(zip(DENSITY_COLUMNS, kinds, strict=True)) if ranked else []
     time, frame, frames = (
         pa.int64(),
