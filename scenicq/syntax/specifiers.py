@@ -27,6 +27,11 @@ _TWO_WORDS = {
 }  # fmt: skip
 _ENDS = frozenset((",", ")", "]", "}", ";", ":", "if", "else", "for", "and", "or", "from", "as"))
 
+_FAR = "a requirement says how far: `require (distance from a to b) < 10`"
+_OUT = "a requirement says where it is not: `in everywhere` and `require not (a.position in road)`"
+_SAID = {"near": _FAR, "within": _FAR, "close": _FAR, "off": _OUT, "outside": _OUT, "not": _OUT}
+"""What people try to place objects with, and how Scenic says it."""
+
 
 class InstanceParser(AtomParser):
     """Reads instances.
@@ -165,6 +170,7 @@ class InstanceParser(AtomParser):
             message = f"`{self.text}` alone starts no specifier"
             return self.fail(message, hint=f"write `{close}`", code="unknown-specifier")
         hint = f"`{close}` is spelled similarly" if close else "a property is set by `with property value`"
+        hint = _SAID.get(self.text, hint)
         return self.fail(f"no specifier starts with `{self.text}`", hint=hint, code="unknown-specifier")
 
     def specifier(self) -> ast.Specifier:

@@ -102,3 +102,9 @@ def test_what_people_call_it_names_what_scenic_calls_it(name, known):
 def test_a_comma_after_the_class_is_told():
     with pytest.raises(ScenarioError, match="no comma stands between the class and its first specifier"):
         compiled("ego = new Object, with width 1\n")
+
+
+@pytest.mark.parametrize(("tried", "told"), [("near ego", "distance from a to b"), ("off road", "not .a.position in")])
+def test_what_is_no_specifier_is_said_as_a_requirement(tried, told):
+    with pytest.raises(ScenarioError, match=told):
+        compiled(f"model scenic.domains.driving.model\nego = new Car\nother = new Car {tried}\n")
