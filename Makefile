@@ -64,6 +64,7 @@ SEED ?= 1
 conformance: $(READY) ## Compare with Scenic 3.1.1 and 2.1.0 (MAP=an OpenDRIVE file, RANDOM=, SEED=; or SCENIC=a checkout)
 ifdef SCENIC
 	$(BIN)/python tests/conformance/published.py $(SCENIC)
+	$(BIN)/python tests/conformance/map_questions.py $(SCENIC)
 else
 	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(SEED)
 endif
