@@ -46,13 +46,16 @@ test-all: $(READY) ## All tests
 golden: $(READY) ## Rewrite the golden files that tests compare with
 	$(PYTEST) --update-golden -m 'not slow'
 
-bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each step of matching is worth; numbers go to bench-results/
+bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each step of matching is worth; numbers go to bench-results/ (SCENIC=a checkout and DATASETS= add its programs)
 	$(BIN)/python tests/bench/queries.py
 	$(BIN)/python tests/bench/jointly.py
 	$(BIN)/python tests/bench/scalability.py --patience 5
 	$(BIN)/python tests/bench/ingest.py
 	$(BIN)/python tests/bench/pictures.py
 	$(BIN)/python tests/bench/steps.py
+ifdef SCENIC
+	$(BIN)/python tests/bench/published.py $(SCENIC) $(DATASETS)
+endif
 
 FRAMES ?= 10000 100000
 bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=1000000 is the largest bar)
