@@ -53,6 +53,7 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/bench/ingest.py
 	$(BIN)/python tests/bench/pictures.py
 	$(BIN)/python tests/bench/steps.py
+	$(BIN)/python tests/bench/by_hand.py
 ifdef SCENIC
 	$(BIN)/python tests/bench/published.py $(SCENIC) $(DATASETS)
 endif

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import click
 
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.advice import Outlook, advice
 
 from .report import columns, count, plain
+
+if TYPE_CHECKING:  # takes long to load
+    from scenicq.query.explain.advice import Outlook
 
 __all__ = ["advise", "is_nearly_empty"]
 
@@ -38,7 +41,9 @@ def advise(query: Query, *, asked: bool) -> None:
         query: After its results were taken.
         asked: Whether the user asked for it, so that it may take its time.
     """
-    found = advice(query, budget_s=math.inf if asked else _BUDGET_S)
+    from scenicq.query.explain.advice import advice  # noqa: PLC0415 - takes long to load
+
+    found = advice(query, budget_s=math.inf if asked else _BUDGET_S, brief=not asked)
     funnel = query.funnel
     lines = [f"{count(funnel.matches, 'match')} in {count(funnel.frames, 'frame')}"]
     if found.first:

@@ -13,11 +13,9 @@ from pathlib import Path
 
 import click
 
-from scenicq.exporters.export import Exporter
 from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query
-from scenicq.report.write import check_target, write_report
 from scenicq.store.atomic_files import sole_writer
 
 from .formats import make_writer
@@ -60,6 +58,8 @@ def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wa
     if wanted.report is None:
         _deliver(query, results, near, wanted, bar)
         return
+    from scenicq.report.write import check_target  # noqa: PLC0415 - takes long to load
+
     check_target(wanted.report)
     with sole_writer(wanted.report):
         _deliver(query, results, near, wanted, bar)
@@ -73,6 +73,8 @@ def _deliver(
     file, report = wanted.file, wanted.report
     exporter = None
     if wanted.export is not None:
+        from scenicq.exporters.export import Exporter  # noqa: PLC0415 - takes long to load
+
         exporter = Exporter(wanted.export[0], query.dataset, wanted.export[1], Path(query.source.name).stem)
     shown: list[Result] | None = None if report is None else []
     close: list[Result] | None = None if report is None else []
@@ -102,6 +104,8 @@ def _deliver(
             with bar.aside():
                 show_few(exporter.finish().left_out)
     if report is not None:
+        from scenicq.report.write import write_report  # noqa: PLC0415 - takes long to load
+
         command = shlex.join(["scenicq", *sys.argv[1:]])
         elapsed_s = time.perf_counter() - started
         write_report(

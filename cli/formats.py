@@ -11,8 +11,6 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, BinaryIO, Protocol
 
-import pyarrow.parquet as pq
-
 from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
 
 from .report import CONTROL as _CONTROL
@@ -124,6 +122,8 @@ class _Csv:
 
 class _Parquet:
     def __init__(self, sink: BinaryIO, roles: Sequence[str], *, ranked: bool, over_time: bool) -> None:
+        import pyarrow.parquet as pq  # noqa: PLC0415 - takes long to load
+
         self._schema = result_schema(roles, ranked=ranked, over_time=over_time)
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Mapping[str, Any]] = []

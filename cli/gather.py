@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from scenicq.exporters.export import EXPORTS
+from scenicq.exporters.forms import FORMS
 from scenicq.query.execution.partitions import Gathered
 from scenicq.query.execution.partitions import gather as find_pieces
 from scenicq.query.execution.record_reader import noted_question, read_record
@@ -33,7 +33,7 @@ __all__ = ["gather"]
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, parquet or ids.  [default: as for `match`]")  # fmt: skip
 @click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write to a file.")
-@click.option("--export", metavar="FORM DIR", type=(click.Choice(list(EXPORTS)), click.Path(path_type=Path)),
+@click.option("--export", metavar="FORM DIR", type=(click.Choice(FORMS), click.Path(path_type=Path)),
               help="Hand the matching frames on, too, in a new folder DIR; as for `match`.")  # fmt: skip
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures of the matches, too: DIR/index.html.")  # fmt: skip

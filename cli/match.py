@@ -15,16 +15,16 @@ from typing import Any
 import click
 
 from scenicq.errors import Diagnostic
-from scenicq.exporters.export import EXPORTS
+from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
-from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.store.atomic_files import sole_writer
-from scenicq.temporal.intervals import DEFAULT_GAP_S
+from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
 from .advise import advise, is_nearly_empty
+from .combinations import check_combination, check_over_time
 from .datasets import open_checked
 from .deliver import Wanted, deliver
 from .engine import parse_engine
@@ -47,6 +47,8 @@ __all__ = ["match"]
 def _near(query: Query, count: int | None) -> Iterator[Result]:
     """The frames that come closest, looked for once the matches are there."""
     if count is not None and not query.funnel.cut:
+        from scenicq.query.explain.nearest_miss import nearest_misses  # noqa: PLC0415 - takes long to load
+
         yield from nearest_misses(query, count)
 
 
@@ -120,7 +122,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--engine", metavar="dask[=ADDRESS]", callback=parse_engine, help="Match in pieces on Dask: in processes "
               "on this machine (--jobs of them, or one a processor), or on the cluster whose scheduler is at ADDRESS.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run with the same -o FILE stopped.")
-@click.option("--export", metavar="FORM DIR", type=(click.Choice(list(EXPORTS)), click.Path(path_type=Path)),
+@click.option("--export", metavar="FORM DIR", type=(click.Choice(FORMS), click.Path(path_type=Path)),
               help="Hand the matching frames on, too, in a new folder DIR: nuscenes-tokens, argoverse2, paths (of "
               "sensor files), interchange (to ingest elsewhere) or openlabel.")
 @click.option("--explain", is_flag=True,
@@ -161,16 +163,14 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     chosen = choose_format(format_, None if shard else file)
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
-    if diverse and sample is None:
-        raise click.UsageError("--diverse needs --sample N", ctx)
+    together = {**ctx.params, "output": file, "advise": advised}
+    check_combination(ctx, together)
     source, target, model = given_program(ctx, program, scenario, dataset)
     options = query_options({**given, "model": model})
     if deadline is not None:
         options = replace(options, until=time.time() + deadline)
     query = Query(open_checked(target), source, options)
-    if (near is not None or advised) and query.is_over_time():
-        option = "--advise" if advised else "--near"
-        raise click.UsageError(f"{option} is about frames: it cannot be had with intervals", ctx)
+    check_over_time(ctx, together, query.is_over_time)
     if explain:
         show_plan(query)
         return
@@ -178,17 +178,15 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         told = remarks(query)
         with bar.aside():
             show_remarks(query, *told)
-    if shard is not None:
-        _in_shard(ctx, query, shard, file, quiet=quiet)
+    if shard is not None and file is not None:
+        query.funnel = replace(run_shard(query, shard, file, quiet=quiet), warnings=query.funnel.warnings)
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
     pieces = None
     if file is not None:
         again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
         INTERRUPTS.advice = f"  = hint: {again}"
-    if resume:
-        if file is None:
-            raise click.UsageError("--resume needs -o FILE, beside which it keeps what is done", ctx)
+    if resume and file is not None:
         real = Path(os.path.realpath(file))
         pieces = real.with_name(f".{real.name}.pieces")
         engine = kept(engine or run_here, pieces)
@@ -235,17 +233,6 @@ def _selected(
         found = [each for each in found if isinstance(each.verdict, Match)]
         found = sample_diverse(found, sample) if diverse else sample_plain(found, sample)
     yield from rank_results(query, found) if rank else found
-
-
-def _in_shard(ctx: click.Context, query: Query, shard: Shard, folder: Path | None, *, quiet: bool) -> None:
-    """Run one shard into a folder."""
-    if folder is None:
-        raise click.UsageError("--shard needs -o FOLDER, which the shards of a query share", ctx)
-    for name in ("near", "limit", "resume", "engine", "report", "export", "rank", "sample"):
-        if ctx.params.get(name):
-            later = ": give it to `scenicq gather`" if name in ("report", "export") else ""
-            raise click.UsageError(f"--shard cannot be had with --{name}{later}", ctx)
-    query.funnel = replace(run_shard(query, shard, folder, quiet=quiet), warnings=query.funnel.warnings)
 
 
 def _conclude(

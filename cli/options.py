@@ -10,7 +10,7 @@ from scenicq.errors import Diagnostic, SolverError
 from scenicq.match.options import MatchOptions
 from scenicq.query.execution.option_texts import OptionTexts, read_options
 from scenicq.query.execution.run import QueryOptions
-from scenicq.temporal.intervals import DEFAULT_GAP_S
+from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
 __all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "query_options"]
 

@@ -18,7 +18,8 @@ import click
 
 from scenicq.errors import Diagnostic
 from scenicq.store.manifest import MANIFEST, Manifest, read_manifest
-from scenicq.store.place import Place, find_place, stamp_of
+from scenicq.store.place import Place, find_place
+from scenicq.store.sound_notes import SoundNotes
 
 from .report import show
 
@@ -63,21 +64,19 @@ def note_sound(place: Place, manifest: Manifest) -> None:
         manifest: Of the dataset.
     """
     with contextlib.suppress(OSError, RuntimeError):
-        note = _sound(place, manifest)
-        note.parent.mkdir(parents=True, exist_ok=True)
-        note.touch()
+        _sound().add(place, manifest)
 
 
 def is_noted_sound(place: Place, manifest: Manifest) -> bool:
     """Whether a dataset was made or found to be sound by this user, and is as it was then."""
     try:
-        return _sound(place, manifest).exists()
+        return _sound().has(place, manifest)
     except (OSError, RuntimeError):
         return False
 
 
-def _sound(place: Place, manifest: Manifest) -> Path:
-    return state_folder() / "sound" / stamp_of(place, manifest)
+def _sound() -> SoundNotes:
+    return SoundNotes(state_folder() / "sound")
 
 
 def recorded(dataset: Dataset) -> Path | None:

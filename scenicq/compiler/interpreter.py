@@ -332,7 +332,7 @@ class Interpreter:
             f"`{kind}` is not supported",
             span,
             "does not describe one instant",
-            hints=("a scene is matched at one instant: remove this, or use `--initial` to ignore it",),
+            hints=("a scene is one instant: remove this, or use `--initial` to ignore it",),
             severity="warning" if self.initial else "error",
         )
         if not self.initial:

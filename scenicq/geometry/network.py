@@ -35,7 +35,7 @@ from scenicq.geometry.elements import (
 from scenicq.geometry.features import MapFeature, dangling, read_geojson
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.network_builder import link
-from scenicq.geometry.regions import SLACK, PolygonSet, PolylineSet, Region
+from scenicq.geometry.regions import SLACK, DeferredPolylines, PolygonSet, PolylineSet, Region
 from scenicq.geometry.road_direction import along_lines
 from scenicq.geometry.shapes import Shape
 
@@ -168,6 +168,9 @@ class Network:
 
         Scenic makes its curbs so from its lane groups. Those of groups inside intersections are no part of it.
         """
+        return DeferredPolylines("curb", self._curbs_everywhere)
+
+    def _curbs_everywhere(self) -> PolylineSet:
         lines = self._outer_curbs
         if not lines:
             lines = right_edges(self.lanes, [crossing.polygon for crossing in self.intersections])

@@ -6,6 +6,7 @@ asked of a region is a function in `membership`, `meeting`, `cells` and `samplin
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
@@ -22,6 +23,7 @@ __all__ = [
     "SLACK",
     "XY",
     "Bounds",
+    "DeferredPolylines",
     "DifferenceOf",
     "Disc",
     "Everywhere",
@@ -152,6 +154,28 @@ class PolylineSet(_Indexed):
 
     def _shapes(self) -> tuple[Shape, ...]:
         return self.lines
+
+
+class DeferredPolylines(PolylineSet):
+    """The union of polylines that are worked out when somebody asks for them."""
+
+    def __init__(self, name: str, make: Callable[[], PolylineSet]) -> None:
+        """Take the name, and what makes the region."""
+        vars(self).update(name=name, _make=make)
+
+    @cached_property
+    def _made(self) -> PolylineSet:
+        return vars(self)["_make"]()
+
+    @property
+    def lines(self) -> tuple[LineString | MultiLineString, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Polylines."""
+        return self._made.lines
+
+    @property
+    def orientation(self) -> VectorField | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The preferred heading of what is placed in the region."""
+        return self._made.orientation
 
 
 @dataclass(frozen=True, eq=False)

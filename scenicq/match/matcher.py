@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from scenicq.budget import TimeIsUp, limited
 from scenicq.forest.scenario import Scenario
@@ -33,8 +34,10 @@ from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_prope
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.search.verdict_builder import Ended, VerdictBuilder
 from scenicq.match.verdict import Cause, Match, Unknown, Verdict
-from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
+
+if TYPE_CHECKING:  # takes long to load
+    from scenicq.smt.answer import Solver
 
 __all__ = ["Matcher"]
 

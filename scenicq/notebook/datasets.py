@@ -18,6 +18,7 @@ from scenicq.notebook.matches import Matches
 from scenicq.query.execution.option_texts import DRIVING, OptionTexts, read_options
 from scenicq.query.execution.run import Query, read_program
 from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.sound_notes import SoundNotes
 
 __all__ = ["OpenedDataset", "open"]
 
@@ -109,13 +110,26 @@ def _with_model(options: OptionTexts) -> OptionTexts:
     return texts
 
 
-def open(address: str | Path) -> OpenedDataset:
+_SOUND = SoundNotes()
+"""What this process has found out."""
+
+
+def open(address: str | Path, *, notes: str | Path | None = None) -> OpenedDataset:
     """Open a dataset that `scenicq ingest` made.
+
+    It is read whole to see whether it is sound: once in a process, and again where a file has changed.
 
     Args:
         address: A folder, or what fsspec understands, such as `s3://bucket/dataset`.
+        notes: A folder in which it is noted that a dataset is sound, for other processes; that of the command is
+            `sound` in its state folder, such as `~/.local/state/scenicq/sound`.
 
     Raises:
-        DataError: store-missing, store-version or store-damaged.
+        DataError: store-missing, store-version or store-damaged; dataset-invalid.
     """
-    return OpenedDataset(open_dataset(address))
+    sound = _SOUND if notes is None else SoundNotes(Path(notes))
+    dataset = open_dataset(address, check=False)
+    if not sound.has(dataset.place, dataset.manifest):
+        dataset = open_dataset(address)
+        sound.add(dataset.place, dataset.manifest)
+    return OpenedDataset(dataset)

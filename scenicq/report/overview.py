@@ -69,6 +69,17 @@ def program_section(lines: Sequence[Line], rest: Mapping[str, int], frames: int)
     )
 
 
+def _step(name: str, number: int, frames: int | None = None) -> str:
+    """A row of the funnel, with a bar for its share of frames where it counts any."""
+    bar = "" if frames is None else _bar(number / frames if frames else 0.0, f"{number:,} of {frames:,}")
+    return element(
+        "tr",
+        element("th", escape(name), scope="row"),
+        element("td", f"{number:,}", class_="count"),
+        element("td", bar, class_="share"),
+    )
+
+
 def funnel_section(funnel: Funnel, total: int) -> str:
     """How many frames are left after each step.
 
@@ -76,26 +87,22 @@ def funnel_section(funnel: Funnel, total: int) -> str:
         funnel: Of a query whose results were taken.
         total: Frames of the dataset.
     """
-    steps = [
-        ("frames", funnel.frames),
-        ("after the prefilter", funnel.candidates),
-        ("with an object for every role", funnel.cast),
-        ("matches", funnel.matches),
-        ("unknown", funnel.unknowns),
-    ]
-    rows = [
-        element(
-            "tr",
-            element("th", escape(name), scope="row"),
-            element("td", f"{count:,}", class_="count"),
-            element(
-                "td",
-                _bar(count / funnel.frames if funnel.frames else 0.0, f"{count:,} of {funnel.frames:,}"),
-                class_="share",
-            ),
-        )
-        for name, count in steps
-    ]
+    steps = [("frames", funnel.frames), ("after the prefilter", funnel.candidates)]
+    counted: list[tuple[str, int]] = []  # what is no frame, so that it has no share of them
+    if funnel.over_time:
+        steps.append(("that match the initial scene", funnel.over_time["starts"]))
+        counted = [
+            ("recordings looked at", funnel.over_time["recordings"]),
+            ("ways to give the objects tracks", funnel.over_time["bindings"]),
+            ("of these cut off: the recording or a track ends before the program", funnel.over_time["cut off"]),
+            ("intervals that match", funnel.matches),
+            ("intervals that are unknown", funnel.unknowns),
+        ]
+    else:
+        steps.append(("with an object for every role", funnel.cast))
+        steps += [("matches", funnel.matches), ("unknown", funnel.unknowns)]
+    rows = [_step(name, number, funnel.frames) for name, number in steps]
+    rows += [_step(name, number) for name, number in counted]
     stopped = f"Stopped after {funnel.frames:,} of {total:,} frames (--limit)." if funnel.frames < total else ""
     told = [f"{each.message}{f' ({each.span.place})' if each.span is not None else ''}" for each in funnel.warnings]
     told += [
@@ -107,6 +114,10 @@ def funnel_section(funnel: Funnel, total: int) -> str:
         (escape(what), f"{count:,}", f"{count / funnel.frames:.1%}")
         for what, count in sorted(funnel.excluded.items(), key=lambda item: (-item[1], item[0]))
     ]
+    broken = [
+        (escape(what), f"{count:,}")
+        for what, count in sorted(funnel.broken.items(), key=lambda item: (-item[1], item[0]))
+    ]
     return element(
         "section",
         element("h2", "Where the frames went", id="funnel-title"),
@@ -114,6 +125,7 @@ def funnel_section(funnel: Funnel, total: int) -> str:
         element("ul", *warnings, class_="cause") if warnings else "",
         element("table", element("tbody", *rows), class_="funnel"),
         table("First failed at", ("what", "frames", "share"), failed),
+        table("Then failed at", ("what", "ways to give the objects tracks"), broken),
         aria_labelledby="funnel-title",
     )
 

@@ -24,7 +24,6 @@ from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
-from scenicq.store.soundness import check_dataset
 from scenicq.store.sql import sql_text
 
 __all__ = ["Dataset", "open_dataset"]
@@ -83,12 +82,15 @@ class Dataset:
         """A table's Parquet files, in the order of their rows; absolute paths where they are on this machine."""
         return tuple(map(self.place.file, self.manifest.tables[table]))
 
-    def connect(self, *, threads: int | None = None, memory_limit: str | None = None) -> duckdb.DuckDBPyConnection:
+    def connect(
+        self, *, threads: int | None = None, memory_limit: str | None = None, views: bool = True
+    ) -> duckdb.DuckDBPyConnection:
         """An in-memory DuckDB with one view a table, that can read the dataset's files and nothing else.
 
         Args:
             threads: Upper bound of DuckDB's threads; DuckDB decides by default.
             memory_limit: Such as "2GB"; DuckDB decides by default.
+            views: Whether the tables are there as views; else only `files` can be read.
         """
         config: dict[str, str | bool | int | float | list[str]] = {
             "autoinstall_known_extensions": False,
@@ -106,7 +108,8 @@ class Dataset:
         for table in self.manifest.tables:
             paths = [str(path) for path in self.files(table)]
             every += paths
-            connection.execute(f"CREATE VIEW {table} AS SELECT * FROM read_parquet({_sql_list(paths)})")
+            if views:
+                connection.execute(f"CREATE VIEW {table} AS SELECT * FROM read_parquet({_sql_list(paths)})")
         connection.execute(f"SET allowed_paths = {_sql_list(every)}")
         connection.execute("SET enable_external_access = false")
         return connection
@@ -224,6 +227,8 @@ def open_dataset(address: str | Path, *, older: bool = False, check: bool = True
         raise DataError(problems)
     dataset = Dataset(place, manifest)
     if check:
+        from scenicq.store.soundness import check_dataset  # noqa: PLC0415 - takes long to load
+
         try:
             with dataset.blamed():
                 check_dataset(dataset)

@@ -26,6 +26,8 @@ from scenicq.store.schema import ArrowTable
 __all__ = ["EGO_COLUMNS", "LABEL_COLUMNS", "MOTION_COLUMNS", "OBJECT_COLUMNS", "RowFile", "assemble", "read_labels"]
 
 _BATCH = 2048
+_FEW = 64
+"""Texts that are decoded one by one."""
 OBJECT_COLUMNS = ["id", "class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy"]
 OBJECT_COLUMNS.extend(("track", "attributes"))
 MOTION_COLUMNS = ["motion_vx", "motion_vy", "acceleration", "yaw_rate", "motion_derived"]
@@ -209,21 +211,28 @@ def _values(table: ArrowTable, name: str) -> list[Any]:
     """A column as Python values: null becomes None, JSON what it says; equal JSON texts share one value."""
     column: Any = table[name]
     is_json = name.endswith(("attributes", "params"))
+    if column.null_count == len(column):
+        return [{} if is_json else None] * len(column)
     if is_json and not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
     if pa.types.is_dictionary(column.type):
         values: list[Any] = []
         for chunk in column.chunks:
             absent = len(chunk.dictionary)
-            indices = chunk.indices.fill_null(absent).to_numpy(zero_copy_only=False)
+            # nulls are nan here
+            indices = np.nan_to_num(chunk.indices.to_numpy(zero_copy_only=False), nan=absent).astype(np.int64)
             # A slice shares the dictionary of its whole row group: decode only what it uses.
             used, places = np.unique(indices, return_inverse=True)
-            texts: list[Any] = chunk.dictionary.take(used[used < absent]).to_pylist()
+            wanted = used[used < absent].tolist()
+            # few are taken one by one: pyarrow loads another module to take them together
+            texts: list[Any] = (
+                [chunk.dictionary[place].as_py() for place in wanted]
+                if len(wanted) <= _FEW
+                else chunk.dictionary.take(wanted).to_pylist()
+            )
             distinct = [*map(json.loads, texts), {}] if is_json else [*texts, None]
             values += [distinct[place] for place in places.tolist()]
         return values
-    if column.null_count == len(column):
-        return [{} if is_json else None] * len(column)
     if column.null_count == 0 and pa.types.is_primitive(column.type):
         return column.to_numpy().tolist()
     return column.to_pylist()

@@ -9,20 +9,29 @@ Readers take rows by number, the prefilter joins them by name; both must find th
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
+import pyarrow.types as kinds
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M, ArrowTable
 from scenicq.store.validation import invalid
 
-__all__ = ["check_counts", "check_frame_index", "check_part"]
+__all__ = ["PART_COLUMNS", "check_counts", "check_frame_index", "check_part"]
+
+PART_COLUMNS = {
+    "labels": {"frame", "recording", "timestamp_us", "map", "ego_x", "ego_y", "ego_heading", "object_count",
+               "first_object", "sensor_count", "first_sensor", "class_counts"},
+    "objects": {"frame", "recording", "timestamp_us", "ordinal", "id", "class", "x", "y", "heading", "ego_right",
+                "ego_ahead", "ego_distance", "relative_heading"},
+    "memberships": {"frame", "object", "distance"},
+    "sensors": {"frame", "recording", "timestamp_us", "channel"},
+}  # fmt: skip
+"""The columns of each table by which the tables of a part are compared."""
 
 _CLOSE = 1e-6
 """How far computed columns may be from what is computed again: metres, radians."""
@@ -32,7 +41,7 @@ def check_part(tables: Mapping[str, ArrowTable], names: Mapping[str, str], maps:
     """Check the tables of one part against each other.
 
     Args:
-        tables: `labels`, `objects`, `memberships` and `sensors`, each sound by itself.
+        tables: `labels`, `objects`, `memberships` and `sensors`, each sound by itself, with `PART_COLUMNS` at least.
         names: What their files are called.
         maps: Names of the maps that labels may refer to.
 
@@ -99,17 +108,22 @@ def _check_order(labels: ArrowTable, file: str, maps: Collection[str]) -> None:
 
 def _check_copies(rows: ArrowTable, labels: ArrowTable, owner: NDArray[np.int64], file: str) -> None:
     """Columns that repeat what the label says."""
-    for name in ("frame", "recording", "timestamp_us"):
+    for name in ("frame", "recording"):
         if name in rows.column_names:
-            same = pc.equal(rows[name], labels[name].take(pa.array(owner)))
-            _refuse(~_flags(same), "is not that of the label that the row belongs to", file, name)
+            numbers, texts = _coded(rows[name])
+            own = _places(texts, labels[name].to_pylist())[owner]
+            _refuse(numbers != own, "is not that of the label that the row belongs to", file, name)
+    if "timestamp_us" in rows.column_names:
+        wrong = rows["timestamp_us"].to_numpy() != labels["timestamp_us"].to_numpy()[owner]
+        _refuse(wrong, "is not that of the label that the row belongs to", file, "timestamp_us")
 
 
 def _check_objects(objects: ArrowTable, labels: ArrowTable, owner: NDArray[np.int64], file: str) -> None:
     counts = labels["object_count"].to_numpy().astype(np.int64)
     place = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
     _refuse(objects["ordinal"].to_numpy() != place, "is not the row's number within its label", file, "ordinal")
-    _refuse(_flags(pc.equal(objects["id"], "ego")), "is the name of the ego", file, "id")
+    numbers, names = _coded(objects["id"])
+    _refuse(numbers == _places(names, ["ego"])[0], "is the name of the ego", file, "id")
     _check_unique(objects, "id", owner, file)
     x, y, heading = (_reals(objects[name]) for name in ("x", "y", "heading"))
     ego_x, ego_y, ego_heading = (_reals(labels[f"ego_{name}"])[owner] for name in ("x", "y", "heading"))
@@ -134,7 +148,7 @@ def _differ(found: NDArray[np.float64], expected: NDArray[np.float64]) -> NDArra
 
 def _check_unique(rows: ArrowTable, column: str, owner: NDArray[np.int64], file: str) -> None:
     """Names that occur once in a label."""
-    pairs = owner * max(1, len(rows)) + _codes(rows[column])
+    pairs = owner * max(1, len(rows)) + _coded(rows[column])[0]
     _, first = np.unique(pairs, return_index=True)
     again = np.ones(len(pairs), dtype=bool)
     again[first] = False
@@ -142,17 +156,16 @@ def _check_unique(rows: ArrowTable, column: str, owner: NDArray[np.int64], file:
 
 
 def _check_class_counts(labels: ArrowTable, objects: ArrowTable, owner: NDArray[np.int64], file: str) -> None:
-    names = pc.unique(objects["class"])
-    code = pc.index_in(objects["class"].combine_chunks(), names).to_numpy(zero_copy_only=False).astype(np.int64)
+    code, names = _coded(objects["class"])
     each = max(1, len(names))
     expected = np.unique(owner * each + code, return_counts=True)
     told = labels["class_counts"].combine_chunks()
     sizes = np.diff(told.offsets.to_numpy())
     items = told.slice(0)
-    claimed = pc.index_in(items.keys, names).to_numpy(zero_copy_only=False)
-    if np.isnan(claimed.astype(float)).any():
+    claimed = _places(names, items.keys.to_pylist())
+    if (claimed < 0).any():
         invalid(file, "counts a class of which there is no object", column="class_counts")
-    keys = np.repeat(np.arange(len(labels)), sizes) * each + claimed.astype(np.int64)
+    keys = np.repeat(np.arange(len(labels)), sizes) * each + claimed
     order = np.argsort(keys, kind="stable")
     counts = items.items.to_numpy()
     same = np.array_equal(keys[order], expected[0]) and np.array_equal(counts[order], expected[1])
@@ -164,36 +177,40 @@ def _check_memberships(tables: Mapping[str, ArrowTable], names: Mapping[str, str
     rows, file = tables["memberships"], names["memberships"]
     far = rows["distance"].to_numpy() > MEMBERSHIP_RADIUS_M + _CLOSE
     _refuse(far, f"is more than {MEMBERSHIP_RADIUS_M} m", file, "distance")
-    frames = tables["labels"]["frame"]
-    label = pc.index_in(rows["frame"].combine_chunks(), frames.combine_chunks()).to_numpy(zero_copy_only=False)
-    _refuse(np.isnan(label.astype(float)), "is no frame of this part", file, "frame")
-    names_of = pc.unique(pa.chunked_array([*tables["objects"]["id"].chunks, pa.array(["ego"])], pa.string()))
-    code = pc.index_in(rows["object"].combine_chunks(), names_of).to_numpy(zero_copy_only=False)
-    _refuse(np.isnan(code.astype(float)), "is no object of this part", file, "object")
+    frames = tables["labels"]["frame"].to_pylist()
+    numbers, texts = _coded(rows["frame"])
+    label = _places(frames, texts)[numbers]
+    _refuse(label < 0, "is no frame of this part", file, "frame")
+    own, known = _coded(tables["objects"]["id"])
+    names_of = [*known, "ego"]
+    numbers, texts = _coded(rows["object"])
+    code = _places(names_of, texts)[numbers]
+    _refuse(code < 0, "is no object of this part", file, "object")
     many = len(names_of)
-    own = pc.index_in(tables["objects"]["id"].combine_chunks(), names_of).to_numpy(zero_copy_only=False)
-    there = np.concatenate((owner * many + own, np.arange(len(frames)) * many + _place(names_of, "ego")))
-    _refuse(
-        ~np.isin(label.astype(np.int64) * many + code.astype(np.int64), there), "is not in the frame", file, "object"
-    )
+    there = np.concatenate((owner * many + own, np.arange(len(frames)) * many + many - 1))
+    pairs = label * many + code
+    first = np.append(True, pairs[1:] != pairs[:-1])[: len(pairs)]  # rows of one object follow each other
+    wrong = np.zeros(len(pairs), dtype=bool)
+    wrong[first] = ~np.isin(pairs[first], there)
+    _refuse(wrong, "is not in the frame", file, "object")
 
 
-def _place(names: Any, text: str) -> int:
-    return int(pc.index(names, text).as_py())
+def _coded(column: Any) -> tuple[NDArray[np.int64], list[str]]:
+    """Texts as numbers, equal for equal ones, and the text of each number."""
+    values = column.combine_chunks()
+    coded = values if kinds.is_dictionary(values.type) else values.dictionary_encode()
+    return coded.indices.to_numpy(zero_copy_only=False).astype(np.int64), coded.dictionary.to_pylist()
 
 
-def _codes(column: Any) -> NDArray[np.int64]:
-    """A number for each text, equal for equal ones."""
-    return column.combine_chunks().dictionary_encode().indices.to_numpy(zero_copy_only=False).astype(np.int64)
+def _places(texts: Sequence[str], asked: Iterable[str]) -> NDArray[np.int64]:
+    """Where each of some texts is among others, -1 where it is not there."""
+    place = {text: number for number, text in enumerate(texts)}
+    return np.fromiter((place.get(text, -1) for text in asked), np.int64)
 
 
 def _reals(column: Any) -> NDArray[np.float64]:
     """Null becomes nan."""
     return column.to_numpy().astype(np.float64)
-
-
-def _flags(column: Any) -> NDArray[np.bool_]:
-    return pc.fill_null(column, False).to_numpy(zero_copy_only=False).astype(bool)
 
 
 def _refuse(wrong: NDArray[np.bool_], what: str, file: str, column: str) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 from scenicq.errors import ScenicqError
 from scenicq.store.frame_index import frame_hashes, index_rows
 from scenicq.store.map_validation import check_lanes, check_regions
-from scenicq.store.row_owners import check_frame_index, check_part
+from scenicq.store.row_owners import PART_COLUMNS, check_frame_index, check_part
 from scenicq.store.schema import SEGMENT_TABLES
-from scenicq.store.validation import invalid, read_sound
+from scenicq.store.validation import check_table, invalid, read_sound
 
 if TYPE_CHECKING:  # which calls this when it is opened
     from scenicq.store.dataset import Dataset
@@ -46,7 +46,10 @@ def check_dataset(dataset: Dataset) -> None:
     recordings: set[str] = set()
     for number in range(len(manifest.tables["labels"])):
         parts = {table: manifest.tables[table][number] for table in SEGMENT_TABLES}
-        rows = {table: read_sound(table, dataset.place.file(part), part.path) for table, part in parts.items()}
+        rows = {
+            table: check_table(table, dataset.place.file(part), part.path, PART_COLUMNS[table])
+            for table, part in parts.items()
+        }
         names = {table: part.path for table, part in parts.items()}
         check_part(rows, names, dataset.maps)
         own = set(rows["labels"]["recording"].to_pylist())

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Generator, Sequence
+from contextlib import contextmanager
 from typing import Any, NoReturn, cast
 
 import numpy as np
@@ -27,7 +28,7 @@ from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
 from scenicq.store.wkb import FARTHEST_M
 
-__all__ = ["invalid", "json_object", "read_sound"]
+__all__ = ["check_table", "invalid", "json_object", "read_sound"]
 
 _MOST_BYTES = 1 << 32
 """Of one file, decoded. A segment has a quarter of that at most, unless a recording is very long."""
@@ -74,19 +75,58 @@ def read_sound(table: str, file: StoreFile, name: str, columns: Sequence[str] | 
         DataError: dataset-invalid.
     """
     fields = [field for field in SCHEMAS[table] if columns is None or field.name in columns]
-    try:
+    with _decoding(name):
         with open_parquet(file) as parquet:
             found = parquet.schema_arrow.names
             _check_columns(parquet, fields, found if columns is None else [n for n in found if n in columns], name)
             rows = parquet.read(columns)
         rows.validate(full=True)
+    for field in fields:
+        _check_column(field, rows[field.name].combine_chunks(), name)
+    return rows
+
+
+def check_table(table: str, file: StoreFile, name: str, kept: Collection[str]) -> ArrowTable:
+    """Check every column of a file by itself, one at a time, so that memory is that of what is kept.
+
+    Args:
+        table: A key of `SCHEMAS`.
+        file: The file.
+        name: What it is called in the dataset.
+        kept: Columns to give back.
+
+    Returns:
+        Those columns; texts as dictionaries, in which each is there once.
+
+    Raises:
+        DataError: dataset-invalid.
+    """
+    fields = list(SCHEMAS[table])
+    columns: dict[str, ArrowArray] = {}
+    with _decoding(name), open_parquet(file) as parquet:
+        _check_columns(parquet, fields, parquet.schema_arrow.names, name)
+        said = parquet.metadata
+    texts = [field.name for field in fields if field.type == pa.string()]
+    with _decoding(name), open_parquet(file, metadata=said, read_dictionary=texts) as parquet:
+        for field in fields:
+            column = parquet.read([field.name]).column(0)
+            column.validate(full=True)
+            values = column.unify_dictionaries().combine_chunks()
+            _check_column(field, values, name)
+            if field.name in kept:
+                columns[field.name] = values
+    return pa.table(columns)
+
+
+@contextmanager
+def _decoding(name: str) -> Generator[None]:
+    """Refuses a file of which a library says that it cannot be decoded."""
+    try:
+        yield
     except (pa.ArrowException, OSError, ValueError, OverflowError, KeyError) as error:
         if isinstance(error, OSError) and error.errno is not None:
             raise
         invalid(name, f"cannot be decoded: {' '.join(str(error).split())[:200]}")
-    for field in fields:
-        _check_column(field, rows[field.name].combine_chunks(), name)
-    return rows
 
 
 def _check_columns(parquet: Any, fields: Sequence[Any], names: Sequence[str], name: str) -> None:
@@ -144,25 +184,30 @@ def _check_reals(name: str, values: ArrowArray, file: str) -> None:
 
 
 def _check_texts(name: str, values: ArrowArray, file: str) -> None:
+    coded = values if kinds.is_dictionary(values.type) else values.dictionary_encode()
+    texts, numbers = coded.dictionary, coded.indices
     is_json = name.endswith(("attributes", "params", "properties"))
     most = _LONGEST_JSON if is_json else _LONGEST_NAME
     if name != "properties":  # of which a map may have long ones
-        _refuse(pc.greater(pc.utf8_length(values), most), f"is longer than {most} characters", file, name)
+        _refuse_texts(pc.greater(pc.utf8_length(texts), most), f"is longer than {most} characters", numbers, file, name)
     if name in _TEXT_KEYS:
-        _refuse(pc.equal(values, ""), "is empty", file, name)
+        _refuse_texts(pc.equal(texts, ""), "is empty", numbers, file, name)
     if name in ("class", "ego_class"):
-        _check_classes(name, values, file)
+        bad = [not (is_class(text) or (text == "" and name == "ego_class")) for text in texts.to_pylist()]
+        _refuse_texts(bad, "is no class of the class tree", numbers, file, name)
     if is_json and name != "properties":
-        for text in pc.unique(values).to_pylist():
-            problem = None if text is None else _attributes_problem(text)
-            if problem is not None:
-                invalid(file, problem, _first(pc.equal(values, text)), name)
+        problems = [None if text is None else _attributes_problem(text) for text in texts.to_pylist()]
+        for problem in dict.fromkeys(each for each in problems if each is not None):
+            _refuse_texts([each == problem for each in problems], problem, numbers, file, name)
 
 
-def _check_classes(name: str, values: ArrowArray, file: str) -> None:
-    for text in pc.unique(values).to_pylist():
-        if not (is_class(text) or (text == "" and name == "ego_class")):
-            invalid(file, "is no class of the class tree", _first(pc.equal(values, text)), name)
+def _refuse_texts(bad: Sequence[bool] | ArrowArray, what: str, numbers: ArrowArray, file: str, column: str) -> None:
+    """Refuse the first row whose text, by its number, is bad; texts that no row has do no harm."""
+    wrong = np.flatnonzero(np.asarray(bad, dtype=bool))
+    if len(wrong):
+        rows = np.isin(pc.fill_null(numbers, -1).to_numpy(zero_copy_only=False), wrong)
+        if rows.any():
+            invalid(file, what, int(np.argmax(rows)), column)
 
 
 def _attributes_problem(text: str) -> str | None:

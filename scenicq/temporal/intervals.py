@@ -29,33 +29,16 @@ from scenicq.store.labels import Label
 from scenicq.store.tracks import RecordingTracks, TrackKey
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable, reads_start
 from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
+from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.runs import Run, runs_from
 from scenicq.temporal.samples import Samples
-from scenicq.temporal.selection import Intervals, chosen
+from scenicq.temporal.selection import chosen
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["DEFAULT_GAP_S", "Interval", "IntervalMatcher", "IntervalOptions", "Start"]
-
-DEFAULT_GAP_S = 1.5
-"""Seconds without a label after which a track's life ends."""
+__all__ = ["Interval", "IntervalMatcher", "Start"]
 
 _MOST_JOINT = 32
 """Starts of one binding that are matched again with values of random variables that the initial scene has, too."""
-
-
-@dataclass(frozen=True, slots=True)
-class IntervalOptions:
-    """How intervals are looked for.
-
-    Attributes:
-        intervals: Of overlapping ones the longest, or all.
-        min_duration_s: How long an interval must be at least; None for a static program that is matched frame by frame.
-        gap_s: Seconds without a label after which a track's life ends.
-    """
-
-    intervals: Intervals = "longest"
-    min_duration_s: float | None = None
-    gap_s: float = DEFAULT_GAP_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from numpy import float64
 from numpy.typing import NDArray
 
-__all__ = ["Intervals", "chosen"]
+from scenicq.temporal.interval_options import Intervals
 
-Intervals = Literal["longest", "all"]
-"""Of overlapping intervals the longest, the earliest of equals; or all."""
+__all__ = ["chosen"]
 
 
 class Stretch(Protocol):

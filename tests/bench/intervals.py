@@ -23,7 +23,7 @@ from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.columns import MemberColumns, RecordingColumns
 from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset
-from scenicq.temporal.intervals import IntervalOptions
+from scenicq.temporal.interval_options import IntervalOptions
 
 SAMPLES, HZ = 200, 10
 HEAD = """from math import cos, sin

@@ -1,7 +1,7 @@
 """The world of traffic in Scenic's Newtonian simulator, with the classes and behaviors that programs for CARLA name."""
 
 from scenic.simulators.newtonian.driving_model import *
-from scenic.domains.driving.actions import Steers
+from scenic.domains.driving.actions import Steers, Walks
 
 param weather = 'ClearNoon'
 param carla_map = 'map'
@@ -100,8 +100,12 @@ behavior WalkBehavior(maxSpeed=1.4):
 behavior CrossingBehavior(reference_actor, min_speed=1, threshold=10, final_speed=None):
     while (distance from self to reference_actor) > threshold:
         wait
-    while True:
-        take SetVelocityAction(min_speed * Vector(0, 1).rotatedBy(self.heading))
+    if isinstance(self, Walks):
+        take SetWalkingDirectionAction(self.heading), SetWalkingSpeedAction(min_speed)
+    else:
+        while True:
+            ahead = Vector(0, min_speed).rotatedBy(self.heading)
+            take SetVelocityAction(ahead.x, ahead.y)
 
 
 def freezeTrafficLights():

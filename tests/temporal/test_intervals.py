@@ -11,7 +11,7 @@ from scenicq.errors import Source
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset
-from scenicq.temporal.intervals import IntervalOptions
+from scenicq.temporal.interval_options import IntervalOptions
 
 D_VALUES = [-3 + number / 4 for number in range(25)]
 """Every value of D that makes a difference: positions are whole numbers."""

@@ -22,7 +22,9 @@ FOUND = {
         ("02-pedestrian-crosses", 0, 22, {"walker": "walker-2"}),
     ],
     "04_follows": [("05-two-lane-traffic", 0, 25, {"leader": "car-leader"})],
+    "05_parked": [("04-against-traffic", 0, 25, {"parked": "car-parked"})],
 }
+MORE_OPTIONS = {"04_follows": ["--min-duration", "5"], "05_parked": ["--min-duration", "12"]}
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +38,7 @@ def town(tmp_path_factory):
 def run(town, name, *options, output=None):
     """What the command prints, as text."""
     words = ["match", str(PROGRAMS / f"{name}.scenic"), str(town), "--tolerance", "position=0.25,heading=5deg"]
-    words += ["--min-duration", "5"] if name == "04_follows" else []
-    done = CliRunner().invoke(cli, [*words, *options])
+    done = CliRunner().invoke(cli, [*words, *MORE_OPTIONS.get(name, []), *options])
     assert done.exit_code == 0, done.output
     return done.stdout
 
@@ -63,7 +64,7 @@ def test_each_program_finds_its_recording(town, name):
             "recording", "start_us", "end_us", "frames", "verdict", "correspondence", "witness", "open_ended"
         ]  # fmt: skip
         assert each["verdict"] == "match"
-        assert each["open_ended"] == (name == "04_follows")
+        assert each["open_ended"] == (name in MORE_OPTIONS)
         assert each["end_us"] - each["start_us"] == (each["frames"]["count"] - 1) * 500_000
 
 

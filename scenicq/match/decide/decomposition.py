@@ -12,7 +12,6 @@ from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Range, T
 from scenicq.forest.walk import leaves, postorder
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.hidden_distances import with_areas
-from scenicq.match.fields.field_solver import decide_directions
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
@@ -48,6 +47,8 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
         sure = isinstance(found, Satisfied) and replay(items, found.values, tolerance, SLACK)
         return found if sure else Undecided(items[0][0], "nonlinear")
     if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in left])):
+        from scenicq.match.fields.field_solver import decide_directions  # noqa: PLC0415 - takes long to load
+
         shared = _shared(left, used)
         parts, number = ([left], None) if shared is None else (shared[2], shared[0].identity)
         return decide_directions(parts, number, tolerance)

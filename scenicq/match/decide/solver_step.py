@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from scenicq.budget import waiting
 from scenicq.forest.groups import Comparison, Constraint
-from scenicq.match.fields.field_solver import repaired
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
-from scenicq.smt.answer import Sat, Solver, Unknown, Unsat
-from scenicq.smt.case_split import check_by_cases
-from scenicq.smt.encode import Encoding, Target, UnsupportedError, encode
+
+if TYPE_CHECKING:  # takes long to load, and most queries ask no solver
+    from scenicq.smt.answer import Solver
+    from scenicq.smt.encode import Encoding, Target
 
 __all__ = ["ask", "encoded", "target_of"]
 
@@ -32,6 +33,8 @@ def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: 
     Raises:
         UnsupportedError: A construct has no formula.
     """
+    from scenicq.smt.encode import encode  # noqa: PLC0415 - takes long to load
+
     targets = [[(target_of(c, options), node, value) for c, node, value in group] for group in items]
     return encode(targets, borders=borders)
 
@@ -44,6 +47,11 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
         options: The options.
         solver: The solver, if there is one.
     """
+    from scenicq.match.fields.field_solver import repaired  # noqa: PLC0415 - these take long to load
+    from scenicq.smt.answer import Sat, Unknown, Unsat  # noqa: PLC0415
+    from scenicq.smt.case_split import check_by_cases  # noqa: PLC0415
+    from scenicq.smt.encode import UnsupportedError  # noqa: PLC0415
+
     flat = [item for group in items for item in group]
     blame = flat[0][0]
     try:
@@ -77,6 +85,8 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
 
 def target_of(constraint: Constraint, options: MatchOptions) -> Target:
     """How a constraint's expression is compared with the label."""
+    from scenicq.smt.encode import Target  # noqa: PLC0415 - takes long to load
+
     if not isinstance(constraint, Comparison):
         return Target(None, 0.0, 0.0)
     margin = options.tolerance.of(constraint.object, constraint.property)

@@ -12,7 +12,6 @@ import numpy as np
 from scenicq.match.verdict import Cause, Unknown
 from scenicq.processes import Lost, Work, Workers, as_many_as_pay
 from scenicq.query.execution.block_matcher import Decided, Decider, every_label
-from scenicq.query.execution.recording_matcher import lost_recording
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.executor import Block
 from scenicq.store.dataset import Dataset
@@ -87,6 +86,8 @@ class BlockExecutor:
                 yield from self._elsewhere([half], tries=1 if half.divisible else _TRIES)
             return
         if block.runs:
+            from scenicq.query.execution.recording_matcher import lost_recording  # noqa: PLC0415 - takes long to load
+
             yield Decided(np.full(block.end - block.first, -1, np.int16), [], [], lost_recording(self._dataset, block))
             return
         for label in every_label(self._dataset, block):

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import duckdb
 import numpy as np
@@ -20,13 +21,15 @@ from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.verdict import Verdict
 from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.executor import Block, Candidate, candidates, names, run_prefilter
 from scenicq.query.prefilter.plan import Plan, make_plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
-from scenicq.temporal.intervals import IntervalMatcher, IntervalOptions
+from scenicq.temporal.interval_options import IntervalOptions
+
+if TYPE_CHECKING:  # takes long to load, and for queries over time
+    from scenicq.query.execution.recording_matcher import DecidedRecordings
 
 _FIRST_BATCH, _BATCH = 16, 512
 """Labels whose places are looked up together: few until it is known what matters."""
@@ -124,7 +127,7 @@ class Decider:
         """
         check_deadline(self.until)
         if self._connection is None:
-            self._connection = self.dataset.connect(threads=self.threads)
+            self._connection = self.dataset.connect(threads=self.threads, views=False)
             self._open.callback(self._connection.close)
             self._solver = self._open.enter_context(LazySolver(self.solver))
         if block.map not in self._worlds:
@@ -143,6 +146,9 @@ class Decider:
 
     def _recordings(self, world: CompiledMap, matcher: Matcher, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
+        from scenicq.query.execution.recording_matcher import RecordingMatcher  # noqa: PLC0415 - takes long to load
+        from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
+
         assert self._connection is not None
         intervals = IntervalMatcher(world.scenario, self.options, self.time, self._solver)
         recordings = RecordingMatcher(self.dataset, matcher, intervals)

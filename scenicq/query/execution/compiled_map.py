@@ -13,14 +13,11 @@ from scenicq.compiler.named_map import NamedMap, named_map
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
-from scenicq.importers.base import read_maps
-from scenicq.importers.opendrive import SUFFIX, convert_maps
-from scenicq.importers.report import Report
 from scenicq.store.dataset import Dataset
 
 __all__ = ["about_dataset", "map_remark", "program_network", "program_remarks", "read_network"]
 
-_SUFFIXES = (SUFFIX, ".geojson", ".json")
+_SUFFIXES = (".xodr", ".geojson", ".json")
 _HINT = "`--map FILE` gives a map to use instead"
 
 
@@ -34,6 +31,10 @@ def read_network(file: Path, cache: Path) -> Network:
     Raises:
         DataError: The map cannot be read; see `scenicq.importers.opendrive.convert_xodr`.
     """
+    from scenicq.importers.base import read_maps  # noqa: PLC0415 - these take long to load
+    from scenicq.importers.opendrive import convert_maps  # noqa: PLC0415
+    from scenicq.importers.report import Report  # noqa: PLC0415
+
     report = Report()
     files = convert_maps({file.stem: file}, cache, report)
     return Network(file.stem, read_maps(files, report)[file.stem])

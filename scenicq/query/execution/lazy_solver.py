@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from scenicq.smt.answer import Answer, SolverSession
-from scenicq.smt.answer_cache import RememberingSolver
-from scenicq.smt.formula import Problem
-from scenicq.smt.solver import open_solver
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # takes long to load
+    from scenicq.smt.answer import Answer, SolverSession
+    from scenicq.smt.answer_cache import RememberingSolver
+    from scenicq.smt.formula import Problem
 
 __all__ = ["LazySolver"]
 
@@ -32,6 +34,9 @@ class LazySolver:
             SolverError: The solver cannot be loaded or started.
         """
         if self._memory is None:
+            from scenicq.smt.answer_cache import RememberingSolver  # noqa: PLC0415 - takes long to load
+            from scenicq.smt.solver import open_solver  # noqa: PLC0415
+
             self._session = open_solver(self.name)
             self._memory = RememberingSolver(self._session)
         self.calls += 1

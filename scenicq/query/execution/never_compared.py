@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
@@ -121,14 +121,14 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
     found = sorted(places.values(), key=lambda each: each.span.start if each.span is not None else 0)
     if not found or not dataset.manifest.total.frames:
         return Coverage()
-    with closing(dataset.connect()) as connection, dataset.blamed():
-        counts = _counts(connection, [each for each in found if each.comparable], options)
+    with closing(dataset.connect(views=False)) as connection, dataset.blamed():
+        counts = _counts(dataset, connection, [each for each in found if each.comparable], options)
         warnings: list[Diagnostic] = []
         missing: dict[str, int] = {}
         for each in found:
             rows, present, lacking = counts.get(each, (1, 0, 0))
             if not present and rows:
-                warnings.append(_warning(connection, each, options))
+                warnings.append(_warning(dataset, connection, each, options))
             elif present and lacking:
                 missing[each.what] = max(lacking, missing.get(each.what, 0))
     return Coverage(tuple(warnings), missing)
@@ -141,43 +141,80 @@ def _classes(category: str, options: MatchOptions) -> str:
 
 def _present(each: _Setting) -> str:
     """SQL that is true of a row that has the property."""
-    prefix = "ego_" if each.ego else ""
-    if each.category and each.name in _COLUMNS:
-        return f"{prefix}{_COLUMNS[each.name]} IS NOT NULL"
-    column = f"{prefix}attributes" if each.category else "params"
+    if known := _column(each):
+        return f"{known} IS NOT NULL"
+    column = ("ego_" if each.ego else "") + "attributes" if each.category else "params"
     key = json.dumps(each.name, ensure_ascii=False) + ":"
     return f"coalesce(contains({column}, {sql_text(key)}), false)"
 
 
 def _counts(
-    connection: duckdb.DuckDBPyConnection, asked: list[_Setting], options: MatchOptions
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, asked: list[_Setting], options: MatchOptions
 ) -> dict[_Setting, tuple[int, int, int]]:
     """For each property the rows that could have it, those that do, and the frames in which one does not."""
     found: dict[_Setting, tuple[int, int, int]] = {}
     for table in ("labels", "objects"):
         mine = [each for each in asked if each.ego == (table == "labels")]
-        if not mine:
-            continue
-        columns: list[str] = []
-        for each in mine:
-            column = "ego_class" if each.ego else "class"
-            own = f"{column} IN {_classes(each.category, options)}" if each.category else "true"
-            has = _present(each)
-            columns += [
-                f"count(*) FILTER ({own})",
-                f"count(*) FILTER ({own} AND {has})",
-                f"count(DISTINCT frame) FILTER ({own} AND NOT ({has}))",
-            ]
-        row = connection.execute(f"SELECT {', '.join(columns)} FROM {table}").fetchone()
-        assert row is not None
-        for place, each in enumerate(mine):
-            found[each] = (row[3 * place], row[3 * place + 1], row[3 * place + 2])
+        full = _full_columns(dataset, connection, table, {_column(each) for each in mine} - {None})
+        found |= {each: (1, 1, 0) for each in mine if _column(each) in full}
+        mine = [each for each in mine if each not in found]
+        rows = [f"count(*) FILTER ({_own(each, options)})" for each in mine]
+        present = [f"count(*) FILTER ({_own(each, options)} AND {_present(each)})" for each in mine]
+        numbers = _row(dataset, connection, [*rows, *present], table)
+        counts = list(zip(mine, numbers, numbers[len(mine) :], strict=False))
+        partial = [each for each, count, there in counts if 0 < there < count]
+        frames = [
+            f"count(DISTINCT frame) FILTER ({_own(each, options)} AND NOT ({_present(each)}))" for each in partial
+        ]
+        lacking = dict(zip(partial, _row(dataset, connection, frames, table), strict=True))
+        found |= {each: (count, there, lacking.get(each, 0)) for each, count, there in counts}
     return found
 
 
-def _known(connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> list[str]:
+def _column(each: _Setting) -> str | None:
+    """The column that a property is in; None for one among the attributes."""
+    return ("ego_" if each.ego else "") + _COLUMNS[each.name] if each.category and each.name in _COLUMNS else None
+
+
+def _own(each: _Setting, options: MatchOptions) -> str:
+    """SQL that is true of a row that could have a property."""
+    return f"{'ego_class' if each.ego else 'class'} IN {_classes(each.category, options)}" if each.category else "true"
+
+
+def _paths(dataset: Dataset, table: str) -> str:
+    return "[" + ", ".join(sql_text(str(path)) for path in dataset.files(table)) + "]"
+
+
+def _read(dataset: Dataset, table: str) -> str:
+    """What SQL reads a table from."""
+    return f"read_parquet({_paths(dataset, table)})"
+
+
+def _row(dataset: Dataset, connection: duckdb.DuckDBPyConnection, columns: list[str], table: str) -> tuple[int, ...]:
+    if not columns:
+        return ()
+    row = connection.execute(f"SELECT {', '.join(columns)} FROM {_read(dataset, table)}").fetchone()
+    assert row is not None
+    return row
+
+
+def _full_columns(
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, table: str, names: Collection[str | None]
+) -> set[str]:
+    """Those of some columns in which every row has a value, by the statistics of the files: no row need be read."""
+    if not names:
+        return set()
+    listed = ", ".join(sql_text(name) for name in names if name is not None)
+    rows = connection.execute(
+        f"SELECT path_in_schema FROM parquet_metadata({_paths(dataset, table)}) WHERE path_in_schema IN ({listed}) "
+        "GROUP BY 1 HAVING count(*) = count(stats_null_count) AND sum(stats_null_count) = 0"
+    ).fetchall()
+    return {name for (name,) in rows}
+
+
+def _known(dataset: Dataset, connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> list[str]:
     """The properties that labels have of such an object beside class and position, or the parameters that they have."""
-    table, prefix = ("labels", "ego_") if each.ego else ("objects", "")
+    table, prefix = (_read(dataset, "labels"), "ego_") if each.ego else (_read(dataset, "objects"), "")
     own = f"{prefix}class IN {_classes(each.category, options)}" if each.category else "true"
     names: list[str] = []
     if each.category:
@@ -193,8 +230,10 @@ def _known(connection: duckdb.DuckDBPyConnection, each: _Setting, options: Match
     return names + sorted(further - set(names))
 
 
-def _warning(connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> Diagnostic:
-    known = _known(connection, each, options)
+def _warning(
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions
+) -> Diagnostic:
+    known = _known(dataset, connection, each, options)
     kind = "the ego" if each.ego else f"`{each.category}`"
     if not each.category:
         message = f"`{each.what}` is never compared: no label of the dataset has such a parameter"

@@ -11,8 +11,7 @@ from scenicq.match.options import MatchOptions, Method
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import QueryOptions
 from scenicq.store.classes import Granularity
-from scenicq.temporal.intervals import DEFAULT_GAP_S, IntervalOptions
-from scenicq.temporal.selection import Intervals
+from scenicq.temporal.interval_options import DEFAULT_GAP_S, IntervalOptions, Intervals
 
 __all__ = ["DRIVING", "VERSIONS", "OptionTexts", "read_built_ins", "read_options"]
 

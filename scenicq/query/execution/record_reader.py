@@ -18,7 +18,7 @@ from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.dataset import open_dataset
-from scenicq.temporal.intervals import IntervalOptions
+from scenicq.temporal.interval_options import IntervalOptions
 
 __all__ = ["note_question", "noted_question", "read_record"]
 

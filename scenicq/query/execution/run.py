@@ -30,7 +30,7 @@ from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, nam
 from scenicq.query.prefilter.plan import Plan
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
-from scenicq.temporal.intervals import IntervalOptions
+from scenicq.temporal.interval_options import IntervalOptions
 
 __all__ = ["Query", "QueryOptions", "Stretch", "read_program"]
 
@@ -291,7 +291,7 @@ class Query:
             least: Blocks that there should be, unless they would become very small.
         """
         if self._known.extents is None:
-            with closing(self.dataset.connect()) as connection:
+            with closing(self.dataset.connect(views=False)) as connection:
                 self._known.extents = extents(self.dataset, connection)
         return blocks(self._known.extents, map_name, self._between(map_name), least=least, whole=self.options.prefilter)
 

@@ -2,38 +2,49 @@
 
 A change drops one requirement or the comparison of one feature, widens one part of the tolerance, or takes a wider
 class. The prefilter of the changed program counts what it leaves, over a sample where the dataset is large; the matcher
-then decides these, as long as there is time, so that the number is one of matches and not only a bound.
+then decides these, as long as there is time, so that the number is one of matches and not only a bound. The sample is
+read into memory once, for all changes.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from itertools import islice
 
+import duckdb
 import numpy as np
 
 from scenicq.errors import Span
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.scenario import Scenario
+from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match
-from scenicq.query.execution.block_matcher import CompiledMap, Decider
+from scenicq.query.execution.block_matcher import CompiledMap
+from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.nearest_miss import show_tolerance
 from scenicq.query.explain.prefilter_counts import spots
+from scenicq.query.prefilter.executor import candidates, hold, run_plan
 from scenicq.store.classes import ancestors, is_class
 
 __all__ = ["Advice", "Change", "Outlook", "advice"]
 
 _MOST_FRAMES = 5_000
 """Frames of a dataset beyond which a sample is looked at."""
-_MOST_CHANGES = 24
-_MOST_DECIDED = 300
+_MOST_CHANGES, _FEW_CHANGES = 24, 5
+"""Changes that are tried; the second where advice must be brief."""
+_MOST_DECIDED, _FEW_DECIDED = 300, 16
 """Frames that the matcher decides for one change."""
+_MOST_RUNS, _FEW_RUNS = 8, 3
+"""Runs of frames of each map that a large dataset is sampled by."""
+_MOST_MAPS = 4
+"""Maps whose frames are looked at."""
 _ANYWHERE = {"position": 1e5, "heading": math.pi}
 """Sizes of a tolerance by which a feature is as good as not compared."""
 _WIDER = (("position", 1.0), ("position", 4.0), ("heading", math.radians(20)), ("heading", math.radians(45)))
@@ -119,33 +130,69 @@ class _Clock:
         return time.process_time() > self._work_end or time.monotonic() > self._end
 
 
-def advice(query: Query, *, budget_s: float = math.inf) -> Advice:
+@dataclass(frozen=True, slots=True)
+class _Sample:
+    """The frames that changes are tried on.
+
+    Attributes:
+        worlds: The scenario over their maps, by the name of the map.
+        held: What holds the frames of each.
+        frames: How many there are.
+        total: How many the dataset has.
+    """
+
+    worlds: Mapping[str, CompiledMap]
+    held: Mapping[str, duckdb.DuckDBPyConnection]
+    frames: int
+    total: int
+
+
+def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> Advice:
     """What keeps the frames of a query from matching, and how many there would be with one change.
 
     Args:
         query: After its results were taken: the changes are tried in the order of what excluded most frames.
         budget_s: Seconds of work that the changes may take; the first is tried in any case.
+        brief: Whether only a few changes are tried, and of each only a few frames decided.
     """
     clock = _Clock(budget_s)
     excluded = query.funnel.excluded.most_common()
-    worlds = list(query.fitting())
+    worlds = {world.network.name: world for world in query.fitting() if query.blocks(world.network.name)}
     if not worlds:
         return Advice(tuple(excluded[:3]), (), complete=True)
     rank = {what: place for place, (what, _) in enumerate(excluded)}
-    changes = sorted(
-        _changes(worlds[0].scenario, query.options.match), key=lambda each: rank.get(each.about, len(rank))
-    )
+    scenario = next(iter(worlds.values())).scenario
+    changes = sorted(_changes(scenario, query.options.match), key=lambda each: rank.get(each.about, len(rank)))
+    most, decided = (_FEW_CHANGES, _FEW_DECIDED) if brief else (_MOST_CHANGES, _MOST_DECIDED)
     found: list[Outlook] = []
-    complete = len(changes) <= _MOST_CHANGES
-    for number, change in enumerate(changes[:_MOST_CHANGES]):
-        if number and clock.is_over:
-            complete = False
-            break
-        outlook = _outlook(query, worlds, change, clock)
-        if outlook.most > query.funnel.matches:
-            found.append(outlook)
+    complete = len(changes) <= most
+    with ExitStack() as stack:
+        sample = _sample(query, worlds, stack, _FEW_RUNS if brief else _MOST_RUNS)
+        solver = stack.enter_context(LazySolver(query.options.solver))
+        for number, change in enumerate(changes[:most]):
+            if number and clock.is_over:
+                complete = False
+                break
+            outlook = _outlook(query.options.match, sample, change, clock, solver, decided)
+            if outlook.most > query.funnel.matches:
+                found.append(outlook)
     found.sort(key=lambda each: (-each.least, -each.most))
     return Advice(tuple(excluded[:3]), tuple(found), complete)
+
+
+def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int) -> _Sample:
+    """Read the frames that changes are tried on."""
+    total = query.dataset.manifest.total.frames
+    step = max(1, -(-len(worlds) // _MOST_MAPS))
+    chosen = dict(list(worlds.items())[::step])
+    held: dict[str, duckdb.DuckDBPyConnection] = {}
+    frames = 0
+    for name in chosen:
+        connection = stack.enter_context(closing(query.dataset.connect(threads=1, views=False)))
+        blocks = query.blocks(name)
+        frames += hold(query.dataset, connection, list(spots(blocks, runs)) if total > _MOST_FRAMES else blocks)
+        held[name] = connection
+    return _Sample(chosen, held, frames, total)
 
 
 def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
@@ -206,33 +253,30 @@ def _changed(scenario: Scenario, change: Change) -> Scenario:
     return replace(scenario, requirements=tuple(requirements), objects=tuple(objects))
 
 
-def _outlook(query: Query, worlds: list[CompiledMap], change: Change, clock: _Clock) -> Outlook:
-    """Count the frames that a change leaves, and decide them while there is time."""
-    options = query.options.match
+def _outlook(
+    options: MatchOptions, sample: _Sample, change: Change, clock: _Clock, solver: LazySolver, most: int
+) -> Outlook:
+    """Count the frames that a change leaves, and decide at most so many of them while there is time."""
     if change.tolerance is not None:
         options = replace(options, tolerance=change.tolerance)
     if change.ignored:
         options = replace(options, ignore_params=options.ignore_params | {change.ignored})
-    total = query.dataset.manifest.total.frames
-    sampled = total > _MOST_FRAMES
-    changed = {
-        world.network.name: CompiledMap.of(_changed(world.scenario, change), world.network, options, prefilter=True)
-        for world in worlds
-    }
-    left = looked_at = matched = decided = 0
-    decider = Decider(query.dataset, options, query.options.solver, changed.__getitem__, None, all_matches=False,
-                      every=False)  # fmt: skip
-    with decider:
-        for name in changed:
-            blocks = query.blocks(name)
-            for block in spots(blocks) if sampled else blocks:
-                found = decider.decide(block)
-                looked_at += len(found.missed)
-                left += int(np.count_nonzero(found.missed < 0))
-                for results in islice(found.found, max(0, _MOST_DECIDED - decided)):
-                    decided += 1
-                    matched += isinstance(results[0].verdict, Match)
-                    if clock.is_over:
-                        break
-    scale = total / looked_at if sampled and looked_at else 1.0
+    left = matched = decided = 0
+    for name, connection in sample.held.items():
+        world = sample.worlds[name]
+        world = CompiledMap.of(_changed(world.scenario, change), world.network, options, prefilter=True)
+        missed = run_plan(connection, world.plan)
+        count = int(np.count_nonzero(missed < 0))
+        left += count
+        if not count or decided >= most:
+            continue
+        matcher = Matcher(world.scenario, options, solver)
+        labels = islice(candidates(connection, world.plan, motion=world.motion), most - decided)
+        for verdict in matcher.match_all([(each.label, each.among) for each in labels]):
+            decided += 1
+            matched += isinstance(verdict, Match)
+            if clock.is_over:
+                break
+    sampled = sample.frames < sample.total
+    scale = sample.total / sample.frames if sampled and sample.frames else 1.0
     return Outlook(change, round(scale * matched), round(scale * (matched + left - decided)), sampled)

@@ -52,10 +52,15 @@ def prefilter_counts(query: Query) -> Iterator[PrefilterCounts]:
             yield PrefilterCounts(plan, tuple(round(share * n) for n in _left(sampled)), tuple(_left(counted)))
 
 
-def spots(blocks: list[Block]) -> Iterator[Block]:
-    """Short runs of frames, evenly over the blocks."""
-    count = min(_SPOTS, len(blocks)) if len(blocks) > 1 else 1
-    each = max(1, _SPOTS // count)
+def spots(blocks: list[Block], most: int = _SPOTS) -> Iterator[Block]:
+    """Short runs of frames, evenly over the blocks.
+
+    Args:
+        blocks: The blocks.
+        most: How many runs there may be.
+    """
+    count = min(most, len(blocks)) if len(blocks) > 1 else 1
+    each = max(1, most // count)
     for place in range(count):
         block = blocks[place * len(blocks) // count]
         step = max(1, (block.end - block.first) // each)

@@ -9,7 +9,7 @@ A block is a run of frames in one part of the store, so memory depends on the si
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from typing import Any
@@ -32,7 +32,9 @@ __all__ = [
     "blocks",
     "candidates",
     "extents",
+    "hold",
     "names",
+    "run_plan",
     "run_prefilter",
     "whole_recordings",
 ]
@@ -42,6 +44,8 @@ _FEWEST_FRAMES, _MOST_FRAMES = 2048, 40_000
 """Frames of a block."""
 _BATCH = 1024
 """Labels in memory."""
+_MOST_NAMED = 512
+"""Frames of a block whose memberships are looked up by name: of them, statistics skip what lies elsewhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,16 +195,69 @@ def whole_recordings(dataset: Dataset, connection: duckdb.DuckDBPyConnection, cu
     return found
 
 
+_TABLES = {LABELS: "labels", OBJECTS: "objects", MEMBERSHIPS: "memberships", _SENSORS: "sensors"}
+"""What the views that a plan reads are of."""
+
+
+def _rows_of(
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block, offset: int = 0
+) -> Iterator[tuple[str, str]]:
+    """The views that a plan reads, with the SQL of each; of the objects only the rows of the block are looked at."""
+    files = {view: sql_text(str(dataset.files(table)[block.part])) for view, table in _TABLES.items()}
+    numbered = "SELECT *, {} + file_row_number AS number FROM read_parquet({}, file_row_number = true)"
+    ends = connection.execute(
+        "SELECT min(first_object), max(first_object + object_count), min(first_sensor), "
+        f"max(first_sensor + sensor_count) FROM read_parquet({files[LABELS]}, file_row_number = true) "
+        f"WHERE {block.where}"
+    ).fetchone()
+    assert ends is not None
+    limits = {OBJECTS: ends[:2], _SENSORS: ends[2:]}
+    for view, path in files.items():
+        where = ""
+        if view == LABELS:
+            where = f" WHERE {block.where}"
+        elif view in limits and None not in limits[view]:
+            where = " WHERE file_row_number BETWEEN {} AND {} - 1".format(*limits[view])
+        elif view == MEMBERSHIPS and block.end - block.first <= _MOST_NAMED:
+            selected = f"SELECT frame FROM read_parquet({files[LABELS]}, file_row_number = true) WHERE {block.where}"
+            where = " WHERE frame IN ({})".format(
+                ", ".join(sql_text(name) for (name,) in connection.execute(selected).fetchall()) or "NULL"
+            )
+        yield view, numbered.format(offset, path) + where
+
+
 def _open(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block) -> None:
     """Make the views that a plan reads."""
-    views = {LABELS: "labels", OBJECTS: "objects", MEMBERSHIPS: "memberships", _SENSORS: "sensors"}
-    for view, table in views.items():
-        path = sql_text(str(dataset.files(table)[block.part]))
-        rows = f" WHERE {block.where}" if view == LABELS else ""
-        connection.execute(
-            f"CREATE OR REPLACE TEMP VIEW {view} AS SELECT *, file_row_number AS number "
-            f"FROM read_parquet({path}, file_row_number = true){rows}"
-        )
+    for view, rows in _rows_of(dataset, connection, block):
+        connection.execute(f"CREATE OR REPLACE TEMP VIEW {view} AS {rows}")
+
+
+_PART = 1 << 40
+"""More rows than a part has."""
+
+
+def hold(dataset: Dataset, connection: duckdb.DuckDBPyConnection, chosen: Sequence[Block]) -> int:
+    """Read some blocks of one map into memory, for plans to be run on all of them together (`run_plan`).
+
+    Args:
+        dataset: The dataset.
+        connection: To it; no block has been run on it.
+        chosen: The blocks, in order.
+
+    Returns:
+        How many frames they have.
+    """
+    unions: dict[str, list[str]] = {view: [] for view in _TABLES}
+    for block in chosen:
+        for view, rows in _rows_of(dataset, connection, block, block.part * _PART):
+            unions[view].append(rows)
+    for view, selected in unions.items():
+        mine = "" if view == LABELS else f" WHERE frame IN (SELECT frame FROM {LABELS})"
+        distinct = dict.fromkeys(selected)  # memberships may be of a whole part
+        connection.execute(f"CREATE TEMP TABLE {view} AS SELECT * FROM ({' UNION ALL '.join(distinct)}){mine}")
+    row = connection.execute(f"SELECT count(*) FROM {LABELS}").fetchone()
+    assert row is not None
+    return int(row[0])
 
 
 def run_prefilter(
@@ -218,6 +275,11 @@ def run_prefilter(
         For each frame in order the number of the step that excludes it, -1 for candidates.
     """
     _open(dataset, connection, block)
+    return run_plan(connection, plan)
+
+
+def run_plan(connection: duckdb.DuckDBPyConnection, plan: Plan) -> NDArray[np.int16]:
+    """Run a plan on the frames that a connection holds; see `run_prefilter`."""
     numbers, missed = np.empty(0, np.int64), np.empty(0, np.int16)
     for place, stage in enumerate(plan.stages):
         for statement in stage.statements:

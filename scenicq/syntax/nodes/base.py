@@ -9,7 +9,7 @@ from scenicq.errors import Span
 __all__ = ["Node"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Node:
     """Base of all nodes.
 

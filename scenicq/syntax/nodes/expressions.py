@@ -44,21 +44,21 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Name(Node):
     """A variable: `road`."""
 
     id: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Constant(Node):
     """A literal: `1`, `2.5`, `'text'` (adjacent strings are joined), `b'x'`, `True`, `None`, `...`."""
 
     value: bool | int | float | complex | str | bytes | EllipsisType | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Replacement(Node):
     """`{value!conversion:format}` in a formatted string; conversion is `r`, `s`, `a` or empty."""
 
@@ -67,35 +67,35 @@ class Replacement(Node):
     format: FormattedString | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FormattedString(Node):
     """`f'...'`: text (as string constants) and replacements, in order."""
 
     parts: tuple[Constant | Replacement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tuple(Node):
     """`a, b`, with or without parentheses (the span includes them); in Scenic 1 `(a, b)` may be an interval."""
 
     items: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class List(Node):
     """`[a, b]`."""
 
     items: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Set(Node):
     """`{a, b}`."""
 
     items: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class DictItem(Node):
     """`key: value`, or `**value` where the key is None."""
 
@@ -103,21 +103,21 @@ class DictItem(Node):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Dict(Node):
     """`{key: value, ...}`."""
 
     items: tuple[DictItem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Starred(Node):
     """`*value` in a display, a subscript or an assignment's target (calls use `Argument`)."""
 
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class UnaryOp(Node):
     """`-x`, `+x`, `~x`, `not x`."""
 
@@ -125,7 +125,7 @@ class UnaryOp(Node):
     operand: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BinaryOp(Node):
     """Python's arithmetic and bit operators, but for `@` (see `Vector`)."""
 
@@ -134,7 +134,7 @@ class BinaryOp(Node):
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BoolOp(Node):
     """`a and b and c`, or the same with `or`; at least two values."""
 
@@ -142,7 +142,7 @@ class BoolOp(Node):
     values: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Comparison(Node):
     """One `operator right` of a chain; Scenic 1's `is in` reads as `in`. The span covers the operator and `right`."""
 
@@ -150,7 +150,7 @@ class Comparison(Node):
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Compare(Node):
     """`left op a op b ...`."""
 
@@ -158,7 +158,7 @@ class Compare(Node):
     comparisons: tuple[Comparison, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class IfElse(Node):
     """`then if test else otherwise`."""
 
@@ -167,7 +167,7 @@ class IfElse(Node):
     otherwise: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Parameter(Node):
     """One parameter of a function; the kind says how arguments reach it."""
 
@@ -177,7 +177,7 @@ class Parameter(Node):
     default: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Lambda(Node):
     """`lambda parameters: body`."""
 
@@ -185,7 +185,7 @@ class Lambda(Node):
     body: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Clause(Node):
     """`for target in iterable if condition if condition` of a comprehension."""
 
@@ -194,7 +194,7 @@ class Clause(Node):
     conditions: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Comprehension(Node):
     """`[element for ...]`, `{element for ...}`, `(element for ...)`."""
 
@@ -203,7 +203,7 @@ class Comprehension(Node):
     clauses: tuple[Clause, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class DictComprehension(Node):
     """`{key: value for ...}`."""
 
@@ -212,7 +212,7 @@ class DictComprehension(Node):
     clauses: tuple[Clause, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Argument(Node):
     """`value`, `name=value`, `*value` or `**value` in a call or in the bases of a class."""
 
@@ -221,7 +221,7 @@ class Argument(Node):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Call(Node):
     """`function(arguments)`."""
 
@@ -229,7 +229,7 @@ class Call(Node):
     arguments: tuple[Argument, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Attribute(Node):
     """`value.name`."""
 
@@ -238,7 +238,7 @@ class Attribute(Node):
     name_span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Slice(Node):
     """`lower:upper:step` in a subscript."""
 
@@ -247,7 +247,7 @@ class Slice(Node):
     step: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Subscript(Node):
     """`value[index]`; several indices are a `Tuple`."""
 
@@ -255,7 +255,7 @@ class Subscript(Node):
     index: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Walrus(Node):
     """`(target := value)`."""
 
@@ -263,7 +263,7 @@ class Walrus(Node):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class UnsupportedExpression(Node):
     """Python that no scenario needs: `await x`, `yield x`; construct is the keyword."""
 

@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class New(Node):
     """An instance: `new Car at (1, 2)` (3), `Car at 1 @ 2` (1 and 2: `keyword` is false, at least one specifier)."""
 
@@ -47,14 +47,14 @@ class New(Node):
     keyword: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Deg(Node):
     """`value deg`."""
 
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Vector(Node):
     """`x @ y`."""
 
@@ -62,7 +62,7 @@ class Vector(Node):
     y: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FieldAt(Node):
     """`field at position`."""
 
@@ -70,7 +70,7 @@ class FieldAt(Node):
     position: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RelativeTo(Node):
     """`left relative to right`, of headings, fields or vectors."""
 
@@ -78,7 +78,7 @@ class RelativeTo(Node):
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OffsetBy(Node):
     """`origin offset by offset`."""
 
@@ -86,7 +86,7 @@ class OffsetBy(Node):
     offset: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OffsetAlong(Node):
     """`origin offset along direction by offset`."""
 
@@ -95,7 +95,7 @@ class OffsetAlong(Node):
     offset: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RelativePosition(Node):
     """`relative position of target [from origin]`; without origin, from the ego (as for all that follow)."""
 
@@ -103,7 +103,7 @@ class RelativePosition(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RelativeHeading(Node):
     """`relative heading of target [from origin]`."""
 
@@ -111,7 +111,7 @@ class RelativeHeading(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ApparentHeading(Node):
     """`apparent heading of target [from origin]`."""
 
@@ -119,7 +119,7 @@ class ApparentHeading(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Distance(Node):
     """`distance [from origin] to target`."""
 
@@ -127,7 +127,7 @@ class Distance(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class DistancePast(Node):
     """`distance past target [of origin]`."""
 
@@ -135,7 +135,7 @@ class DistancePast(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Angle(Node):
     """`angle [from origin] to target`, also spelled `azimuth`."""
 
@@ -143,7 +143,7 @@ class Angle(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Altitude(Node):
     """`altitude [from origin] to target`."""
 
@@ -151,7 +151,7 @@ class Altitude(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class CanSee(Node):
     """`viewer can see target`."""
 
@@ -159,7 +159,7 @@ class CanSee(Node):
     target: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Intersects(Node):
     """`left intersects right`."""
 
@@ -167,7 +167,7 @@ class Intersects(Node):
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Follow(Node):
     """`follow field [from origin] for distance`."""
 
@@ -176,7 +176,7 @@ class Follow(Node):
     distance: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Visible(Node):
     """`visible region`, `not visible region`: the part that the ego sees, or does not."""
 
@@ -184,7 +184,7 @@ class Visible(Node):
     negated: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class VisibleFrom(Node):
     """`region visible from viewer`, `region not visible from viewer`."""
 
@@ -193,7 +193,7 @@ class VisibleFrom(Node):
     negated: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PartOf(Node):
     """`front of target`, `front left of target`, ...: a point of the box, oriented along the heading."""
 
@@ -201,7 +201,7 @@ class PartOf(Node):
     target: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Temporal(Node):
     """`always x`, `eventually x`, `next x`."""
 
@@ -209,7 +209,7 @@ class Temporal(Node):
     operand: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Until(Node):
     """`left until right`."""
 
@@ -217,7 +217,7 @@ class Until(Node):
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Implies(Node):
     """`left implies right`."""
 
@@ -225,6 +225,6 @@ class Implies(Node):
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class InitialScenario(Node):
     """`initial scenario`: true in the scenario that runs first."""

@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Model(Node):
     """`model scenic.domains.driving.model`."""
 
@@ -35,7 +35,7 @@ class Model(Node):
     name_span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ParamItem(Node):
     """`name = value` of a `param` statement; the name may have been quoted."""
 
@@ -44,14 +44,14 @@ class ParamItem(Node):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Param(Node):
     """`param a = 1, b = 2`."""
 
     items: tuple[ParamItem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Require(Node):
     """`require condition`, `require[probability] condition`, each with an optional `as name`."""
 
@@ -60,14 +60,14 @@ class Require(Node):
     name: str | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RequireMonitor(Node):
     """`require monitor M()`."""
 
     monitor: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Mutate(Node):
     """`mutate a, b by scale`; without objects, all."""
 
@@ -75,14 +75,14 @@ class Mutate(Node):
     scale: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Simulator(Node):
     """`simulator S()`."""
 
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class DynamicStatement(Node):
     """What happens over time, skipped with its body but for what ends a run.
 
@@ -101,7 +101,7 @@ class DynamicStatement(Node):
     unit: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class DynamicDefinition(Node):
     """A definition of what happens over time, skipped with its body but for monitors; unnamed blocks have no name.
 
@@ -121,7 +121,7 @@ class DynamicDefinition(Node):
     body: tuple[Statement, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
     """A construct that not every version of Scenic has.
 
@@ -136,7 +136,7 @@ class Evidence:
     versions: frozenset[int]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Module:
     """A whole program.
 

@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class WithSpecifier(Node):
     """`with property value`."""
 
@@ -41,42 +41,42 @@ class WithSpecifier(Node):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class AtSpecifier(Node):
     """`at position`."""
 
     position: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class InSpecifier(Node):
     """`in region`."""
 
     region: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OnSpecifier(Node):
     """`on region` (Scenic 3: also a vector)."""
 
     region: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ContainedInSpecifier(Node):
     """`contained in region`."""
 
     region: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OffsetBySpecifier(Node):
     """`offset by offset`."""
 
     offset: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OffsetAlongSpecifier(Node):
     """`offset along direction by offset`."""
 
@@ -84,7 +84,7 @@ class OffsetAlongSpecifier(Node):
     offset: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BeyondSpecifier(Node):
     """`beyond target by offset [from origin]`."""
 
@@ -93,21 +93,21 @@ class BeyondSpecifier(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class VisibleSpecifier(Node):
     """`visible [from viewer]`."""
 
     viewer: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class NotVisibleSpecifier(Node):
     """`not visible [from viewer]`."""
 
     viewer: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class DirectionSpecifier(Node):
     """`left of reference [by distance]`, and `right of`, `ahead of`, `behind`, `above`, `below`."""
 
@@ -116,7 +116,7 @@ class DirectionSpecifier(Node):
     distance: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FollowingSpecifier(Node):
     """`following field [from origin] for distance`."""
 
@@ -125,14 +125,14 @@ class FollowingSpecifier(Node):
     distance: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FacingSpecifier(Node):
     """`facing heading`, of a heading or a vector field."""
 
     heading: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FacingTowardSpecifier(Node):
     """`facing [directly] toward target`."""
 
@@ -140,7 +140,7 @@ class FacingTowardSpecifier(Node):
     directly: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FacingAwayFromSpecifier(Node):
     """`facing [directly] away from target`."""
 
@@ -148,7 +148,7 @@ class FacingAwayFromSpecifier(Node):
     directly: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ApparentlyFacingSpecifier(Node):
     """`apparently facing heading [from origin]`."""
 
@@ -156,7 +156,7 @@ class ApparentlyFacingSpecifier(Node):
     origin: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class UsingSpecifier(Node):
     """`using f(...)`."""
 

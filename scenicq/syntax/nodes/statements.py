@@ -44,14 +44,14 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ExpressionStatement(Node):
     """An expression on its own line."""
 
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Assign(Node):
     """`a = b = value`."""
 
@@ -59,7 +59,7 @@ class Assign(Node):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class AugmentedAssign(Node):
     """`target += value`; the operator is without `=`."""
 
@@ -68,7 +68,7 @@ class AugmentedAssign(Node):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class AnnotatedAssign(Node):
     """`target: annotation [= value]`."""
 
@@ -77,7 +77,7 @@ class AnnotatedAssign(Node):
     value: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Branch(Node):
     """`if test: body` or `elif test: body`."""
 
@@ -85,7 +85,7 @@ class Branch(Node):
     body: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class If(Node):
     """`if`, any number of `elif`, and the body of `else` (empty where there is none)."""
 
@@ -93,7 +93,7 @@ class If(Node):
     orelse: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class For(Node):
     """`for target in iterable: body`, with an `else`."""
 
@@ -103,7 +103,7 @@ class For(Node):
     orelse: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class While(Node):
     """`while test: body`, with an `else`."""
 
@@ -112,22 +112,22 @@ class While(Node):
     orelse: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Break(Node):
     """`break`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Continue(Node):
     """`continue`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Pass(Node):
     """`pass`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FunctionDef(Node):
     """`def name(parameters) -> returns: body`; the span starts at `def`, after the decorators."""
 
@@ -139,21 +139,21 @@ class FunctionDef(Node):
     decorators: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Return(Node):
     """`return [value]`."""
 
     value: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Delete(Node):
     """`del a, b`."""
 
     targets: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Assert(Node):
     """`assert test [, message]`."""
 
@@ -161,7 +161,7 @@ class Assert(Node):
     message: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Raise(Node):
     """`raise [exception [from cause]]`."""
 
@@ -169,7 +169,7 @@ class Raise(Node):
     cause: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ExceptHandler(Node):
     """`except [type [as name]]: body`."""
 
@@ -178,7 +178,7 @@ class ExceptHandler(Node):
     body: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Try(Node):
     """`try`, `except`, `else`, `finally` (`interrupt when` makes it a `DynamicStatement`)."""
 
@@ -188,7 +188,7 @@ class Try(Node):
     final: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class WithItem(Node):
     """`context [as target]`."""
 
@@ -196,7 +196,7 @@ class WithItem(Node):
     target: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class WithStatement(Node):
     """`with items: body`."""
 
@@ -204,7 +204,7 @@ class WithStatement(Node):
     body: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PropertyDefault(Node):
     """`name: value` in a class, or `name[additive]: value` with modifiers `additive`, `dynamic`, `final`."""
 
@@ -214,7 +214,7 @@ class PropertyDefault(Node):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ClassDef(Node):
     """`class name(bases): body`; a property line is a `PropertyDefault`, all else an ordinary statement."""
 
@@ -225,7 +225,7 @@ class ClassDef(Node):
     decorators: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ImportAlias(Node):
     """`path [as name]`; the path is dotted in `import`, a single name (or `*`) in `from`."""
 
@@ -233,14 +233,14 @@ class ImportAlias(Node):
     name: str | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Import(Node):
     """`import a.b as c, d`."""
 
     aliases: tuple[ImportAlias, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ImportFrom(Node):
     """`from ..module import a as b, c`; level counts the leading dots."""
 
@@ -249,21 +249,21 @@ class ImportFrom(Node):
     aliases: tuple[ImportAlias, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Global(Node):
     """`global a, b`."""
 
     names: tuple[Name, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Nonlocal(Node):
     """`nonlocal a, b`."""
 
     names: tuple[Name, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class UnsupportedStatement(Node):
     """Python that no scenario needs, skipped with its body: `async def`, `match`; construct is the keyword."""
 

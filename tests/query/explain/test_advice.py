@@ -9,6 +9,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.explain import advice as advice_module
+from scenicq.query.explain import prefilter_counts
 from scenicq.query.explain.advice import advice
 from scenicq.store.dataset import open_dataset
 
@@ -71,9 +72,21 @@ def test_a_parameter_is_a_change_too(dataset):
 
 def test_large_datasets_are_sampled(dataset, monkeypatch):
     monkeypatch.setattr(advice_module, "_MOST_FRAMES", 10)
-    found = advice(taken(dataset, TEXT))
+    query = taken(dataset, TEXT)
+    assert not any(each.sampled for each in advice(query).outlooks)  # where the sample is all there is
+    monkeypatch.setattr(prefilter_counts, "_SPOT_FRAMES", 10)
+    found = advice(query)
     assert found.outlooks
     assert all(each.sampled for each in found.outlooks)
+
+
+def test_brief_advice_is_bounded_by_work_and_says_no_more_than_all_of_it(dataset):
+    query = taken(dataset, TEXT)
+    brief, full = advice(query, brief=True), advice(query)
+    assert not brief.complete
+    known = {each.change.told: each for each in full.outlooks}
+    for each in brief.outlooks:
+        assert each.least <= known[each.change.told].least <= each.most
 
 
 def test_without_time_one_change_is_tried(dataset):
