@@ -60,7 +60,7 @@ def show_funnel(query: Query, elapsed_s: float) -> None:
         elapsed_s: Seconds that it took.
     """
     # what is never compared was said before the results
-    show(each for each in query.funnel.warnings if each.code != "never-compared")
+    show(each for each in query.funnel.warnings if each.code not in ("never-compared", "no-tracks"))
     lines = columns(_steps(query), right=frozenset({0}))
     lines += [*_failures(query.funnel), *_broken(query.funnel)]
     for what, frames in sorted(query.funnel.missing.items()):

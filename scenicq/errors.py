@@ -75,6 +75,7 @@ CODES: dict[str, str] = {
     "predictions-unmatched": "predictions are of a frame that the dataset does not have",
     "predictions-frame": "predicted boxes do not lie in the frame of reference that their format has",
     "few-recordings": "too few recordings for a verdict",
+    "heights-unknown": "distances are those in the plane: the dataset does not know all heights",
     "no-density": "a probability density does not exist, or could not be computed",
     "engine-failed": "what runs a query on other processes or machines is not there, or stopped",
     # the solvers
@@ -83,6 +84,7 @@ CODES: dict[str, str] = {
     # the answers
     "frame-excluded": "what a frame shows is not what the program allows",
     "never-compared": "the program sets what no label of the dataset has",
+    "no-tracks": "a program over time, and objects of which nothing says that they are the same in several labels",
     # what compiles but cannot be meant
     "angle-without-deg": "an angle of more than a full turn, which may be meant in degrees",
     "range-reversed": "a range whose first end is above its second",

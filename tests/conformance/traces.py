@@ -78,7 +78,7 @@ def intervals(program: str, dataset: Path) -> dict[str, list[dict[str, Any]]]:
         ValueError: The program is refused.
     """
     words = ["match", program, str(dataset), "--behaviors", "ignore", "--intervals", "all", "--exit-zero"]
-    done = CliRunner().invoke(cli, [*words, "--quiet", "--jobs", "1", "--timeout", "60", "--format", "jsonl"])
+    done = CliRunner().invoke(cli, [*words, "--quiet", "--jobs", "1", "--timeout", "20", "--format", "jsonl"])
     if done.exit_code:
         raise ValueError(done.stderr.strip() or repr(done.exception))
     found: dict[str, list[dict[str, Any]]] = {}

@@ -46,7 +46,7 @@ class Coverage:
     """How much of what a program sets is compared with a dataset.
 
     Attributes:
-        warnings: One for each property that no label has (never-compared).
+        warnings: One for each property that no label has (never-compared); no-tracks, where nothing has a track.
         missing: Frames in which a property is missing that others have, by its name in the program.
     """
 
@@ -104,6 +104,13 @@ def _settings(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
                 ego = index == scenario.ego and options.ego == "label"
                 told = f"read here: the library's default for `{name}` stands in"
                 yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, requirement.span, told)
+    for condition in scenario.dynamics.conditions if scenario.dynamics is not None else ():
+        for index, name in features(condition):
+            if index != PARAMS and name in _READ:
+                thing = scenario.objects[index]
+                ego = index == scenario.ego and options.ego == "label"
+                told = "read here: an interval that hangs on it is unknown"
+                yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, condition.span, told)
 
 
 def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOptions) -> Coverage:
@@ -114,13 +121,15 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
         scenarios: The program, compiled over maps of the dataset.
         options: Classes, ego and ignored parameters.
     """
+    scenarios = tuple(scenarios)
     places: dict[tuple[Span | None, str, str], _Setting] = {}
     for scenario in scenarios:
         for each in _settings(scenario, options):
             places.setdefault((each.span, each.name, each.category), each)
     found = sorted(places.values(), key=lambda each: each.span.start if each.span is not None else 0)
+    without = _without_tracks(dataset, scenarios)
     if not found or not dataset.manifest.total.frames:
-        return Coverage()
+        return Coverage(without)
     with closing(dataset.connect(views=False)) as connection, dataset.blamed():
         counts = _counts(dataset, connection, [each for each in found if each.comparable], options)
         warnings: list[Diagnostic] = []
@@ -131,7 +140,17 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
                 warnings.append(_warning(dataset, connection, each, options))
             elif present and lacking:
                 missing[each.what] = max(lacking, missing.get(each.what, 0))
-    return Coverage(tuple(warnings), missing)
+    return Coverage((*without, *warnings), missing)
+
+
+def _without_tracks(dataset: Dataset, scenarios: Iterable[Scenario]) -> tuple[Diagnostic, ...]:
+    """A warning where a program over time has objects besides the ego, and nothing says which objects are the same."""
+    over_time = any(scenario.dynamics is not None and len(scenario.objects) > 1 for scenario in scenarios)
+    if not over_time or dataset.manifest.tracks or not dataset.manifest.total.objects:
+        return ()
+    message = "no object of the dataset has a track: each is another one in every frame, and no interval is longer"
+    hint = "in the interchange format `track` says which objects of several labels are the same"
+    return (Diagnostic("no-tracks", message, hints=(hint,), severity="warning"),)
 
 
 def _classes(category: str, options: MatchOptions) -> str:

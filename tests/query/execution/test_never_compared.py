@@ -140,3 +140,41 @@ def test_match_says_in_a_line_what_cannot_be_meant(dataset, run, tmp_path):
     assert lines[1].startswith("warning[unused-variable]: ")
     assert "scenicq check" in lines[2]
     assert run("match", file, dataset.folder, "--strict").exit_code == 2
+
+
+def over_time(tmp_path, text, **more):
+    source = tmp_path / "source"
+    (source / "maps").mkdir(parents=True)
+    (source / "maps" / "town.geojson").write_text(json.dumps(MAP))
+    labels = [
+        {
+            "id": f"f{number}", "recording": "r", "timestamp_us": 500_000 * number, "map": "town",
+            "ego": box("ego", 0.0), "objects": [box(f"a{number}", 10.0, **more)],
+        }
+        for number in range(4)
+    ]  # fmt: skip
+    (source / "labels.jsonl").write_text("".join(json.dumps(label) + "\n" for label in labels))
+    header = {"name": "d", "interchange": 1, "angle": "heading", "classes": "scenic"}
+    (source / "dataset.json").write_text(json.dumps(header))
+    ingest(source, tmp_path / "d")
+    return [
+        (each.code, each.message)
+        for each in Query(open_dataset(tmp_path / "d"), Source("p.scenic", text), QueryOptions()).coverage().warnings
+    ]
+
+
+PAIR = f"ego = new Object {PLACED}\nother = new Object {PLACED}\n"
+
+
+def test_objects_without_tracks_are_told_where_they_matter(tmp_path):
+    distance = PAIR + "require always (distance to other) < 20"
+    assert [code for code, _ in over_time(tmp_path / "1", distance)] == ["no-tracks"]
+    assert over_time(tmp_path / "2", distance, track="t") == []
+    assert over_time(tmp_path / "3", PAIR) == []
+    assert over_time(tmp_path / "4", f"ego = new Object {PLACED}\nterminate when ego.position.x > 3") == []
+
+
+def test_what_a_condition_over_time_reads_and_no_label_has_is_told(tmp_path):
+    speed = PAIR + "terminate when other.speed > 2"
+    assert [code for code, _ in over_time(tmp_path / "1", speed)] == ["no-tracks", "never-compared"]
+    assert over_time(tmp_path / "2", speed, track="t") == []
