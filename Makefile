@@ -46,7 +46,7 @@ test-all: $(READY) ## All tests
 golden: $(READY) ## Rewrite the golden files that tests compare with
 	$(PYTEST) --update-golden -m 'not slow'
 
-bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each step of matching is worth; numbers go to bench-results/
+bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each step of matching is worth; numbers go to bench-results/ (SCENIC=a checkout and DATASETS= add its programs)
 	$(BIN)/python tests/bench/queries.py
 	$(BIN)/python tests/bench/jointly.py
 	$(BIN)/python tests/bench/scalability.py --patience 5
@@ -54,6 +54,9 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/bench/pictures.py
 	$(BIN)/python tests/bench/steps.py
 	$(BIN)/python tests/bench/by_hand.py
+ifdef SCENIC
+	$(BIN)/python tests/bench/published.py $(SCENIC) $(DATASETS)
+endif
 
 FRAMES ?= 10000 100000
 bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=1000000 is the largest bar)
@@ -65,6 +68,7 @@ SEED ?= 1
 conformance: $(READY) ## Compare with Scenic 3.1.1 and 2.1.0 (MAP=an OpenDRIVE file, RANDOM=, SEED=; or SCENIC=a checkout)
 ifdef SCENIC
 	$(BIN)/python tests/conformance/published.py $(SCENIC)
+	$(BIN)/python tests/conformance/map_questions.py $(SCENIC)
 else
 	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(SEED)
 endif

@@ -69,7 +69,7 @@ def _curb(network: Network, group: LaneGroup) -> ModelValue:
     strip = shapes.band(shapes.union_all(edges), _CURB)
     near = [shapes.intersection(line, strip) for line in network.curbs_near(strip)]
     own = [part for part in shapes.simple_parts(near) if part.length > 0]
-    # inside intersections maps have none of the kind: what comes near there belongs to other roads
+    # curbs without a group lie outside of intersections: what comes near inside belongs to other roads
     crossing = group.road is not None and group.road.intersection is not None
     along = sum(part.length for part in own) >= 0.5 * sum(edge.length for edge in edges)
     return _lines(own if along and not crossing else edges, f"curb of {group.id}")

@@ -15,7 +15,7 @@ from scenicq.compiler.choices import make_choice
 from scenicq.compiler.coerce import to_node
 from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, ScenicClass, fail
 from scenicq.errors import Note, Span
-from scenicq.forest.nodes import Constant, DirectionAt, Feature, Index, Node
+from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Constant, DirectionAt, Feature, Index, Node
 
 __all__ = ["BoundSpecifier", "Evaluator", "construct"]
 
@@ -172,7 +172,12 @@ def _either(name: str, given: BoundSpecifier, default: BoundSpecifier) -> BoundS
 
 
 def _is_same(one: Node, other: Node) -> bool:
-    """Whether two headings are the same direction at the same place, as on a road."""
+    """Whether two headings are the same direction at the same place, as on a road; the second may have 0 added."""
+    match other:
+        case Arithmetic(op=ArithmeticOp.ADD, args=(DirectionAt() as field, Constant(value=0.0))):
+            other = field
+        case _:
+            pass
     if not (isinstance(one, DirectionAt) and isinstance(other, DirectionAt)):
         return False
     fields = [field.value if isinstance(field, Constant) else field for field in (one.field, other.field)]

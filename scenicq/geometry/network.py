@@ -122,7 +122,8 @@ class Network:
     @cached_property
     def _outer_curbs(self) -> tuple[LineString, ...]:
         def is_inside(group: LaneGroup | None) -> bool:
-            return group is not None and group.road is not None and group.road.intersection is not None
+            roads = [group.road, *(lane.road for lane in group.lanes)] if group is not None else []
+            return any(road is not None and road.intersection is not None for road in roads)
 
         return tuple(line for group, lines in self._curb_lines.items() if not is_inside(group) for line in lines)
 
@@ -165,7 +166,7 @@ class Network:
     def curbRegion(self) -> PolylineSet:
         """All curbs, in the direction of traffic; where the map names none, the right edges of the outermost lanes.
 
-        Scenic makes its curbs so from its lane groups. Inside intersections there are none.
+        Scenic makes its curbs so from its lane groups. Those of groups inside intersections are no part of it.
         """
         return DeferredPolylines("curb", self._curbs_everywhere)
 

@@ -33,3 +33,18 @@ def test_where_the_map_gives_no_direction_it_is_any(place: str) -> None:
 def test_on_the_road_it_is_that_of_traffic() -> None:
     heading = heading_of_the_last("spot = new OrientedPoint on road\nnew Object at spot, facing 0 relative to spot\n")
     assert [type(node) for node in postorder([heading]) if isinstance(node, Range | DirectionAt)] == [DirectionAt]
+
+
+@pytest.mark.parametrize(
+    ("place", "either"),
+    [("ego.laneGroup.opposite", True), ("visible ego.laneGroup.opposite", True), ("ego.lane", False), ("road", False)],
+)
+def test_what_lies_on_a_part_that_some_elements_lack_has_either_heading(place: str, either: bool) -> None:
+    heading = heading_of_the_last(f"new Pedestrian on {place}\n")
+    found = {type(node) for node in postorder([heading]) if isinstance(node, Range | DirectionAt)}
+    assert found == ({Range, DirectionAt} if either else {DirectionAt})
+
+
+def test_where_the_class_says_the_same_there_is_nothing_to_choose() -> None:
+    heading = heading_of_the_last("new Car on ego.laneGroup.opposite\n")
+    assert [type(node) for node in postorder([heading]) if isinstance(node, Range | DirectionAt)] == [DirectionAt]

@@ -72,7 +72,7 @@ def _name(element: Any) -> str | None:
 
 
 def _names(elements: Any) -> list[str]:
-    return sorted(each.uid for each in elements)
+    return sorted({each.uid for each in elements})
 
 
 def _way(maneuver: Any) -> list[str]:

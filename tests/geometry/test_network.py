@@ -70,6 +70,23 @@ def town(*more: MapFeature) -> Network:
     )
 
 
+def test_curbs_of_lane_groups() -> None:
+    own = MapFeature("edge of turn", "curb", LineString([(6, 50), (6, 40)]), {"group": "turns"})
+    other = MapFeature("edge of road", "curb", LineString([(7.9, 0), (7.9, 40)]), {"group": "north"})
+    network = town(own, other)
+    group, inside = network.elements["north"], network.elements["turns"]
+    assert isinstance(group, LaneGroup)
+    assert isinstance(inside, LaneGroup)
+    assert [list(line.coords) for line in network.curbs_of(group)] == [[(7.9, 0.0), (7.9, 40.0)]]
+    assert [list(line.coords) for line in network.curbs_of(inside)] == [[(6.0, 40.0), (6.0, 50.0)]], "with the traffic"
+    # what lies inside an intersection is no part of all curbs
+    assert contains(network.curbRegion, 7.9, 20)
+    assert contains(network.curbRegion, 8, 20)
+    assert not contains(network.curbRegion, 6, 45)
+    dangling = MapFeature("stray", "curb", LineString([(0, 0), (0, 1)]), {"group": "nowhere"})
+    assert town(dangling).problems == ("`group` of curb `stray`: `nowhere` is not in the map",)
+
+
 def lane(network: Network, name: str) -> Lane:
     found = network.elements[name]
     assert isinstance(found, Lane)

@@ -26,7 +26,7 @@ from scenicq.query.execution import dask_engine as dask
 from scenicq.query.execution.partitions import partitions
 from scenicq.query.execution.results import Funnel, record
 from scenicq.query.execution.run import Query, QueryOptions, read_program
-from scenicq.query.execution.shards import Question, in_order, run_here
+from scenicq.query.execution.shards import Question, in_order, kept, run_here, shards_of
 from scenicq.query.prefilter import executor
 from scenicq.store.dataset import Dataset, open_dataset
 
@@ -168,6 +168,23 @@ def test_dask_gives_the_same_and_listens_on_the_loopback_only(dataset: Dataset, 
     )
     assert addresses == {"127.0.0.1"}
     assert dask_children() == []
+
+
+@needs_signals
+@pytest.mark.usefixtures("needs_dask")
+def test_dask_begins_nothing_when_the_time_is_over_and_leaves_nothing_behind(
+    dataset: Dataset, undisturbed: Found, tmp_path: Path
+) -> None:
+    late = query(dataset, jobs=2, until=1.0)
+    pieces = shards_of(late, 6)
+    assert not list(in_order(late, kept(dask.dask_engine(), tmp_path), pieces, lambda _: None))
+    assert late.funnel.cut
+    assert not list(tmp_path.iterdir())
+    assert dask_children() == []
+    # a limit that is not reached changes nothing
+    early = query(dataset, jobs=2, until=1e12)
+    every = [record(each) for each in in_order(early, kept(dask.dask_engine(), tmp_path), pieces, lambda _: None)]
+    assert (every, early.funnel) == undisturbed
 
 
 @needs_signals
