@@ -149,7 +149,7 @@ def _text(found: Evaluation) -> str:
         for title, head, rows in tables(each, found.distance_m):
             lines += ["", title, *columns([head, *rows])]
         lines.append("")
-        lines += [plain(role.sentence) for role in each.headline]
+        lines += [plain(one.sentence) for one in (*each.headline, *each.weighted)]
         if each.simulated is not None:
             lines.append(plain(each.simulated.sentence))
         lines.append("")

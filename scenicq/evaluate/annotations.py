@@ -25,6 +25,8 @@ Numbers = NDArray[np.int32]
 T = TypeVar("T")
 
 _UNKNOWN = "unknown"
+_EGO = ("ego_x", "ego_y", "ego_heading", "ego_z", "ego_pitch", "ego_roll")
+_OBJECT = ("x", "y", "heading", "width", "length", "height", "vx", "vy", "z")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +39,10 @@ class Frames:
         recordings: Names of the recordings.
         recording: Number of the recording of each frame, shape (n,).
         timestamp_us: Shape (n,).
+        maps: Names of the maps.
+        map: Number of the map of each frame, shape (n,).
         ego_x, ego_y, ego_heading: The centre of the ego, shape (n,).
+        ego_z, ego_pitch, ego_roll: Its height and tilt, nan where unknown, shape (n,).
         params: Global parameters of each frame.
     """
 
@@ -46,9 +51,14 @@ class Frames:
     recordings: list[str]
     recording: Numbers
     timestamp_us: NDArray[np.int64]
+    maps: list[str]
+    map: Numbers
     ego_x: Reals
     ego_y: Reals
     ego_heading: Reals
+    ego_z: Reals
+    ego_pitch: Reals
+    ego_roll: Reals
     params: list[Mapping[str, Any]]
 
 
@@ -62,7 +72,9 @@ class Annotations:
         frame: Number of the frame, shape (n,).
         classes, source_classes: Names of classes: of the class tree, and the source's own.
         category, source_category: Numbers of them, shape (n,).
-        x, y, heading, width, length, height, vx, vy: Shape (n,); nan where unknown.
+        x, y, heading, width, length, height, vx, vy, z: Shape (n,); nan where unknown.
+        attributes: Names of attributes.
+        attribute: Number of the attribute that counts, -1 without, shape (n,).
         points: How many points the source counts in the box, by the attribute that says so; -1 where it does not.
         visibility: Names of levels, in the order of `visible`.
         visible: Number of the level, shape (n,).
@@ -83,25 +95,32 @@ class Annotations:
     height: Reals
     vx: Reals
     vy: Reals
+    z: Reals
+    attributes: list[str]
+    attribute: Numbers
     points: Mapping[str, Reals]
     visibility: list[str]
     visible: Numbers
 
 
-def read_annotations(dataset: Dataset, points: tuple[str, ...] = ()) -> tuple[Frames, Annotations]:
+def read_annotations(
+    dataset: Dataset, points: tuple[str, ...] = (), groups: tuple[str, ...] = ()
+) -> tuple[Frames, Annotations]:
     """All labels of a dataset.
 
     Args:
         dataset: The dataset.
         points: Attributes that count points.
+        groups: Groups of attributes of which an object has one.
     """
     with dataset.blamed(), closing(dataset.connect()) as connection:
         rows = connection.sql(
-            "SELECT frame, recording, timestamp_us, ego_x, ego_y, ego_heading, params FROM labels "
+            f"SELECT frame, recording, timestamp_us, map, {', '.join(_EGO)}, params FROM labels "
             "ORDER BY recording, timestamp_us, frame"
         ).to_arrow_table()
         names: list[str] = rows["frame"].to_pylist()
         recordings, recording = _codes(rows["recording"])
+        maps, of_map = _codes(rows["map"])
         texts, at = _codes(rows["params"], absent="{}")
         params = [json.loads(text) for text in texts]
         frames = Frames(
@@ -110,21 +129,21 @@ def read_annotations(dataset: Dataset, points: tuple[str, ...] = ()) -> tuple[Fr
             recordings=recordings,
             recording=recording,
             timestamp_us=rows["timestamp_us"].to_numpy(),
-            ego_x=_reals(rows["ego_x"]),
-            ego_y=_reals(rows["ego_y"]),
-            ego_heading=_reals(rows["ego_heading"]),
+            maps=maps,
+            map=of_map,
+            **{name: _reals(rows[name]) for name in _EGO},
             params=[params[number] for number in at.tolist()],
         )
         connection.register("numbered", rows.select(["frame"]).append_column("number", [list(range(len(names)))]))
         objects = connection.sql(
             'SELECT n.number, o.id, o.track, o."class", o.source_class, o.x, o.y, o.heading, o.width, o.length, '
-            "o.height, o.vx, o.vy, o.attributes FROM objects o JOIN numbered n ON o.frame = n.frame "
+            "o.height, o.vx, o.vy, o.z, o.attributes FROM objects o JOIN numbered n ON o.frame = n.frame "
             "ORDER BY n.number, o.ordinal"
         ).to_arrow_table()
-    return frames, _annotations(objects, points)
+    return frames, _annotations(objects, points, groups)
 
 
-def _annotations(objects: Any, points: tuple[str, ...]) -> Annotations:
+def _annotations(objects: Any, points: tuple[str, ...], groups: tuple[str, ...]) -> Annotations:
     classes, category = _codes(objects["class"])
     source_classes, source_category = _codes(objects["source_class"])
     texts, at = _codes(objects["attributes"], absent="{}")
@@ -132,6 +151,9 @@ def _annotations(objects: Any, points: tuple[str, ...]) -> Annotations:
     levels = [str(each.get("visibility", _UNKNOWN)) for each in told]
     visibility = sorted(set(levels) | {_UNKNOWN})
     order = {level: number for number, level in enumerate(visibility)}
+    of_text = [next((f"{group}.{each[group]}" for group in groups if group in each), "") for each in told]
+    attributes = sorted(set(of_text) - {""})
+    places = {name: number for number, name in enumerate(attributes)}
 
     def count(name: str) -> Callable[[Mapping[str, Any]], float]:
         return lambda each: float(each.get(name, -1))
@@ -144,7 +166,9 @@ def _annotations(objects: Any, points: tuple[str, ...]) -> Annotations:
         category=category,
         source_classes=source_classes,
         source_category=source_category,
-        **{name: _reals(objects[name]) for name in ("x", "y", "heading", "width", "length", "height", "vx", "vy")},
+        **{name: _reals(objects[name]) for name in _OBJECT},
+        attributes=attributes,
+        attribute=np.array([places.get(name, -1) for name in of_text], dtype=np.int32)[at],
         points={name: np.array([*map(count(name), told)], dtype=np.float64)[at] for name in points},
         visibility=visibility,
         visible=np.array([order[level] for level in levels], dtype=np.int32)[at],

@@ -28,13 +28,14 @@ class Centres:
     Attributes:
         frame: Number of the frame.
         category: Number of the class.
-        x, y: Centre, metres.
+        x, y, z: Centre, metres; z is None where distances are those in the plane.
     """
 
     frame: NDArray[np.int32]
     category: NDArray[np.int32]
     x: Reals
     y: Reals
+    z: Reals | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,13 +61,14 @@ def find_pairs(predictions: Centres, objects: Centres, reach_m: float, *, neares
         reach_m: The distance.
         nearest_only: Whether each prediction is paired with the nearest object alone, at any distance.
     """
+    axes = "xy" if predictions.z is None or objects.z is None else "xyz"
     with closing(duckdb.connect(":memory:")) as connection:
         connection.register("predictions", _table(predictions))
         connection.register("objects", _table(objects))
         joined = "FROM predictions p JOIN objects o ON p.frame = o.frame AND p.category = o.category"
         if nearest_only:
             # a pair of numbers is compared by the first, then by the second
-            square = "(p.x - o.x) * (p.x - o.x) + (p.y - o.y) * (p.y - o.y)"
+            square = " + ".join(f"(p.{axis} - o.{axis}) * (p.{axis} - o.{axis})" for axis in axes)
             found = connection.execute(
                 f"SELECT prediction, least.number AS object, sqrt(least.square) AS distance FROM "
                 f"(SELECT p.number AS prediction, min({{square: {square}, number: o.number}}) AS least {joined} "
@@ -74,11 +76,12 @@ def find_pairs(predictions: Centres, objects: Centres, reach_m: float, *, neares
             ).fetchnumpy()
             return Pairs(_numbers(found["prediction"]), _numbers(found["object"]), np.asarray(found["distance"]))
         found = connection.execute(
-            f"SELECT p.number AS prediction, o.number AS object, p.x - o.x AS dx, p.y - o.y AS dy {joined} "
+            f"SELECT p.number AS prediction, o.number AS object, "
+            f"{', '.join(f'p.{axis} - o.{axis} AS d{axis}' for axis in axes)} {joined} "
             "WHERE abs(p.x - o.x) < $reach AND abs(p.y - o.y) < $reach",
             {"reach": reach_m},
         ).fetchnumpy()
-    distance = np.sqrt(np.square(found["dx"]) + np.square(found["dy"]))
+    distance = np.sqrt(sum(np.square(found[f"d{axis}"]) for axis in axes))
     near = distance < reach_m
     prediction, numbers, distance = found["prediction"][near], found["object"][near], distance[near]
     order = np.lexsort((numbers, distance, prediction))
@@ -90,15 +93,9 @@ def _numbers(values: NDArray[np.int64]) -> Numbers:
 
 
 def _table(boxes: Centres) -> Any:
-    return pa.table(
-        {
-            "number": np.arange(len(boxes.x)),
-            "frame": boxes.frame,
-            "category": boxes.category,
-            "x": boxes.x,
-            "y": boxes.y,
-        }
-    )
+    columns = {"number": np.arange(len(boxes.x)), "frame": boxes.frame, "category": boxes.category}
+    columns |= {"x": boxes.x, "y": boxes.y} | ({} if boxes.z is None else {"z": boxes.z})
+    return pa.table(columns)
 
 
 def assign(pairs: Pairs, rank: Numbers, objects: int, threshold_m: float, *, nearest_only: bool = False) -> Numbers:

@@ -21,7 +21,17 @@ from scenicq.evaluate.resampling import (
     sign_flip_test,
 )
 
-__all__ = ["DISTANCES_M", "Comparison", "Share", "compare", "distance_names", "p_text", "share_of", "strata_of"]
+__all__ = [
+    "DISTANCES_M",
+    "Comparison",
+    "Share",
+    "compare",
+    "distance_names",
+    "p_text",
+    "percent",
+    "share_of",
+    "strata_of",
+]
 
 Reals = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -85,9 +95,9 @@ class Comparison:
         """All of it in one line."""
         if math.isnan(self.share.rate):
             return f"{self.about}: no object to be found"
-        text = f"missed {_percent(self.share)} of {self.about}"
+        text = f"missed {percent(self.share)} of {self.about}"
         if not math.isnan(self.other.rate):
-            text += f" against {_percent(self.other)}"
+            text += f" against {percent(self.other)}"
         if not math.isnan(self.p_value):
             text += f"; {p_text(self.p_value)}"
             if not math.isnan(self.p_corrected) and self.p_corrected != self.p_value:
@@ -101,7 +111,8 @@ def p_text(value: float) -> str:
     return "p < 0.001" if value < 0.001 else f"p = {value:.3f}"
 
 
-def _percent(share: Share) -> str:
+def percent(share: Share) -> str:
+    """A share with its interval, as it stands in a sentence."""
     if math.isnan(share.interval[0]):
         return f"{100 * share.rate:.0f} %"
     low, high = share.interval

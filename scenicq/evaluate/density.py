@@ -15,14 +15,15 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.evaluate.expression_arrays import UncomputedError, evaluate_arrays
+from scenicq.evaluate.observed_columns import ANGLES, Observed, ObservedColumns
 from scenicq.evaluate.variables import Draws, density_of, point_density
-from scenicq.forest.columns import Array, Coded, Data, Vectors, constant_column
+from scenicq.forest.columns import Array, Data, Vectors, constant_column
 from scenicq.forest.groups import Comparison, Condition, Group
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -41,18 +42,28 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import children, leaves, postorder, rebuild
 
-__all__ = ["GroupDensity", "Observed"]
+__all__ = ["GroupDensity", "GroupValues"]
 
 Reals = NDArray[np.float64]
-Observed = Mapping[tuple[int, str], Value]
-"""What a label observes: values by object (`PARAMS` for parameters) and property."""
-
 _CHUNK = 200
 _AFFINE = 1e-6
 _Draw = Callable[[Leaf, tuple[Data, ...]], Data]
 
-_ANGLES = frozenset({"heading"})
-_SLACK = 1e-3
+
+class GroupValues(NamedTuple):
+    """What a group says of labels.
+
+    Attributes:
+        log, error: Logarithms of the densities of the features and their standard errors, shape (labels,); -inf outside
+            of the support.
+        solved: Values of the solved variables, in the mean over the draws, shape (labels, variables).
+        log_size: Logarithm of the density of those values over that of the features, shape (labels,).
+    """
+
+    log: Reals
+    error: Reals
+    solved: Reals
+    log_size: Reals
 
 
 @dataclass(eq=False)
@@ -80,7 +91,7 @@ class GroupDensity:
         """Sort the group's constraints by what their expressions hang on."""
         compared = [each for each in self.group.constraints if isinstance(each, Comparison)]
         self._roots = {
-            id(each): _turned(each.expression) if each.property in _ANGLES else each.expression for each in compared
+            id(each): _turned(each.expression) if each.property in ANGLES else each.expression for each in compared
         }
         self.fixed = tuple(each for each in compared if not leaves(each.expression))
         self._continuous = tuple(each for each in compared if any(map(_is_continuous, leaves(each.expression))))
@@ -94,36 +105,51 @@ class GroupDensity:
         """Whether the group counts nothing."""
         return not self._continuous and not self._finite
 
-    def log_densities(self, labels: Sequence[Observed]) -> tuple[Reals, Reals]:
-        """Logarithms of the densities and their standard errors, shape (labels,); -inf outside of the support.
+    def finite_values(self, label: Observed) -> Iterator[Value]:
+        """What a label observes of the features that hang on finite choices alone."""
+        return (label[each.object, each.property] for each in self._finite)
+
+    def values(self, labels: Sequence[Observed]) -> GroupValues:
+        """Densities of labels, of which there is one at least.
 
         Raises:
             UncomputedError: There is no density, or none that can be computed.
         """
         parts = [self._of_some(labels[start : start + _CHUNK]) for start in range(0, len(labels), _CHUNK)]
-        return np.concatenate([first for first, _ in parts]), np.concatenate([second for _, second in parts])
+        return GroupValues(*map(np.concatenate, zip(*parts, strict=True)))
 
-    def _of_some(self, labels: Sequence[Observed]) -> tuple[Reals, Reals]:
-        columns = _Columns(labels)
+    def _of_some(self, labels: Sequence[Observed]) -> GroupValues:
+        columns = ObservedColumns(labels)
         if not self._pivots and self._continuous:
             self._pivots = self._choose(columns)
         dimension = sum(2 if isinstance(leaf, PointIn) else 1 for leaf in self._pivots)
-        total = np.zeros((1, 1))
+        total, size_sum, sums = np.zeros((1, 1)), np.zeros(len(labels)), np.zeros((len(labels), dimension))
         for turns in itertools.product((-math.tau, 0.0, math.tau), repeat=self._angles()):
-            total = total + self._weights(columns, dimension, turns)
+            weight, values, size = self._weights(columns, dimension, turns)
+            total = total + weight
+            size_sum += _row_means(np.where(weight > 0, weight * size, 0.0), len(labels))
+            for place, value in enumerate(values):
+                sums[:, place] += _row_means(np.where(weight > 0, weight * value, 0.0), len(labels))
         total = np.broadcast_to(total, (len(labels), total.shape[1]))
         means = total.mean(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             errors = total.std(axis=1) / math.sqrt(total.shape[1]) / means
-            return np.log(means), np.where(means > 0, errors, 0.0)
+            log = np.log(means)
+            return GroupValues(log, np.where(means > 0, errors, 0.0), sums / means[:, None], np.log(size_sum) - log)
 
     def _angles(self) -> int:
-        return sum(each.property in _ANGLES for each in self._continuous)
+        return sum(each.property in ANGLES for each in self._continuous)
 
-    def _weights(self, columns: _Columns, dimension: int, turns: tuple[float, ...]) -> Array:
-        """What is averaged, for headings that are whole turns off: shape broadcastable to (labels, draws)."""
+    def _weights(
+        self, columns: ObservedColumns, dimension: int, turns: tuple[float, ...]
+    ) -> tuple[Array, Sequence[Array], Array]:
+        """What is averaged, for headings that are whole turns off, the solved variables, and their determinant.
+
+        Shapes are broadcastable to (labels, draws).
+        """
         solved: dict[Identity, Data] = {}
-        density: Array = np.ones((1, 1))
+        values: Sequence[Array] = ()
+        density, size = np.ones((1, 1)), np.ones((1, 1))
         if self._continuous:
             base, matrix = self._affine(columns, dimension)
             off = columns.targets(self._continuous)
@@ -138,7 +164,7 @@ class GroupDensity:
             solved = self._assign(values)
             with np.errstate(all="ignore"):
                 density = np.where(size > 0, 1 / size, 0.0)
-        return density * self._chances(columns, solved)
+        return density * self._chances(columns, solved), values, size
 
     def _assign(self, values: Sequence[Array]) -> dict[Identity, Data]:
         found: dict[Identity, Data] = {}
@@ -147,7 +173,7 @@ class GroupDensity:
             found[leaf.identity] = (next(left), next(left)) if isinstance(leaf, PointIn) else next(left)
         return found
 
-    def _chances(self, columns: _Columns, solved: Mapping[Identity, Data]) -> Array:
+    def _chances(self, columns: ObservedColumns, solved: Mapping[Identity, Data]) -> Array:
         """Densities of the solved variables at their values, where all that must hold does."""
         density: list[Array] = [np.ones((1, 1))]
         whole = {leaf.identity: self._whole(leaf) for leaf in self._pivots}
@@ -196,7 +222,7 @@ class GroupDensity:
         total = sum(index.weights)
         return tuple((weight / total, option) for weight, option in zip(index.weights, choice.options, strict=True))
 
-    def _affine(self, columns: _Columns, dimension: int) -> tuple[list[Array], list[list[Array]]]:
+    def _affine(self, columns: ObservedColumns, dimension: int) -> tuple[list[Array], list[list[Array]]]:
         """The features where all solved variables are 0, and by how much they change with each."""
         base = self._at(columns, [np.zeros((1, 1))] * dimension)
         matrix: list[list[Array]] = []
@@ -206,7 +232,9 @@ class GroupDensity:
             matrix.append([high - low for high, low in zip(moved, base, strict=True)])
         return base, matrix
 
-    def _at(self, columns: _Columns, values: Sequence[Array], pivots: Sequence[Leaf] | None = None) -> list[Array]:
+    def _at(
+        self, columns: ObservedColumns, values: Sequence[Array], pivots: Sequence[Leaf] | None = None
+    ) -> list[Array]:
         """The coordinates of the features where solved variables have some values."""
         known = self._assign(values) if pivots is None else _assigned(pivots, values)
 
@@ -216,7 +244,7 @@ class GroupDensity:
         roots = tuple(self._roots[id(each)] for each in self._continuous)
         return _coordinates(evaluate_arrays(_without_regions(roots, known), draw, columns.values, self.draws.count))
 
-    def _choose(self, columns: _Columns) -> tuple[Leaf, ...]:
+    def _choose(self, columns: ObservedColumns) -> tuple[Leaf, ...]:
         """Variables to solve for: as many as the features have coordinates, which must be affine in them."""
         sizes = [2 if columns.is_pair(each) else 1 for each in self._continuous]
         wanted = sum(sizes)
@@ -236,7 +264,7 @@ class GroupDensity:
     def _roots_of_continuous(self) -> tuple[Node, ...]:
         return tuple(self._roots[id(each)] for each in self._continuous)
 
-    def _is_affine(self, columns: _Columns, chosen: Sequence[Leaf], wanted: int) -> bool:
+    def _is_affine(self, columns: ObservedColumns, chosen: Sequence[Leaf], wanted: int) -> bool:
         few = columns.first(8)
         rng = np.random.default_rng(1)
         one, other = ([np.full((1, 1), value) for value in rng.uniform(-1, 1, wanted)] for _ in range(2))
@@ -254,6 +282,10 @@ class GroupDensity:
             columns_.append([x - y for x, y in zip(self._at(few, unit, chosen), base, strict=True)])
         _, size = _solve(columns_, [np.zeros((1, 1))] * wanted)
         return bool(np.any(size > _AFFINE))
+
+
+def _row_means(values: Array, rows: int) -> Reals:
+    return np.broadcast_to(values, (rows, values.shape[1])).mean(axis=1)
 
 
 def _is_continuous(leaf: Leaf) -> bool:
@@ -341,55 +373,3 @@ def _solve(matrix: Sequence[Sequence[Array]], rest: Sequence[Array]) -> tuple[li
     full[size <= 1e-12] = np.eye(count)
     found = np.linalg.solve(full, np.nan_to_num(right))[..., 0]
     return [found[..., number] for number in range(count)], np.where(size > 1e-12, size, 0.0)
-
-
-class _Columns:
-    """What labels observe, as arrays of shape (labels, 1)."""
-
-    def __init__(self, labels: Sequence[Observed]) -> None:
-        self._labels = labels
-        self.values: dict[tuple[int, str], Data] = {}
-        for key in labels[0] if labels else ():
-            self.values[key] = _column([label[key] for label in labels])
-
-    def first(self, count: int) -> _Columns:
-        """The first labels."""
-        return _Columns(self._labels[:count])
-
-    def is_pair(self, each: Comparison) -> bool:
-        """Whether a feature is a vector."""
-        return isinstance(self.values[each.object, each.property], tuple)
-
-    def targets(self, compared: Sequence[Comparison]) -> Iterator[tuple[Array, bool]]:
-        """The coordinates of features, and whether each is an angle."""
-        for each in compared:
-            value = self.values[each.object, each.property]
-            if isinstance(value, tuple):
-                yield from ((axis, False) for axis in value)
-            elif isinstance(value, np.ndarray):
-                yield value, each.property in _ANGLES
-            else:
-                raise UncomputedError(f"`{each.property}` is no number")
-
-    def holds(self, each: Comparison, value: Data) -> Array:
-        """Where a feature that hangs on finite choices has the label's value."""
-        own = self.values[each.object, each.property]
-        if isinstance(own, tuple) and isinstance(value, tuple):
-            return np.hypot(own[0] - value[0], own[1] - value[1]) <= _SLACK
-        if isinstance(own, Coded) and isinstance(value, Coded):
-            return np.array([[one == other for other in value.options] for one in own.options])[own.which, value.which]
-        if isinstance(own, np.ndarray) and isinstance(value, np.ndarray):
-            off = np.abs(own - value)
-            if each.property in _ANGLES:
-                off = np.abs(np.mod(own - value + math.pi, math.tau) - math.pi)
-            return off <= _SLACK
-        raise UncomputedError(f"`{each.property}` is no number")
-
-
-def _column(values: list[Value]) -> Data:
-    if all(isinstance(value, tuple) for value in values):
-        pairs = np.array(values, dtype=np.float64)
-        return pairs[:, :1], pairs[:, 1:]
-    if all(isinstance(value, bool | int | float) for value in values):
-        return np.array(values, dtype=np.float64)[:, None]
-    return Coded(np.arange(len(values))[:, None], tuple(values))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.annotations import Annotations, Frames, read_annotations
 from scenicq.evaluate.assignment import Centres, Pairs, assign, find_pairs
-from scenicq.evaluate.precision import Errors, box_errors
+from scenicq.evaluate.ego_poses import EgoPoses
+from scenicq.evaluate.precision import ERRORS, Errors, box_errors
+from scenicq.evaluate.region_of_interest import RegionOfInterest
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions, Protocol
 from scenicq.store.classes import is_class
 from scenicq.store.dataset import Dataset
@@ -47,7 +49,9 @@ class Detection:
         prediction_class: The same for predictions, shape (predictions,).
         frame: Number of the dataset's frame of each prediction.
         owner: For each centre distance the label object of each prediction, -1 without.
-        errors: Of the predictions that are label objects within `ERRORS_AT_M`, nan for others; shape (predictions, 4).
+        errors: Of the predictions that are label objects within `ERRORS_AT_M`, nan for others; shape (predictions, 5).
+        flat: Whether distances are those in the plane although the benchmark takes those in space, since the dataset
+            does not know all heights.
         distance: Of each label object from the ego, metres.
         score: For each centre distance the score with which each label object was found, -inf where it was not.
     """
@@ -62,6 +66,7 @@ class Detection:
     frame: Numbers
     owner: Mapping[float, NDArray[np.int64]]
     errors: Reals
+    flat: bool
     distance: Reals
     score: Mapping[float, Reals]
 
@@ -79,7 +84,7 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
             predictions that the dataset's classes do not have.
     """
     protocol = predictions.protocol
-    frames, objects = read_annotations(dataset, protocol.points)
+    frames, objects = read_annotations(dataset, protocol.points, protocol.attributes)
     places = _places(dataset, frames, predictions, missing)
     covered = np.zeros(len(frames.names), dtype=np.bool_)
     covered[places[places >= 0]] = True
@@ -88,25 +93,32 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
     frame = places[predictions.frame] if len(predictions.frame) else np.zeros(0, dtype=np.int32)
     known = frame >= 0
     predictions, frame = _taken(predictions, known), frame[known]
-    origin = _origins(dataset, frames)
-    if predictions.of_ego:
-        predictions = _on_map(predictions, frame, frames, origin)
+    poses = EgoPoses(dataset, frames)
+    of_ego = predictions.of_ego
+    if of_ego:
+        predictions = _on_map(predictions, frame, frames, poses)
+    spatial = protocol.spatial and _in_space(predictions, objects, frames)
     _check_frame_of_reference(predictions, frame, frames)
     classes, object_class, prediction_class = _classes(objects, predictions)
     object_class = np.where(covered[objects.frame], object_class, -1).astype(np.int32)
     keep = np.ones(len(frame), dtype=np.bool_)
     racks = _Racks(objects, protocol, classes)
-    object_class[~_in_range(objects.x, objects.y, objects.frame, object_class, origin, protocol, classes)] = -1
+    limits = np.array([*(protocol.ranges_m.get(name, protocol.range_m) for name in classes), math.inf])
+    object_class[poses.away(objects, objects.frame, spatial=spatial) >= limits[object_class]] = -1
     object_class[_without_points(objects)] = -1
     object_class[racks.hold(objects.x, objects.y, objects.frame, object_class)] = -1
     keep &= prediction_class >= 0
-    keep &= _in_range(predictions.x, predictions.y, frame, prediction_class, origin, protocol, classes)
+    keep &= poses.away(predictions, frame, spatial=spatial) < limits[prediction_class]
     keep &= ~racks.hold(predictions.x, predictions.y, frame, prediction_class)
     order = np.flatnonzero(keep)
     order = order[_by_score(predictions.score[order], last_first=protocol.last_first)]
     order = order[_first_of_each(frame[order], prediction_class[order], protocol)]
+    if math.isfinite(protocol.roi_m):
+        roi = RegionOfInterest(dataset, frames, protocol.roi_m)
+        object_class[~roi.holds(objects, objects.frame)] = -1
+        order = order[roi.holds(_taken(predictions, order), frame[order])]
     predictions, frame, prediction_class = _taken(predictions, order), frame[order], prediction_class[order]
-    pairs = _pairs(predictions, frame, prediction_class, objects, object_class, protocol)
+    pairs = _pairs(predictions, frame, prediction_class, objects, object_class, spatial=spatial)
     rank = np.arange(len(frame))
     owner = {
         threshold: assign(pairs, rank, len(objects.frame), threshold, nearest_only=protocol.nearest_only)
@@ -127,15 +139,38 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
         prediction_class=prediction_class,
         frame=frame,
         owner=owner,
-        errors=_errors(predictions, objects, owner[ERRORS_AT_M], turned[prediction_class], hull=protocol.hull),
+        errors=_errors(
+            predictions,
+            objects,
+            owner[ERRORS_AT_M],
+            turned[prediction_class],
+            frame,
+            poses if of_ego else None,
+            spatial=spatial,
+        ),
+        flat=protocol.spatial and not spatial,
         distance=np.hypot(objects.x - frames.ego_x[objects.frame], objects.y - frames.ego_y[objects.frame]),
         score=score,
     )
 
 
 def _taken(predictions: Predictions, which: NDArray[np.bool_] | NDArray[np.int64]) -> Predictions:
-    names = ("frame", "category", "x", "y", "heading", "width", "length", "height", "vx", "vy", "score")
-    return replace(predictions, **{name: getattr(predictions, name)[which] for name in names})
+    columns = (
+        "frame",
+        "category",
+        "x",
+        "y",
+        "z",
+        "heading",
+        "width",
+        "length",
+        "height",
+        "vx",
+        "vy",
+        "score",
+        "attribute",
+    )
+    return replace(predictions, **{name: getattr(predictions, name)[which] for name in columns})
 
 
 def _places(dataset: Dataset, frames: Frames, predictions: Predictions, missing: Missing) -> Numbers:
@@ -174,32 +209,22 @@ def _places(dataset: Dataset, frames: Frames, predictions: Predictions, missing:
     return places
 
 
-def _origins(dataset: Dataset, frames: Frames) -> tuple[Reals, Reals]:
-    """Where the source has the ego: its rear axle where the dataset says how far that is."""
-    facts = cast("Mapping[str, object]", dataset.manifest.provenance.get("facts") or {})
-    behind = facts.get("ego_centre_ahead_of_rear_axle_m", 0.0)
-    behind = float(behind) if isinstance(behind, int | float) else 0.0
-    heading = np.nan_to_num(frames.ego_heading)
-    return frames.ego_x + behind * np.sin(heading), frames.ego_y - behind * np.cos(heading)
-
-
-def _on_map(predictions: Predictions, frame: Numbers, frames: Frames, origin: tuple[Reals, Reals]) -> Predictions:
+def _on_map(predictions: Predictions, frame: Numbers, frames: Frames, poses: EgoPoses) -> Predictions:
     """Boxes of the ego's frame in that of the map."""
     heading = frames.ego_heading[frame]
     if np.isnan(heading).any():
         number = int(frame[int(np.argmax(np.isnan(heading)))])
         message = f"{predictions.name}: boxes lie in the ego's frame, and the ego of {frames.names[number]} has none"
         raise DataError(Diagnostic("predictions-frame", message))
-    ahead, left = predictions.x, predictions.y
-    # heading 0 is +y: ahead is (-sin, cos), left is (-cos, -sin)
-    sine, cosine = np.sin(heading), np.cos(heading)
-    return replace(
-        predictions,
-        x=origin[0][frame] - sine * ahead - cosine * left,
-        y=origin[1][frame] + cosine * ahead - sine * left,
-        heading=heading + predictions.heading,
-        of_ego=False,
-    )
+    x, y, z = poses.on_map(frame, predictions.x, predictions.y, np.nan_to_num(predictions.z))
+    z[np.isnan(predictions.z) | np.isnan(frames.ego_z[frame])] = np.nan
+    return replace(predictions, x=x, y=y, z=z, heading=poses.heading_on_map(frame, predictions.heading), of_ego=False)
+
+
+def _in_space(predictions: Predictions, objects: Annotations, frames: Frames) -> bool:
+    """Whether all heights are known."""
+    columns = (predictions.z, objects.z, frames.ego_z, frames.ego_pitch, frames.ego_roll)
+    return all(bool(np.isfinite(values).all()) for values in columns)
 
 
 def _check_frame_of_reference(predictions: Predictions, frame: Numbers, frames: Frames) -> None:
@@ -245,14 +270,6 @@ def _classes(objects: Annotations, predictions: Predictions) -> tuple[list[str],
     object_class = of_objects[objects.source_category] if len(of_objects) else np.zeros(0, dtype=np.int32)
     prediction_class = np.array([*of_predictions, -1], dtype=np.int32)[predictions.category]
     return known, object_class, prediction_class
-
-
-def _in_range(
-    x: Reals, y: Reals, frame: Numbers, category: Numbers, origin: tuple[Reals, Reals], protocol: Protocol,
-    classes: list[str],
-) -> Bools:  # fmt: skip
-    ranges = np.array([*(protocol.ranges_m.get(name, protocol.range_m) for name in classes), math.inf])
-    return np.hypot(x - origin[0][frame], y - origin[1][frame]) < ranges[category]
 
 
 def _without_points(objects: Annotations) -> Bools:
@@ -312,36 +329,53 @@ def _first_of_each(frame: Numbers, category: Numbers, protocol: Protocol) -> NDA
 
 def _pairs(
     predictions: Predictions, frame: Numbers, category: Numbers, objects: Annotations, object_class: Numbers,
-    protocol: Protocol,
+    *, spatial: bool,
 ) -> Pairs:  # fmt: skip
     counted = np.flatnonzero(object_class >= 0)
+
     found = find_pairs(
-        Centres(frame, category, predictions.x, predictions.y),
-        Centres(objects.frame[counted], object_class[counted], objects.x[counted], objects.y[counted]),
+        Centres(frame, category, predictions.x, predictions.y, predictions.z if spatial else None),
+        Centres(
+            objects.frame[counted],
+            object_class[counted],
+            objects.x[counted],
+            objects.y[counted],
+            objects.z[counted] if spatial else None,
+        ),
         max(THRESHOLDS_M),
-        nearest_only=protocol.nearest_only,
+        nearest_only=predictions.protocol.nearest_only,
     )
     return replace(found, object=counted[found.object])
 
 
 def _errors(
-    predictions: Predictions, objects: Annotations, owner: NDArray[np.int64], half_turn: Bools, *, hull: bool
-) -> Reals:
-    errors = np.full((len(owner), 4), np.nan)
+    predictions: Predictions, objects: Annotations, owner: NDArray[np.int64], half_turn: Bools, frame: Numbers,
+    seen_from: EgoPoses | None, *, spatial: bool,
+) -> Reals:  # fmt: skip
+    """The errors of predictions that are label objects; headings are compared in the ego's frame, where it is given."""
+    errors = np.full((len(owner), len(ERRORS)), np.nan)
     mine = np.flatnonzero(owner >= 0)
     its = owner[mine]
 
     def sizes(of: Predictions | Annotations, which: NDArray[np.int64]) -> Reals:
         return np.column_stack((of.width[which], of.length[which], of.height[which]))
 
+    headings = predictions.heading[mine], objects.heading[its]
+    if seen_from is not None:
+        headings = tuple(seen_from.heading_seen(frame[mine], each) for each in headings)
+    numbers = {name: number for number, name in enumerate(objects.attributes)}
+    same = np.array([*(numbers.get(name, -2) for name in predictions.attributes), -2], dtype=np.int32)
+    wanted = objects.attribute[its]
     compared = Errors(
         dx=predictions.x[mine] - objects.x[its],
         dy=predictions.y[mine] - objects.y[its],
+        dz=predictions.z[mine] - objects.z[its] if spatial else np.zeros(len(mine)),
         sizes=sizes(predictions, mine),
         other_sizes=sizes(objects, its),
-        turn=predictions.heading[mine] - objects.heading[its],
+        turn=headings[0] - headings[1],
         dvx=predictions.vx[mine] - objects.vx[its],
         dvy=predictions.vy[mine] - objects.vy[its],
+        attribute=np.where(wanted < 0, np.nan, same[predictions.attribute[mine]] != wanted),
     )
-    errors[mine] = box_errors(compared, half_turn[mine], hull=hull)
+    errors[mine] = box_errors(compared, half_turn[mine], hull=predictions.protocol.hull)
     return errors

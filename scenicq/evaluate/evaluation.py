@@ -22,15 +22,18 @@ from scenicq.evaluate.matched import Matched, read_matched
 from scenicq.evaluate.resampling import holm, resamples
 from scenicq.evaluate.simulation import Simulated, read_simulated, verdict
 from scenicq.evaluate.slices import Slice, slices
+from scenicq.evaluate.weighting import Weighted, weighted
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
 from scenicq.query.execution.result_files import read_records
+from scenicq.query.execution.result_origin import ORIGIN, check_origins, name_origin
 from scenicq.query.execution.results import Result, record
 from scenicq.store.dataset import Dataset
 
 __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
 
 Bools = NDArray[np.bool_]
+Reals = NDArray[np.float64]
 
 Results: TypeAlias = Path | str | Iterable[Result | Mapping[str, Any]]
 """A file of results, results as a query gives them, or records of them."""
@@ -65,6 +68,8 @@ class ScenarioEvaluation:
         roles: How often the objects of each role are missed, against others of their classes that are alike in
             distance and visibility.
         all_objects: The same of all objects of frames that match, against those of the other frames.
+        weighted: How often the objects of each role (all objects without roles) are missed where frames are spread as
+            the program spreads its scenes; empty where the results are not ranked.
         classes: Figures of each class, on frames that match and on the others.
         slices: Shares missed by what objects and frames are like.
         worst: Frames that match, the worst first.
@@ -78,6 +83,7 @@ class ScenarioEvaluation:
     other: int
     roles: tuple[Comparison, ...]
     all_objects: Comparison
+    weighted: tuple[Weighted, ...]
     classes: tuple[ClassFigures, ...]
     slices: tuple[Slice, ...]
     worst: tuple[WorstFrame, ...]
@@ -96,6 +102,7 @@ class Evaluation:
     """A model judged on the frames of scenarios.
 
     Attributes:
+        dataset: The dataset and its version, as `name_origin` says it.
         predictions: Name of the file.
         distance_m: Centre distance within which an object counts as found.
         least_score: Score from which a prediction counts, but for average precision.
@@ -104,6 +111,7 @@ class Evaluation:
         detection: Labels and predictions, for pictures.
     """
 
+    dataset: str
     predictions: str
     distance_m: float
     least_score: float
@@ -150,8 +158,9 @@ def evaluate(
     detection = detect(dataset, predictions, missing)
     rng = np.random.default_rng(seed)
     judge = _Judge(detection, distance_m, least_score, rng)
-    found = [judge.scenario(read_matched(name, _records(each), detection.frames, detection.objects))
-             for name, each in named.items()]  # fmt: skip
+    doubts: list[Diagnostic] = []
+    found = [judge.scenario(read_matched(name, _own(name, _records(each), dataset, doubts), detection.frames,
+                                         detection.objects)) for name, each in named.items()]  # fmt: skip
     found = _corrected(found)
     if runs is not None:
         missing_runs = [each.name for each in found if each.name not in runs]
@@ -160,7 +169,15 @@ def evaluate(
             hint = f"it has {', '.join(sorted(runs))}; a scenario is called after its file of results"
             raise DataError(Diagnostic("file-invalid", message, hints=(hint,)))
         found = [replace(each, simulated=verdict(runs[each.name], _decisive(each))) for each in found]
-    return Evaluation(predictions.name, distance_m, least_score, tuple(found), tuple(_warnings(found)), detection)
+    return Evaluation(
+        name_origin(dataset),
+        predictions.name,
+        distance_m,
+        least_score,
+        tuple(found),
+        (*doubts, *_warnings(found, detection)),
+        detection,
+    )
 
 
 def _name_of(results: Results) -> str:
@@ -173,6 +190,20 @@ def _records(results: Results) -> Iterator[Mapping[str, Any]]:
     else:
         for each in results:
             yield record(each) if isinstance(each, Result) else each
+
+
+def _own(
+    name: str, records: Iterable[Mapping[str, Any]], dataset: Dataset, doubts: list[Diagnostic]
+) -> Iterator[Mapping[str, Any]]:
+    """The records, once it is sure that they do not name another dataset; another version of it is a doubt."""
+    mine = {ORIGIN: name_origin(dataset)}
+    seen: set[Any] = set()
+    for each in records:
+        if each.get(ORIGIN) not in seen:
+            seen.add(each.get(ORIGIN))
+            doubt = check_origins((f"{name} (results)", [each]), (dataset.name, [mine]))
+            doubts += [] if doubt is None else [doubt]
+        yield each
 
 
 def _decisive(scenario: ScenarioEvaluation) -> Comparison:
@@ -190,7 +221,13 @@ def _corrected(found: list[ScenarioEvaluation]) -> list[ScenarioEvaluation]:
     return done
 
 
-def _warnings(found: Iterable[ScenarioEvaluation]) -> Iterator[Diagnostic]:
+def _warnings(found: Iterable[ScenarioEvaluation], detection: Detection) -> Iterator[Diagnostic]:
+    if detection.flat:
+        message = (
+            "the benchmark takes distances in space, and the dataset does not know all heights: the plane is taken"
+        )
+        hint = "a dataset that was made before heights were kept gets them when its source is ingested again"
+        yield Diagnostic("heights-unknown", message, severity="warning", hints=(hint,))
     for one in found:
         for each in one.headline:
             if each.share.of and each.few:
@@ -229,11 +266,13 @@ class _Judge:
         here, there = self._counted & matching[frame], self._counted & other[frame]
         in_roles = np.zeros(len(frame), dtype=np.bool_)
         roles: list[Comparison] = []
+        asked: list[tuple[str, Bools]] = []
         for role in matched.roles:
             mine = np.zeros(len(frame), dtype=np.bool_)
             mine[role.objects] = True
             mine &= here
             in_roles |= mine
+            asked.append((f"role {role.name}", mine))
             others = (here | there) & ~mine & self._of_classes(mine)
             roles.append(self._compare(f"role {role.name}", mine, others, self._alike))
         of_all = self._compare("all objects", here, there, self._class)
@@ -245,6 +284,7 @@ class _Judge:
             other=int(other.sum()),
             roles=tuple(roles),
             all_objects=of_all,
+            weighted=tuple(self._weighted(matched.log_weight, asked or [("all objects", here)])),
             classes=tuple(
                 figures
                 for group, frames in (("matching", matching), ("other", other))
@@ -256,6 +296,13 @@ class _Judge:
             missed=self._missed,
             mine=mine,
         )
+
+    def _weighted(self, log_weight: Reals | None, asked: Iterable[tuple[str, Bools]]) -> Iterator[Weighted]:
+        if log_weight is not None:
+            for about, mine in asked:
+                numbers = np.flatnonzero(mine)
+                of_frame = log_weight[self._detection.objects.frame[numbers]]
+                yield weighted(about, self._missed[numbers], of_frame, self._recording[numbers], self._weights)
 
     def _of_classes(self, mine: Bools) -> Bools:
         return np.isin(self._class, np.unique(self._class[mine]))

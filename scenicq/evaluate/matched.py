@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,8 @@ __all__ = ["Matched", "Played", "read_matched"]
 Bools = NDArray[np.bool_]
 
 _EGO = "ego"
+_LARGEST = 700.0
+"""Logarithm of the largest weight that a float can hold, about."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +45,8 @@ class Matched:
         decided: Frames that match or do not; the others are unknown.
         roles: In the order of their first match; what the recording vehicle plays is left out.
         witness: The values of the random variables by frame, of its first match.
+        log_weight: How much each frame counts where frames are to be spread as the program spreads its scenes, nan
+            where the results do not say, shape (frames,); None where they say it of none.
     """
 
     name: str
@@ -49,6 +54,7 @@ class Matched:
     decided: Bools
     roles: tuple[Played, ...]
     witness: Mapping[int, Mapping[str, Any]]
+    log_weight: NDArray[np.float64] | None = None
 
 
 def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames, objects: Annotations) -> Matched:
@@ -70,6 +76,8 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
     starts = np.searchsorted(objects.frame, np.arange(len(frames.names) + 1))
     played: dict[str, dict[int, None]] = {}
     witness: dict[int, Mapping[str, Any]] = {}
+    log_weight = np.full(len(frames.names), np.nan)
+    ranked = False
     recordings = {recording: number for number, recording in enumerate(frames.recordings)}
     for each in records:
         verdict = each.get("verdict")
@@ -81,6 +89,9 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
             continue
         matching[where] = True
         known = _known(each, "witness")
+        if "log_weight" in each:
+            ranked = True
+            log_weight[where] = _log_weight(name, each["log_weight"])
         names = objects.ids if "frame" in each else objects.tracks
         cast = {role: its for role, its in _known(each, "correspondence").items() if its != _EGO}
         for frame in where:
@@ -100,7 +111,19 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
         decided=matching | ~unknown,
         roles=tuple(Played(role, np.array(sorted(numbers), dtype=np.int64)) for role, numbers in played.items()),
         witness=witness,
+        log_weight=log_weight if ranked else None,
     )
+
+
+def _log_weight(name: str, told: Any) -> float:
+    """A weight that results say; text where they are CSV, nan where it is not known."""
+    try:
+        value = math.nan if told in (None, "") else float(told)
+    except (TypeError, ValueError):
+        value = math.inf
+    if abs(value) > _LARGEST:
+        raise DataError(Diagnostic("file-invalid", f"results of {name}: {told!r} is no `log_weight`"))
+    return value
 
 
 def _known(each: Mapping[str, Any], name: str) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from scenicq.evaluate.detection import Detection
 from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation, WorstFrame
 from scenicq.evaluate.rows import tables
 from scenicq.geometry.boxes import corners
+from scenicq.geometry.camera import box_corners
 from scenicq.report.backdrop import Backdrop
+from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
 from scenicq.report.frames import table, when
 from scenicq.report.page import page
 from scenicq.report.picture import View, ground, plane_of
@@ -28,9 +31,14 @@ SHOWN = 30
 """Frames of each scenario that are shown as pictures."""
 
 _NEAREST, _FARTHEST = 25.0, 60.0
+_IMAGE = (720, 450)
+"""Pixels of a camera's image at most: enough to see boxes on it."""
+_FAR_M = 100.0
+"""Boxes farther away than this are not drawn over the image of a camera."""
 _SIGNS = (
     "Pictures: label objects are green where they were found, red where they were missed, dotted where they do not "
-    "count; those in question have thick lines; predictions are dashed."
+    "count; those in question have thick lines; predictions are dashed. Over images of cameras the same "
+    "boxes are drawn where the dataset knows the calibration and the heights of the boxes."
 )
 
 
@@ -50,7 +58,8 @@ def write_pages(evaluation: Evaluation, dataset: Dataset, folder: Path, sensors:
         DataError: target-exists, or target-unwritable.
     """
     with new_report(folder) as work:
-        files = SensorFiles(roots_of(dataset, sensors), folder, work, can_make_thumbnails(), inside=True)
+        roots = roots_of(dataset, sensors)
+        files = SensorFiles(roots, folder, work, can_make_thumbnails(), inside=True, size=_IMAGE)
         text = _Pages(evaluation, dataset, files).text()
         (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
     return folder / "index.html"
@@ -83,6 +92,7 @@ class _Pages:
     def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
         counts = f"{each.matching:,} frames match, {each.other:,} do not"
         sentences = [element("p", element("b", escape(role.sentence))) for role in each.headline]
+        sentences += [element("p", escape(one.sentence)) for one in each.weighted]
         if each.simulated is not None:
             sentences.append(element("p", escape(each.simulated.sentence)))
         parts = [element("h2", escape(each.name)), element("p", escape(counts)), *sentences]
@@ -111,19 +121,45 @@ class _Pages:
     def _frame(self, each: ScenarioEvaluation, one: WorstFrame) -> str:
         label = self._labels[one.frame]
         told = f"{one.recording}, {when(label.timestamp_us)}: {one.missed} of {one.of} missed, {one.false} false boxes"
+        boxes = list(self._boxes(each, label)) if label.cameras else []
         images = [
-            element("a", element("img", src=sensor.thumbnail, alt=sensor.channel), href=sensor.link)
+            element("li", element("a", camera_image(sensor, label.cameras.get(sensor.channel), boxes),
+                                  element("span", escape(sensor.channel)), href=sensor.link))
             for sensor in self._files.find(label.sensors)
             if sensor.thumbnail
-        ]
+        ]  # fmt: skip
         return element(
             "section",
             element("h3", escape(one.frame)),
             element("p", escape(told), class_="hint"),
             self._picture(each, label),
-            element("p", *images) if images else "",
+            element("ul", *images, class_="cameras wide", aria_label="Cameras") if images else "",
             id=self._anchor(each, one),
         )
+
+    def _kind(self, each: ScenarioEvaluation, number: int) -> str:
+        """Of a label object, for the style."""
+        counts = self._evaluation.detection.object_class[number] >= 0
+        kind = "missed" if each.missed[number] else "found" if counts else "uncounted"
+        return f"{kind} asked" if each.mine[number] else kind
+
+    def _boxes(self, each: ScenarioEvaluation, label: Label) -> Iterator[SpaceBox]:
+        """Label objects and predictions in space, those in question last."""
+        detection = self._evaluation.detection
+        frame = detection.frames.numbers[label.frame]
+        numbers = np.flatnonzero(detection.objects.frame == frame).tolist()
+        pairs = sorted(zip(numbers, label.objects, strict=True), key=lambda pair: bool(each.mine[pair[0]]))
+        for number, thing in pairs:
+            box = space_box(thing, self._kind(each, number), f"{thing.id}, {thing.category}")
+            if box is not None and detection.distance[number] < _FAR_M:
+                yield box
+        found = detection.predictions
+        for number, told in _shown(detection, frame, self._evaluation.least_score):
+            place = found.x[number], found.y[number], found.z[number]
+            size = found.width[number], found.length[number], found.height[number]
+            away = math.dist(place[:2], (label.ego.x, label.ego.y))
+            if np.isfinite((*place, *size)).all() and away < _FAR_M:
+                yield SpaceBox(box_corners(place, size, found.heading[number], 0.0, 0.0), "prediction", told)
 
     def _picture(self, each: ScenarioEvaluation, label: Label) -> str:
         if label.map not in self._backdrops:
@@ -137,9 +173,7 @@ class _Pages:
         left, top, width, _ = view.box(plane)
         boxes = [draw_object(label.ego, plane)] if label.has_ego else []
         for number, thing in zip(numbers.tolist(), label.objects, strict=True):
-            kind = "missed" if each.missed[number] else "found" if detection.object_class[number] >= 0 else "uncounted"
-            role = "asked" if each.mine[number] else ""
-            boxes.append(element("g", draw_object(thing, plane), class_=f"{kind} {role}".strip()))
+            boxes.append(element("g", draw_object(thing, plane), class_=self._kind(each, number)))
         return element(
             "svg",
             element("title", escape(label.frame)),
@@ -154,11 +188,19 @@ class _Pages:
         )
 
 
+def _shown(detection: Detection, frame: int, least: float) -> Iterator[tuple[int, str]]:
+    """The predictions of a frame that are shown, with what is said of them."""
+    found = detection.predictions
+    numbers: list[int] = np.flatnonzero((detection.frame == frame) & (found.score >= least)).tolist()
+    for number in numbers:
+        category = detection.classes[int(detection.prediction_class[number])]
+        yield number, f"predicted {category}, score {found.score[number]:.2f}"
+
+
 def _predictions(detection: Detection, frame: int, plane: Plane, least: float) -> Iterator[str]:
     found = detection.predictions
-    for number in np.flatnonzero((detection.frame == frame) & (found.score >= least)).tolist():
+    for number, told in _shown(detection, frame, least):
         outline = corners(found.x[number], found.y[number], found.heading[number], found.width[number],
                           found.length[number])  # fmt: skip
-        told = f"predicted {detection.classes[detection.prediction_class[number]]}, score {found.score[number]:.2f}"
         path = points_path(plane.to_picture(outline).tolist(), closed=True)
         yield element("g", element("title", escape(told)), element("path", d=path), class_="prediction")

@@ -16,8 +16,8 @@ __all__ = ["ERRORS", "Errors", "average_precision", "box_errors", "mean_errors",
 
 Reals = NDArray[np.float64]
 
-ERRORS = ("translation", "scale", "orientation", "velocity")
-"""Metres; 1 - intersection over union of aligned boxes; radians; metres per second."""
+ERRORS = ("translation", "scale", "orientation", "velocity", "attribute")
+"""Metres; 1 - intersection over union of aligned boxes; radians; metres per second; share of wrong attributes."""
 
 _NEAREST = 0.1
 """Precision and recall up to this do not count in the clipped definition."""
@@ -30,10 +30,11 @@ class Errors:
     """Two boxes each, label and prediction: what is compared. Arrays have shape (n,).
 
     Attributes:
-        dx, dy: Difference of the centres, metres.
+        dx, dy, dz: Difference of the centres, metres.
         sizes, other_sizes: Width, length and height of both, shape (n, 3); a height of nan is left out of the volume.
         turn: Difference of the headings, radians.
         dvx, dvy: Difference of the velocities, metres per second.
+        attribute: 1 where the attribute is another, 0 where it is the same, nan where the label has none.
     """
 
     dx: Reals
@@ -43,10 +44,12 @@ class Errors:
     turn: Reals
     dvx: Reals
     dvy: Reals
+    dz: Reals
+    attribute: Reals
 
 
 def box_errors(pairs: Errors, half_turn: NDArray[np.bool_], *, hull: bool = False) -> Reals:
-    """The errors of `ERRORS`, shape (n, 4); nan where something is unknown.
+    """The errors of `ERRORS`, shape (n, 5); nan where something is unknown.
 
     Args:
         pairs: What is compared.
@@ -62,7 +65,8 @@ def box_errors(pairs: Errors, half_turn: NDArray[np.bool_], *, hull: bool = Fals
     scale = 1 - common / union
     period = np.where(half_turn, math.pi, math.tau)
     turn = np.abs((pairs.turn + period / 2) % period - period / 2)
-    return np.column_stack((np.hypot(pairs.dx, pairs.dy), scale, turn, np.hypot(pairs.dvx, pairs.dvy)))
+    away = np.hypot(np.hypot(pairs.dx, pairs.dy), pairs.dz)
+    return np.column_stack((away, scale, turn, np.hypot(pairs.dvx, pairs.dvy), pairs.attribute))
 
 
 def average_precision(found: Reals, wrong: Reals, objects: Reals, *, clipped: bool) -> Reals:
@@ -94,12 +98,12 @@ def average_precision(found: Reals, wrong: Reals, objects: Reals, *, clipped: bo
 
 
 def mean_errors(score: Reals, is_found: NDArray[np.bool_], errors: Reals, objects: int, *, clipped: bool) -> Reals:
-    """The mean of each error over what was found, shape (4,).
+    """The mean of each error over what was found, shape (5,).
 
     Args:
         score: Of each prediction, falling, shape (n,).
         is_found: Whether each is a label object.
-        errors: Of those that are, shape (found, 4), nan where unknown.
+        errors: Of those that are, shape (found, 5), nan where unknown.
         objects: How many label objects there are.
         clipped: Whether means up to each recall are averaged over the recalls reached, from above 10 %.
     """

@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.evaluate.density import GroupDensity, Observed
+from scenicq.evaluate.density import GroupDensity
 from scenicq.evaluate.expression_arrays import UncomputedError
+from scenicq.evaluate.observed_columns import Observed
 from scenicq.evaluate.variables import Draws
+from scenicq.evaluate.weighting import log_weights
 from scenicq.forest.groups import PARAMS, Comparison
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
@@ -24,6 +26,8 @@ from scenicq.query.execution.run import Query
 from scenicq.store.labels import Label
 
 __all__ = ["densities", "log_densities", "rank_results", "sample_diverse", "sample_plain"]
+
+Reals = NDArray[np.float64]
 
 _DRAWS = 512
 
@@ -79,7 +83,9 @@ def _of_one_signature(
 ) -> list[LogDensity]:
     names = [thing.name for thing in scenario.objects]
     shared = Draws(draws, seed)
-    logs, errors = np.zeros(len(labels)), np.zeros(len(labels))
+    logs, errors, of_variables = np.zeros(len(labels)), np.zeros(len(labels)), np.zeros(len(labels))
+    solved: list[Reals] = []
+    finite: list[list[Value]] = [[] for _ in labels]
     fixed: list[str] = []
     counted = False
     for group in build_groups(scenario, signature, options):
@@ -89,19 +95,27 @@ def _of_one_signature(
             continue
         counted = True
         try:
-            log, error = each.log_densities(labels)
+            values = each.values(labels)
         except UncomputedError as why:
             return [LogDensity(None, fixed=tuple(fixed), reason=str(why))] * len(labels)
-        logs += log
-        errors = np.hypot(errors, error)
+        logs += values.log
+        of_variables += values.log + values.log_size
+        errors = np.hypot(errors, values.error)
+        solved.append(values.solved)
+        for number, label in enumerate(labels):
+            finite[number].extend(each.finite_values(label))
     if not counted:
         return [LogDensity(None, fixed=tuple(fixed), reason="every feature is fixed by an equality")] * len(labels)
     outside = "outside of what the program generates, by less than the tolerance"
+    inside = np.flatnonzero(np.isfinite(logs))
+    kinds = [tuple(finite[number]) for number in inside.tolist()]
+    weights = np.full(len(labels), math.nan)
+    weights[inside] = log_weights(of_variables[inside], np.hstack(solved)[inside], kinds, seed)
     return [
-        LogDensity(float(log), float(error), tuple(fixed))
+        LogDensity(float(log), float(error), tuple(fixed), log_weight=float(weight))
         if math.isfinite(log)
         else LogDensity(None, 0, tuple(fixed), outside)
-        for log, error in zip(logs, errors, strict=True)
+        for log, error, weight in zip(logs, errors, weights, strict=True)
     ]
 
 

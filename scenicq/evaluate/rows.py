@@ -11,6 +11,7 @@ from scenicq.evaluate.comparison import Comparison, Share, p_text
 from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation
 from scenicq.evaluate.precision import ERRORS
 from scenicq.evaluate.slices import Slice
+from scenicq.evaluate.weighting import Weighted
 
 __all__ = ["COLUMNS", "Table", "evaluation_record", "flat_rows", "tables"]
 
@@ -66,6 +67,18 @@ def _comparison(each: Comparison) -> dict[str, Any]:
     }
 
 
+def _weighted(each: Weighted) -> dict[str, Any]:
+    return {
+        "about": each.about,
+        "missed": _share(each.share),
+        "objects": each.objects,
+        "left_out": each.left_out,
+        "equal_objects": round(each.equal, 2),
+        "effective_recordings": round(each.recordings, 2),
+        "sentence": each.sentence,
+    }
+
+
 def _figures(each: ClassFigures) -> dict[str, Any]:
     measures = {"recall": each.recall, "precision": each.precision, "average_precision": each.average_precision}
     return {
@@ -90,6 +103,7 @@ def _slice(each: Slice) -> dict[str, Any]:
 def evaluation_record(evaluation: Evaluation) -> dict[str, Any]:
     """All figures as nested values, ready for JSON."""
     return {
+        "dataset": evaluation.dataset,
         "predictions": evaluation.predictions,
         "found_within_m": evaluation.distance_m,
         "least_score": evaluation.least_score,
@@ -105,6 +119,7 @@ def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
         "other_frames": each.other,
         "roles": [_comparison(role) for role in each.roles],
         "all_objects": _comparison(each.all_objects),
+        "weighted": [_weighted(one) for one in each.weighted],
         "classes": [_figures(figures) for figures in each.classes],
         "slices": [_slice(part) for part in each.slices],
         "worst_frames": [
@@ -127,6 +142,11 @@ def flat_rows(evaluation: Evaluation) -> Iterator[dict[str, Any]]:
             yield _row(
                 one.name, table, each.about, measure="missed", **_of(each.share), **_of_others(each.other),
                 p_value=each.p_value, p_corrected=each.p_corrected, recordings=each.effective,
+            )  # fmt: skip
+        for part in one.weighted:
+            yield _row(
+                one.name, "weighted", part.about, measure="missed", **{**_of(part.share), "objects": part.equal},
+                recordings=part.recordings,
             )  # fmt: skip
         for figures in one.classes:
             measures = {
@@ -184,7 +204,8 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
     ]
     classes = [each for each in scenario.classes if each.distance_m == distance_m]
     errors = {(each.category, each.group): each.errors for each in scenario.classes if each.errors}
-    heads = ("CLASS", "FRAMES", "OBJECTS", "RECALL", "PRECISION", "AP", *(name.upper() for name in ERRORS))
+    told = [name for name in ERRORS if any(name in each for each in errors.values())]
+    heads = ("CLASS", "FRAMES", "OBJECTS", "RECALL", "PRECISION", "AP", *(name.upper() for name in told))
     rows = [
         (
             each.category,
@@ -193,7 +214,7 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
             _percent(*each.recall),
             _percent(*each.precision),
             _percent(*each.average_precision),
-            *(_error(errors.get((each.category, each.group), {}).get(name)) for name in ERRORS),
+            *(_error(errors.get((each.category, each.group), {}).get(name)) for name in told),
         )
         for each in sorted(classes, key=lambda each: each.category)
     ]

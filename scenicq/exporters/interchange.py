@@ -10,6 +10,7 @@ from typing import Any
 from shapely.geometry import mapping
 
 from scenicq.errors import Diagnostic
+from scenicq.geometry.camera import Camera
 from scenicq.geometry.features import MapFeature
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label, LabelObject
@@ -69,8 +70,14 @@ def label_record(label: Label, objects: list[LabelObject]) -> dict[str, Any]:
     if label.params:
         line["params"] = dict(label.params)
     if label.sensors:
-        line["sensors"] = dict(label.sensors)
+        line["sensors"] = {
+            channel: _sensor(path, label.cameras.get(channel)) for channel, path in label.sensors.items()
+        }
     return line
+
+
+def _sensor(path: str, camera: Camera | None) -> str | dict[str, Any]:
+    return path if camera is None else {"path": path, **camera._asdict()}
 
 
 def _object(member: LabelObject, *, named: bool) -> dict[str, Any]:
@@ -81,6 +88,9 @@ def _object(member: LabelObject, *, named: bool) -> dict[str, Any]:
     for key in ("width", "length", "height", "velocity", "track"):
         if (value := getattr(member, key)) is not None:
             found[key] = value
+    if (space := member.out_of_plane) is not None:
+        known = {"z": space.z, "pitch": space.pitch, "roll": space.roll}
+        found |= {key: value for key, value in known.items() if value is not None}
     if member.attributes:
         found["attributes"] = dict(member.attributes)
     return found

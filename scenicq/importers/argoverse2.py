@@ -1,5 +1,7 @@
 """Argoverse 2 sensor logs in their official layout: `LOG/annotations.feather`, `LOG/map/log_map_archive_*.json`.
 
+Cameras are those of `calibration/`, where an image is there, without distortion: the images have none.
+
 Conventions of the source: boxes lie in the frame of the ego at their timestamp (x ahead, y left, origin in the middle
 of the rear axle), quaternions are w, x, y, z of either sign, times are nanoseconds. The ego has no box and nothing has
 a velocity: see `facts`.
@@ -8,13 +10,13 @@ a velocity: see `facts`.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenicq.importers.argoverse2_cameras import POSE, calibration_of, check_pose, nearest, views_of
 from scenicq.importers.argoverse2_map import read_archive
 from scenicq.importers.base import ClassNames, Options, Source, read_maps
 from scenicq.importers.by_file import Place, by_file_source, missing, take_map
@@ -25,7 +27,7 @@ from scenicq.importers.layouts import ARGOVERSE2_FILES, argoverse2_logs
 from scenicq.importers.motion import Rigid, quaternion, velocities
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy
-from scenicq.store.labels import Label, LabelObject
+from scenicq.store.labels import Label, LabelObject, OutOfPlane
 
 __all__ = ["Argoverse2", "archive_of"]
 
@@ -36,13 +38,11 @@ _AXLE_TO_CENTRE_M = 1.42
 """How far the centre of the ego's box lies ahead of its rear axle."""
 
 _REACH_US, _LONGEST_STEP_US = 250_000, 550_000
-_FARTHEST_M = 1e7
 _BOXES, _POSES = ARGOVERSE2_FILES
 _FRAMES = 156
 _EGO_CLASS = "EGO_VEHICLE"
-_POSE = {"qw": "real", "qx": "real", "qy": "real", "qz": "real", "tx_m": "real", "ty_m": "real", "tz_m": "real"}
 _SIZE = ("width_m", "length_m", "height_m")
-_BOX = {"timestamp_ns": "integer", "track_uuid": "text", "category": "text", **dict.fromkeys(_SIZE, "real"), **_POSE}
+_BOX = {"timestamp_ns": "integer", "track_uuid": "text", "category": "text", **dict.fromkeys(_SIZE, "real"), **POSE}
 
 
 class Argoverse2:
@@ -71,7 +71,10 @@ class Argoverse2:
         return by_file_source(
             f"argoverse2-{path.resolve().name}",
             maps,
-            [Place(log.name, tuple(log / name for name in ARGOVERSE2_FILES), path, log.name) for log in logs],
+            [
+                Place(log.name, (*(log / name for name in ARGOVERSE2_FILES), *calibration_of(log)), path, log.name)
+                for log in logs
+            ],
             {**taxonomy("argoverse2"), **options.class_map},
             _read_log,
             frames=_FRAMES * len(logs),
@@ -93,6 +96,7 @@ class _Box:
     x: float
     y: float
     heading: float
+    out_of_plane: OutOfPlane
     size: tuple[float, float, float]
     attributes: Mapping[str, str | float | bool]
 
@@ -131,8 +135,10 @@ class _Log:
         archive = archive_of(self._log / "map")
         parts = [] if archive is None else archive.stem.split("____")[1:]
         params: dict[str, str | float | bool] = {"location": parts[0].partition("_")[0]} if parts else {}
-        cameras = self._cameras()
-        centres = [(time // 1000, *self._poses[time].place((_AXLE_TO_CENTRE_M, 0.0, 0.0))[:2]) for time in times]
+        images = self._images()
+        views = views_of(self._log, times, images, self._tell)
+        places = [self._poses[time].place((_AXLE_TO_CENTRE_M, 0.0, 0.0)) for time in times]
+        centres = [(time // 1000, x, y) for time, (x, y, _) in zip(times, places, strict=True)]
         ego_moves = _moves(centres)
         moves = {
             (track, place[0]): move
@@ -145,12 +151,13 @@ class _Log:
                 recording=self._log.name,
                 timestamp_us=time // 1000,
                 map=self._log.name,
-                ego=_ego(centre, self._poses[time].heading, move),
+                ego=_ego(place, self._poses[time], move),
                 objects=tuple(self._object(box, moves[box.track, time // 1000]) for box in self._boxes[time]),
                 params=params,
-                sensors=self._sensors(time, cameras),
+                sensors=self._sensors(time, images),
+                cameras=views[time],
             )
-            for time, centre, move in zip(times, centres, ego_moves, strict=True)
+            for time, place, move in zip(times, places, ego_moves, strict=True)
         ]
 
     def _object(self, box: _Box, velocity: tuple[float, float] | None) -> LabelObject:
@@ -167,10 +174,11 @@ class _Log:
             velocity=velocity,
             track=box.track,
             attributes=box.attributes,
+            out_of_plane=box.out_of_plane,
         )
 
     def _read_poses(self, wanted: set[int]) -> dict[int, Rigid]:
-        rows = read_feather(self._log / _POSES, {"timestamp_ns": "integer", **_POSE})
+        rows = read_feather(self._log / _POSES, {"timestamp_ns": "integer", **POSE})
         poses: dict[int, Rigid] = {}
         for number, time in enumerate(rows["timestamp_ns"]):
             if time in wanted and time not in poses:
@@ -194,13 +202,14 @@ class _Log:
         if not all(value is not None and 0 < value < math.inf for value in size):
             raise InvalidError("its size is not positive")
         box = self._poses[time].then(_pose(row))
-        x, y, _ = box.origin
+        x, y, z = box.origin
+        space = OutOfPlane(z, box.pitch, box.roll)
         points = row.get("num_interior_pts")
         attributes: dict[str, str | float | bool] = {} if points is None else {"num_interior_pts": points}
-        self._boxes[time].append(_Box(track, category, x, y, box.heading, size, attributes))
+        self._boxes[time].append(_Box(track, category, x, y, box.heading, space, size, attributes))
         self._tracks[track].append((time // 1000, x, y))
 
-    def _cameras(self) -> dict[str, list[tuple[int, str]]]:
+    def _images(self) -> dict[str, list[tuple[int, str]]]:
         """Times and names of the images of each camera, where they are there."""
         found: dict[str, list[tuple[int, str]]] = {}
         for camera in sorted((self._log / "sensors" / "cameras").glob("*")):
@@ -208,15 +217,16 @@ class _Log:
             found[camera.name] = sorted((int(stem), name) for stem, name in stems if stem.isascii() and stem.isdigit())
         return found
 
+    def _tell(self, problem: str) -> None:
+        self._report.left_out("camera", "record-invalid", f"{self._log.name}/{problem}")
+
     def _sensors(self, time: int, cameras: Mapping[str, list[tuple[int, str]]]) -> dict[str, str]:
         # A folder that is the log itself has no name of its own here.
         start = "" if self._folder == "." else f"{self._folder}/"
         sensors = {"lidar": f"{start}sensors/lidar/{time}.feather"}
         for camera, images in cameras.items():
             if images:
-                after = bisect_left(images, (time, ""))
-                near = min(images[max(0, after - 1) : after + 1], key=lambda image: abs(image[0] - time))
-                sensors[camera] = f"{start}sensors/cameras/{camera}/{near[1]}"
+                sensors[camera] = f"{start}sensors/cameras/{camera}/{nearest(images, time)[1]}"
         return {readable(channel): readable(path) for channel, path in sorted(sensors.items())}
 
 
@@ -224,12 +234,14 @@ def _moves(places: Sequence[tuple[int, float, float]]) -> list[tuple[float, floa
     return velocities(places, reach_us=_REACH_US, longest_us=_LONGEST_STEP_US)
 
 
-def _ego(centre: tuple[int, float, float], heading: float, velocity: tuple[float, float] | None) -> LabelObject:
+def _ego(place: tuple[float, float, float], pose: Rigid, velocity: tuple[float, float] | None) -> LabelObject:
     width, length, height = _EGO_SIZE_M
-    return LabelObject("ego", "Car", _EGO_CLASS, centre[1], centre[2], heading, width, length, height, velocity)
+    return LabelObject(
+        "ego", "Car", _EGO_CLASS, place[0], place[1], pose.heading, width, length, height, velocity,
+        out_of_plane=OutOfPlane(place[2], pose.pitch, pose.roll),
+    )  # fmt: skip
 
 
 def _pose(row: Mapping[str, Any]) -> Rigid:
-    if any(row[name] is None or not abs(row[name]) < _FARTHEST_M for name in _POSE):
-        raise InvalidError("its pose is not finite")
+    check_pose(row)
     return quaternion(row["qw"], row["qx"], row["qy"], row["qz"], (row["tx_m"], row["ty_m"], row["tz_m"]))

@@ -2,7 +2,8 @@
 
 - `dataset.json`: {"name", "interchange": 1, "angle": "heading" | "yaw", "classes": "nuscenes" | "scenic" | FILE};
 - `labels.jsonl`: one label a line; also `labels-*.jsonl`, either with `.gz`, or `labels.parquet`. An explicit null says
-  that there is no ego, or that a heading is not known;
+  that there is no ego, or that a heading is not known. Objects may have `z`, `pitch` and `roll`; a sensor is a path, or
+  an object with `path` and what `cameras.CAMERA_KEYS` lists;
 - `maps/NAME.geojson`: metres of the map's frame.
 """
 
@@ -17,6 +18,7 @@ from typing import Any, cast
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.angles import normalize
+from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
 from scenicq.importers.base import (
     ClassNames,
@@ -27,6 +29,7 @@ from scenicq.importers.base import (
     read_class_map,
     read_maps,
 )
+from scenicq.importers.cameras import camera_of
 from scenicq.importers.ego_choice import ego_facts, viewpoint
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.folders import first_files, read_bytes, readable
@@ -35,8 +38,9 @@ from scenicq.importers.interchange_columns import read_columns
 from scenicq.importers.layouts import is_interchange
 from scenicq.importers.report import Report
 from scenicq.store.classes import taxonomy, taxonomy_names
-from scenicq.store.columns import RecordingColumns
-from scenicq.store.labels import Label, LabelObject, Recording
+from scenicq.store.columns import OUT_OF_PLANE, RecordingColumns
+from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
+from scenicq.store.wkb import FARTHEST_M
 
 __all__ = ["Interchange", "LineReader"]
 
@@ -168,9 +172,23 @@ class _LabelReader:
                 objects=objects,
                 params=fields.scalars(line, "params", self._attribute(f"{place}: label `{frame}`")),
                 sensors=_sensors(line),
+                cameras=dict(self._cameras(line, frame, place)),
             )
         except InvalidError as error:
             raise InvalidError(f"label `{frame}`: {error}") from error
+
+    def _cameras(self, line: Record, frame: str, place: str) -> Iterator[tuple[str, Camera]]:
+        """The cameras of a line; one that cannot be is left out."""
+        for channel, sensor in fields.optional_record(line, "sensors").items():
+            if isinstance(sensor, dict):
+                try:
+                    camera = camera_of(cast(Record, sensor))
+                except InvalidError as error:
+                    message = f"{place}: camera `{channel}` of label `{frame}`: {error}"
+                    self._report.left_out("camera", "record-invalid", message)
+                else:
+                    if camera is not None:
+                        yield channel, camera
 
     def _ego(self, entry: Record, place: str) -> LabelObject:
         try:
@@ -209,6 +227,7 @@ class _LabelReader:
             velocity=None if velocity is None else (velocity[0], velocity[1]),
             track=fields.optional_text(entry, "track"),
             attributes=fields.scalars(entry, "attributes", self._attribute(place)),
+            out_of_plane=_out_of_plane(entry),
             # Last: an object that is left out must not count as one of unknown class.
             category="Car" if source_class is None else self._classes.category(source_class),
         )
@@ -221,7 +240,20 @@ def _sensors(line: Record) -> dict[str, str]:
     if line.get("sensors") is None:
         return {}
     sensors = fields.record(line["sensors"], "`sensors`")
-    return {channel: fields.text(sensors, channel) for channel in sensors}
+    return {
+        channel: fields.text(cast(Record, sensor), "path")
+        if isinstance(sensor, dict)
+        else fields.text(sensors, channel)
+        for channel, sensor in sensors.items()
+    }
+
+
+def _out_of_plane(entry: Record) -> OutOfPlane | None:
+    z, *turns = (fields.optional_number(entry, name) for name in OUT_OF_PLANE)
+    if z is not None and abs(z) > FARTHEST_M:
+        raise InvalidError("`z` is at no place on a map")
+    pitch, roll = (None if angle is None else normalize(angle) for angle in turns)
+    return None if z is pitch is roll is None else OutOfPlane(z, pitch, roll)
 
 
 def _invalid(folder: Path, message: str) -> DataError:

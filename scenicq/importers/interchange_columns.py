@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
+from scenicq.importers.cameras import camera_of
 from scenicq.importers.fields import InvalidError, parse_json
 from scenicq.importers.sound_columns import UNUSUAL, are, column, demand, vectors
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
+from scenicq.store.wkb import FARTHEST_M
 
 __all__ = ["read_columns"]
 
@@ -54,7 +56,9 @@ def _columns(
     demand(len(set(times)) == len(times) and len(maps) == 1)
     lists: list[list[Any]] = [label["objects"] for label in labels]
     sensors: list[dict[str, Any]] = [label.get("sensors") or {} for label in labels]
-    paths = [path for paths in sensors for path in paths.values()]
+    files = [file for files in sensors for file in files.values()]
+    cameras = [cast(dict[str, Any], file) if type(file) is dict else None for file in files]
+    paths: list[Any] = [camera.get("path") if camera else file for file, camera in zip(files, cameras, strict=True)]
     demand(all(type(path) is str and path for path in paths))
     egos, objects = [label["ego"] for label in labels], list(chain.from_iterable(lists))
     demand(are(objects, dict))
@@ -86,6 +90,7 @@ def _columns(
         sensor_counts=np.array([len(channels) for channels in sensors], dtype=np.int64),
         channels=[channel for channels in sensors for channel in channels],
         paths=paths,
+        cameras=[None if camera is None else camera_of(camera) for camera in cameras],
     )
 
 
@@ -136,7 +141,16 @@ def _members(
         vy=np.ascontiguousarray(vxy[:, 1]),
         track=[track or None for track in tracks],
         attributes=_json(column(entries, "attributes")),
+        z=_heights(entries),
+        pitch=normalize_array(_optional_reals(column(entries, "pitch"))),
+        roll=normalize_array(_optional_reals(column(entries, "roll"))),
     )
+
+
+def _heights(entries: Sequence[dict[str, Any]]) -> NDArray[np.float64]:
+    values = _optional_reals(column(entries, "z"))
+    demand(not np.any(np.abs(values) > FARTHEST_M))
+    return values
 
 
 def _sizes(entries: Sequence[dict[str, Any]], key: str) -> NDArray[np.float64]:

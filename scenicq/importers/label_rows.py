@@ -6,8 +6,8 @@ import json
 import math
 from collections.abc import Iterator
 
-from scenicq.store.columns import MemberColumns, RecordingColumns
-from scenicq.store.labels import Label, LabelObject
+from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, RecordingColumns
+from scenicq.store.labels import Label, LabelObject, OutOfPlane
 
 __all__ = ["labels_of"]
 
@@ -30,6 +30,11 @@ def labels_of(columns: RecordingColumns) -> list[Label]:
                 objects=tuple(objects[first:last]),
                 params=json.loads(columns.params[number] or "{}"),
                 sensors=dict(zip(columns.channels[file:end], columns.paths[file:end], strict=True)),
+                cameras={
+                    channel: camera
+                    for channel, camera in zip(columns.channels[file:end], columns.cameras[file:end], strict=False)
+                    if camera is not None
+                },
             )
         )
         first, file = last, end
@@ -40,6 +45,7 @@ def _members(members: MemberColumns) -> Iterator[LabelObject]:
     reals = (members.x, members.y, members.heading, members.width, members.length, members.height)
     rows = zip(*(column.tolist() for column in reals), strict=True)
     speeds = zip(members.vx.tolist(), members.vy.tolist(), strict=True)
+    spaces = _spaces(members)
     for number, ((x, y, *others), velocity) in enumerate(zip(rows, speeds, strict=True)):
         heading, width, length, height = (None if math.isnan(value) else value for value in others)
         yield LabelObject(
@@ -55,4 +61,15 @@ def _members(members: MemberColumns) -> Iterator[LabelObject]:
             velocity=None if math.isnan(velocity[0]) else velocity,
             track=members.track[number],
             attributes=json.loads(members.attributes[number] or "{}"),
+            out_of_plane=spaces[number],
         )
+
+
+def _spaces(members: MemberColumns) -> list[OutOfPlane | None]:
+    columns = [getattr(members, name) for name in OUT_OF_PLANE]
+    unknown = [math.nan] * len(members.x)
+    rows = zip(*(unknown if values is None else values.tolist() for values in columns), strict=True)
+    return [
+        None if all(map(math.isnan, row)) else OutOfPlane(*(None if math.isnan(value) else value for value in row))
+        for row in rows
+    ]

@@ -53,6 +53,16 @@ class Rigid:
         return Rigid(x, y, z, (-a, -b, -c))
 
     @property
+    def pitch(self) -> float:
+        """Turn about the y axis, radians, after which comes the heading's."""
+        return math.asin(max(-1.0, min(1.0, -self.x[2])))
+
+    @property
+    def roll(self) -> float:
+        """Turn about the x axis, radians, before the pitch."""
+        return math.atan2(self.y[2], self.z[2])
+
+    @property
     def heading(self) -> float:
         """Heading in (-pi, pi] of the x axis, seen from above."""
         return heading_of(self.x[0], self.x[1])

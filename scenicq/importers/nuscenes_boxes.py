@@ -33,7 +33,7 @@ class Boxes:
     Attributes:
         tokens: Of the annotations.
         samples, tracks: Numbers of the sample and of the instance, shape (n,).
-        values: x, y, heading, width, length, height in metres and radians, shape (n, 6).
+        values: x, y, heading, width, length, height, z in metres and radians, shape (n, 7).
         attributes: What else is said, as JSON; None where there is nothing.
     """
 
@@ -61,7 +61,7 @@ def of_rows(rows: Sequence[Box]) -> Boxes:
         [token for token, *_ in rows],
         np.array([sample for _, sample, *_ in rows], dtype=np.int64),
         np.array([track for _, _, track, *_ in rows], dtype=np.int64),
-        np.array([values for *_, values, _ in rows], dtype=np.float64).reshape(-1, 6),
+        np.array([values for *_, values, _ in rows], dtype=np.float64).reshape(-1, 7),
         [attributes for *_, attributes in rows],
     )
 
@@ -104,7 +104,7 @@ class BoxReader:
         """
         sample = found(self._samples, fields.text(row, "sample_token"), "sample")
         track = found(self._tracks, fields.text(row, "instance_token"), "instance")
-        x, y, heading = pose(row)
+        x, y, heading, z = pose(row)
         size = fields.vector(row, "size", 3)
         if min(size) <= 0:
             raise InvalidError("`size` is not positive")
@@ -112,17 +112,17 @@ class BoxReader:
         for key in _COUNTS:
             if row.get(key) is not None:
                 told[key] = fields.integer(row, key)
-        return token, sample, track, (x, y, heading, *size), to_json(told)
+        return token, sample, track, (x, y, heading, *size, z), to_json(told)
 
     def columns(self, rows: Sequence[Annotation]) -> Boxes | None:
         """All of some annotations, as `row` makes them; None where it would refuse one."""
         try:
             samples = _numbers(self._samples, [row.sample_token for row in rows])
             tracks = _numbers(self._tracks, [row.instance_token for row in rows])
-            values = np.empty((len(rows), 6))
-            values[:, :2] = _vectors([row.translation for row in rows], 3)[:, :2]
+            values = np.empty((len(rows), 7))
+            values[:, [0, 1, 6]] = _vectors([row.translation for row in rows], 3)
             values[:, 2] = _headings([row.rotation for row in rows])
-            values[:, 3:] = _vectors([row.size for row in rows], 3)
+            values[:, 3:6] = _vectors([row.size for row in rows], 3)
             also = [
                 self._also(row.attribute_tokens, row.visibility_token, row.num_lidar_pts, row.num_radar_pts)
                 for row in rows
@@ -150,20 +150,20 @@ class BoxReader:
         return told
 
 
-def pose(row: Record) -> tuple[float, float, float]:
-    """Position and heading of `translation` and `rotation`.
+def pose(row: Record) -> tuple[float, float, float, float]:
+    """x, y, heading and z of `translation` and `rotation`.
 
     Raises:
         InvalidError: They are unsound.
     """
-    x, y, _ = fields.vector(row, "translation", 3)
+    x, y, z = fields.vector(row, "translation", 3)
     a, b, c, d = fields.vector(row, "rotation", 4)
     norm = math.hypot(a, b, c, d)
     if not 0.5 < norm < 2:
         raise InvalidError("`rotation` is not a unit quaternion")
     a, b, c, d = a / norm, b / norm, c / norm, d / norm
     yaw = math.atan2(2 * (a * d + b * c), 1 - 2 * (c * c + d * d))
-    return x, y, normalize(yaw - math.pi / 2)
+    return x, y, normalize(yaw - math.pi / 2), z
 
 
 def _headings(rotations: Sequence[tuple[float, ...]]) -> NDArray[np.float64]:

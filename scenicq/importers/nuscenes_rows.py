@@ -5,7 +5,7 @@ They hold what is used. Rows that msgspec refuses are for `json`, and for what t
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias, TypedDict
+from typing import Annotated, NotRequired, TypeAlias, TypedDict
 
 from msgspec import Meta, Struct
 from msgspec.json import Decoder
@@ -50,6 +50,8 @@ class SensorFile(TypedDict):
     calibrated_sensor_token: _Text
     filename: _Text
     is_key_frame: bool
+    width: NotRequired[_Count | None]
+    height: NotRequired[_Count | None]
 
 
 class EgoPose(TypedDict):

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.geometry.camera import Camera
 from scenicq.importers.base import ClassNames, Labels
 from scenicq.importers.label_rows import labels_of
 from scenicq.importers.nuscenes_boxes import Boxes
@@ -47,16 +48,16 @@ class Instant:
 
     Attributes:
         place: File and line, for messages.
-        pose: Of the ego: x, y, heading.
-        sensors: Channel and file, in order of the channels.
+        pose: Of the ego: x, y, heading, z.
+        sensors: Channel, file and camera, in order of the channels.
         boxes: How many of the scene's boxes are its.
     """
 
     token: str
     time: int
     place: str
-    pose: tuple[float, float, float] | None
-    sensors: tuple[tuple[str, str], ...]
+    pose: tuple[float, float, float, float] | None
+    sensors: tuple[tuple[str, str, Camera | None], ...]
     boxes: int
 
 
@@ -152,14 +153,15 @@ def _columns(scene: SceneContent, classes: ClassNames) -> RecordingColumns:
         objects=_objects(scene, classes, boxes, np.repeat(moments, counts)),
         object_counts=counts,
         sensor_counts=np.array([len(instant.sensors) for instant, _ in posed], dtype=np.int64),
-        channels=[channel for instant, _ in posed for channel, _ in instant.sensors],
-        paths=[path for instant, _ in posed for _, path in instant.sensors],
+        channels=[channel for instant, _ in posed for channel, _, _ in instant.sensors],
+        paths=[path for instant, _ in posed for _, path, _ in instant.sensors],
+        cameras=[camera for instant, _ in posed for *_, camera in instant.sensors],
     )
 
 
-def _egos(times: NDArray[np.int64], poses: Sequence[tuple[float, float, float]]) -> MemberColumns:
+def _egos(times: NDArray[np.int64], poses: Sequence[tuple[float, float, float, float]]) -> MemberColumns:
     n = len(poses)
-    centres = [(x - AXLE_TO_CENTRE_M * math.sin(h), y + AXLE_TO_CENTRE_M * math.cos(h)) for x, y, h in poses]
+    centres = [(x - AXLE_TO_CENTRE_M * math.sin(h), y + AXLE_TO_CENTRE_M * math.cos(h)) for x, y, h, _ in poses]
     xy = np.array(centres, dtype=np.float64).reshape(-1, 2)
     velocity = _velocities(np.zeros(n, dtype=np.int64), times, xy)
     width, length, height = EGO_SIZE_M
@@ -169,7 +171,7 @@ def _egos(times: NDArray[np.int64], poses: Sequence[tuple[float, float, float]])
         source_class=["vehicle.ego"] * n,
         x=xy[:, 0],
         y=xy[:, 1],
-        heading=np.array([heading for _, _, heading in poses], dtype=np.float64),
+        heading=np.array([heading for _, _, heading, _ in poses], dtype=np.float64),
         width=np.full(n, width),
         length=np.full(n, length),
         height=np.full(n, height),
@@ -177,6 +179,7 @@ def _egos(times: NDArray[np.int64], poses: Sequence[tuple[float, float, float]])
         vy=velocity[:, 1],
         track=[None] * n,
         attributes=[None] * n,
+        z=np.array([z for *_, z in poses], dtype=np.float64),
     )
 
 
@@ -184,7 +187,7 @@ def _objects(scene: SceneContent, classes: ClassNames, boxes: Boxes, times: NDAr
     tracks: list[int] = boxes.tracks.tolist()
     names = [scene.tracks[track][1] for track in tracks]
     velocity = _velocities(boxes.tracks, times, boxes.values[:, :2])
-    x, y, heading, width, length, height = boxes.values.T
+    x, y, heading, width, length, height, z = boxes.values.T
     return MemberColumns(
         id=boxes.tokens,
         category=[classes.known.get(name) or classes.category(name) for name in names],
@@ -199,6 +202,7 @@ def _objects(scene: SceneContent, classes: ClassNames, boxes: Boxes, times: NDAr
         vy=velocity[:, 1],
         track=[scene.tracks[track][0] for track in tracks],
         attributes=boxes.attributes,
+        z=z,
     )
 
 

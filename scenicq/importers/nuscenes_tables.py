@@ -11,7 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
+from scenicq.importers.cameras import Mount, Pose, posed
+from scenicq.importers.cameras import pose_of as vehicle_pose
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.json_tables import Block, Rows, read_list
 from scenicq.importers.nuscenes_boxes import Box, Boxes, BoxReader, found, joined, of_rows, pose
@@ -51,6 +54,22 @@ class _Sample:
     place: str
 
 
+@dataclass(frozen=True, slots=True)
+class _Mounted:
+    """A sensor on a vehicle; what is no camera, or not calibrated, has no mount."""
+
+    channel: str
+    mount: Mount | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Image:
+    sample: str
+    sensor: _Mounted
+    width: int
+    height: int
+
+
 class _Place:
     """File and line of a row, found out only for messages."""
 
@@ -80,7 +99,7 @@ class Tables:
         self.samples_of: defaultdict[str, list[_Sample]] = defaultdict(list)
         for token, row, place in self._rows("sample", "label"):
             self._try("label", place, lambda: self._add_sample(token, row, place))  # noqa: B023
-        self.sensors: defaultdict[str, dict[str, str]] = defaultdict(dict)
+        self.sensors: defaultdict[str, dict[str, tuple[str, Camera | None]]] = defaultdict(dict)
         self.poses = self._read_sensor_files()
         self._classes: dict[str, str] = self._read_classes()
         self._read_boxes()
@@ -94,7 +113,7 @@ class Tables:
                 sample.time,
                 sample.place,
                 self.poses.get(sample.token),
-                tuple(sorted(self.sensors[sample.token].items())),
+                tuple((channel, *file) for channel, file in sorted(self.sensors[sample.token].items())),
                 self._boxes_of[sample.token],
             )
             for sample in self.samples_of[token]
@@ -125,33 +144,52 @@ class Tables:
         self.samples[token] = (scene, sample)
         self.samples_of[scene].append(sample)
 
-    def _read_sensor_files(self) -> dict[str, tuple[float, float, float]]:
-        """Fill in the files of each sample; the result is position and heading of its ego."""
+    def _read_sensor_files(self) -> dict[str, tuple[float, float, float, float]]:
+        """Fill in the files of each sample; the result is x, y, heading and z of its ego."""
         channels = self._keyed("sensor", lambda row: fields.text(row, "channel"))
-        mounted = self._keyed(
-            "calibrated_sensor", lambda row: found(channels, fields.text(row, "sensor_token"), "sensor")
-        )
+        mounted: dict[str, _Mounted] = {}
+        for token, row, place in self._rows("calibrated_sensor", "record"):
+            name = f"calibrated_sensor `{token}`"
+            of = self._try(
+                "record", place, lambda row=row: found(channels, fields.text(row, "sensor_token"), "sensor"), name
+            )
+            if of is not None:
+                mounted[token] = _Mounted(of, self._try("camera", place, lambda row=row: _mount(row), name))
         pose_of: dict[str, str] = {}
+        images: defaultdict[str, list[_Image]] = defaultdict(list)
         for token, row, place in self._rows("sample_data", "sensor file", SENSOR_FILES):
             if row.get("is_key_frame") is not True or str(row.get("sample_token")) not in self.samples:
                 continue
 
             def add(row: Record = row) -> None:
-                channel = found(mounted, fields.text(row, "calibrated_sensor_token"), "calibrated_sensor")
-                sample = fields.text(row, "sample_token")
-                self.sensors[sample][channel] = fields.text(row, "filename")
-                if channel == POSE_CHANNEL:
+                sensor: _Mounted = found(mounted, fields.text(row, "calibrated_sensor_token"), "calibrated_sensor")
+                sample, size = fields.text(row, "sample_token"), [row.get(key) for key in ("width", "height")]
+                self.sensors[sample][sensor.channel] = fields.text(row, "filename"), None
+                if sensor.channel == POSE_CHANNEL:
                     pose_of[sample] = fields.text(row, "ego_pose_token")
+                width, height = (pixels if type(pixels) is int else 0 for pixels in size)
+                if sensor.mount is not None and width > 0 and height > 0:
+                    images[fields.text(row, "ego_pose_token")].append(_Image(sample, sensor, width, height))
 
             self._try("sensor file", place, add, f"sample_data `{token}`")
-        wanted = set(pose_of.values())
-        poses = {
-            token: made
-            for token, row, place in self._rows("ego_pose", "ego pose", EGO_POSES)
-            if token in wanted
-            and (made := self._try("ego pose", place, lambda row=row: pose(row), f"ego_pose `{token}`"))
-        }
+        wanted = {*pose_of.values(), *images}
+        poses: dict[str, tuple[float, float, float, float]] = {}
+        for token, row, place in self._rows("ego_pose", "ego pose", EGO_POSES):
+            if token not in wanted:
+                continue
+            made = self._try("ego pose", place, lambda row=row: pose(row), f"ego_pose `{token}`")
+            if made is not None:
+                poses[token] = made
+                vehicle = vehicle_pose(tuple(row["rotation"]), tuple(row["translation"]))
+                for image in images.get(token, ()):
+                    self._try("camera", place, lambda image=image, vehicle=vehicle: self._add_camera(image, vehicle))
         return {sample: poses[token] for sample, token in pose_of.items() if token in poses}
+
+    def _add_camera(self, image: _Image, vehicle: Pose) -> None:
+        channel, mount = image.sensor.channel, image.sensor.mount
+        if mount is not None:
+            camera = posed(mount, vehicle, image.width, image.height)
+            self.sensors[image.sample][channel] = self.sensors[image.sample][channel][0], camera
 
     def _read_classes(self) -> dict[str, str]:
         """Class name of each instance."""
@@ -242,6 +280,19 @@ def _log(row: Record) -> _Log:
     if zone is not None:
         ahead = int(f"{zone[1]}1") * (int(zone[2]) * 3600 + int(zone[3]) * 60)
     return _Log(fields.text(row, "location"), fields.optional_text(row, "date_captured"), ahead)
+
+
+def _mount(row: Record) -> Mount | None:
+    """How a sensor sees, where it is a camera."""
+    matrix = row.get("camera_intrinsic")
+    if not matrix:
+        return None
+    rows = [fields.vector({"camera_intrinsic": line}, "camera_intrinsic", 3) for line in
+            fields.items(row, "camera_intrinsic")]  # fmt: skip
+    if len(rows) != 3:
+        raise InvalidError("`camera_intrinsic` has not three rows")
+    pose = vehicle_pose(fields.vector(row, "rotation", 4), fields.vector(row, "translation", 3))
+    return Mount(pose, (rows[0][0], rows[1][1], rows[0][2], rows[1][2]))
 
 
 def _params(description: object, log: _Log) -> dict[str, str | float | bool]:

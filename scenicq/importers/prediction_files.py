@@ -33,7 +33,8 @@ _HINT = (
     "known are nuScenes detection results (.json), Argoverse 2 detections (.feather), and labels of the interchange "
     "format whose objects have a `score` (.jsonl or .parquet)"
 )
-_NUMBERS = ("x", "y", "heading", "width", "length", "height", "vx", "vy", "score")
+_NUMBERS = ("x", "y", "heading", "width", "length", "height", "vx", "vy", "score", "z")
+_MOST_ATTRIBUTES = 100
 _NEEDED = ("x", "y", "heading", "width", "length", "score")
 
 
@@ -46,6 +47,7 @@ class _Detection(msgspec.Struct):
     detection_name: str
     detection_score: float
     velocity: tuple[float | None, float | None] = (None, None)
+    attribute_name: str = ""
 
 
 class _Results(msgspec.Struct):
@@ -66,6 +68,7 @@ class _Object(msgspec.Struct, rename={"category": "class"}):
     yaw: float | None = None
     height: float | None = None
     velocity: tuple[float, float] | None = None
+    z: float | None = None
 
 
 class _Line(msgspec.Struct):
@@ -119,13 +122,31 @@ class _Gathered:
         self._frame: list[NDArray[np.int32]] = []
         self._category: list[NDArray[np.int32]] = []
         self._values: list[Reals] = []
+        self._attributes: dict[str, int] = {}
+        self._attribute: list[NDArray[np.int8]] = []
 
-    def add(self, frame: str, classes: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
-        """A frame with its boxes: columns as in `_NUMBERS`."""
+    def add(
+        self,
+        frame: str,
+        classes: Iterable[str],
+        rows: Sequence[Sequence[float]],
+        attributes: Sequence[str] | None = None,
+    ) -> None:
+        """A frame with its boxes: columns as in `_NUMBERS`; an empty attribute is none.
+
+        Raises:
+            ValueError: There are more attributes than anybody names.
+        """
         numbers = [self.classes.setdefault(name, len(self.classes)) for name in classes]
         self._frame.append(np.full(len(rows), len(self.frames), dtype=np.int32))
         self._category.append(np.array(numbers, dtype=np.int32))
         self._values.append(np.array(rows, dtype=np.float64).reshape(-1, len(_NUMBERS)))
+        told = [self._attributes.setdefault(name, len(self._attributes)) if name else -1 for name in attributes or ()]
+        if len(self._attributes) > _MOST_ATTRIBUTES:
+            raise ValueError(f"more than {_MOST_ATTRIBUTES} names of attributes")
+        self._attribute.append(
+            np.full(len(rows), -1, dtype=np.int8) if attributes is None else np.array(told, dtype=np.int8)
+        )
         self.frames.append(frame)
 
     def predictions(self, path: Path, protocol: Protocol) -> Predictions:
@@ -141,6 +162,8 @@ class _Gathered:
             frame=np.concatenate([none, *self._frame]),
             classes=list(self.classes),
             category=np.concatenate([none, *self._category]),
+            attributes=list(self._attributes),
+            attribute=np.concatenate([none.astype(np.int8), *self._attribute]),
             **columns,
         )
 
@@ -152,7 +175,12 @@ def _nuscenes(path: Path) -> Predictions:
         gathered = _Gathered()
         for sample, text in whole.results.items():
             boxes = decoder.decode(text)
-            gathered.add(sample, [box.detection_name for box in boxes], [_nuscenes_row(box) for box in boxes])
+            gathered.add(
+                sample,
+                [box.detection_name for box in boxes],
+                [_nuscenes_row(box) for box in boxes],
+                [box.attribute_name for box in boxes],
+            )
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise _invalid(path, error) from None
     return gathered.predictions(path, NUSCENES)
@@ -163,8 +191,8 @@ def _nuscenes_row(box: _Detection) -> tuple[float, ...]:
     norm = a * a + b * b + c * c + d * d
     yaw = math.atan2(2 * (a * d + b * c), norm - 2 * (c * c + d * d)) if norm > 0 else math.nan
     vx, vy = (math.nan if value is None else value for value in box.velocity)
-    x, y, _ = box.translation
-    return (x, y, yaw - math.pi / 2, *box.size, vx, vy, box.detection_score)
+    x, y, z = box.translation
+    return (x, y, yaw - math.pi / 2, *box.size, vx, vy, box.detection_score, z)
 
 
 def _lines(path: Path) -> Predictions:
@@ -185,7 +213,9 @@ def _line_row(box: _Object) -> tuple[float, ...]:
     if heading is None:
         heading = math.nan if box.yaw is None else box.yaw - math.pi / 2
     height = math.nan if box.height is None else box.height
-    return (*box.position, heading, box.width, box.length, height, *(box.velocity or (math.nan, math.nan)), box.score)
+    z = math.nan if box.z is None else box.z
+    velocity = box.velocity or (math.nan, math.nan)
+    return (*box.position, heading, box.width, box.length, height, *velocity, box.score, z)
 
 
 def _table(path: Path) -> ArrowTable:
@@ -226,6 +256,9 @@ def _argoverse2(path: Path) -> Predictions:
         vx=unknown,
         vy=unknown,
         score=_reals(path, table, "score"),
+        z=_reals(path, table, "tz_m"),
+        attributes=[],
+        attribute=np.full(len(yaw), -1, dtype=np.int8),
         of_ego=True,
     )
 
@@ -279,7 +312,8 @@ def _parquet(path: Path) -> Predictions:
         frames = known
     classes, category = _codes(path, table["class"])
     columns: dict[str, Any] = {name: _reals(path, table, name) for name in _NUMBERS}
-    return Predictions(str(path), PLAIN, frames, frame, classes, category, **columns)
+    none = np.full(len(frame), -1, dtype=np.int8)
+    return Predictions(str(path), PLAIN, frames, frame, classes, category, attributes=[], attribute=none, **columns)
 
 
 def _unnested(path: Path, table: ArrowTable) -> tuple[ArrowTable, list[str]]:

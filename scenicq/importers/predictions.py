@@ -46,6 +46,11 @@ class Protocol:
         no_orientation, no_velocity: Classes for which these errors mean nothing.
         last_first: Whether of boxes with one score the later one comes first.
         velocity: Whether velocities are predicted.
+        attributes: Groups of attributes, of which an object has one, that are predicted: `vehicle.parked`.
+        no_attribute: Classes for which that error means nothing.
+        spatial: Whether distances are those in space, not in the plane.
+        roi_m: Metres from the drivable area up to which a corner of a box must lie for it to be evaluated, where the
+            map has such an area.
     """
 
     name: str
@@ -66,6 +71,10 @@ class Protocol:
     no_velocity: frozenset[str] = frozenset()
     last_first: bool = True
     velocity: bool = True
+    attributes: tuple[str, ...] = ()
+    no_attribute: frozenset[str] = frozenset()
+    spatial: bool = False
+    roi_m: float = math.inf
 
 
 NUSCENES = Protocol(
@@ -95,6 +104,8 @@ NUSCENES = Protocol(
     half_turn=frozenset({"barrier"}),
     no_orientation=frozenset({"traffic_cone"}),
     no_velocity=frozenset({"traffic_cone", "barrier"}),
+    attributes=("cycle", "pedestrian", "vehicle"),
+    no_attribute=frozenset({"traffic_cone", "barrier"}),
 )
 """The nuScenes detection task (configuration `detection_cvpr_2019`)."""
 
@@ -109,8 +120,10 @@ ARGOVERSE2 = Protocol(
     hull=True,
     last_first=False,
     velocity=False,
+    spatial=True,
+    roi_m=5.0,
 )
-"""The Argoverse 2 detection task, without its region of interest."""
+"""The Argoverse 2 detection task."""
 
 PLAIN = Protocol("interchange", tree=True)
 """Predictions in the interchange format: everything counts, classes are those of the class tree."""
@@ -132,8 +145,11 @@ class Predictions:
         width, length, height: Metres, shape (n,); a height of nan is not known.
         vx, vy: Metres per second, shape (n,); nan where unknown.
         score: Confidence, shape (n,).
-        of_ego: Whether boxes lie in the ego's own frame: x ahead, y to the left, from the middle of the rear axle, and
-            `heading` counts from the ego's.
+        z: Height of the centre, metres, shape (n,); nan where unknown.
+        attributes: Names of attributes that are predicted.
+        attribute: Number of the attribute of each box, -1 without, shape (n,).
+        of_ego: Whether boxes lie in the ego's own frame: x ahead, y to the left, z up, from the middle of the rear
+            axle, and `heading` counts from the ego's.
     """
 
     name: str
@@ -151,4 +167,7 @@ class Predictions:
     vx: Reals
     vy: Reals
     score: Reals
+    z: Reals
+    attributes: list[str]
+    attribute: NDArray[np.int8]
     of_ego: bool = False

@@ -29,10 +29,10 @@ class Judgement:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What to tell: one sentence a role, and one about the simulated runs where there are any."""
+        """What to tell: one sentence a role, two for ranked results, and one about simulated runs."""
         found: list[str] = []
         for each in self.evaluation.scenarios:
-            found += [role.sentence for role in each.headline]
+            found += [one.sentence for one in (*each.headline, *each.weighted)]
             if each.simulated is not None:
                 found.append(each.simulated.sentence)
         return tuple(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 
 from scenicq.errors import Source
@@ -12,6 +12,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import leaves
 from scenicq.geometry.angles import normalize, rotate
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
+from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
 from scenicq.report.legend import legend
 from scenicq.report.page import page
 from scenicq.report.picture import Shot
@@ -143,14 +144,14 @@ def badge(verdict: Verdict, otherwise: str) -> str:
     return element("span", escape(shown), class_=f"badge {kind}")
 
 
-def _sensors(sensors: Sequence[Sensor]) -> str:
+def _sensors(shot: Shot, sensors: Sequence[Sensor]) -> str:
     cameras: list[str] = []
     files: list[str] = []
     for sensor in sensors:
         text = escape(sensor.path)
         if sensor.thumbnail is not None:
-            image = element("img", src=sensor.thumbnail, alt=f"Thumbnail of {sensor.channel}", loading="lazy")
-            small = image.removesuffix("</img>") + element("span", escape(sensor.channel))
+            camera = shot.label.cameras.get(sensor.channel)
+            small = camera_image(sensor, camera, _boxes(shot)) + element("span", escape(sensor.channel))
             cameras.append(
                 element("li", element("a", small, href=sensor.link, title=sensor.path, target="_blank", rel="noopener"))
             )
@@ -164,6 +165,17 @@ def _sensors(sensors: Sequence[Sensor]) -> str:
         return seen
     title = element("summary", f"{'Other sensor' if cameras else 'Sensor'} files ({len(files)})")
     return seen + element("details", title, element("ul", *files, class_="sensors"), open=len(files) <= 3)
+
+
+def _boxes(shot: Shot) -> Iterator[SpaceBox]:
+    """The objects of a frame, those with a role in its colour and last."""
+    roles = {role.thing.id: role for role in shot.roles}
+    for thing in sorted(shot.label.objects, key=lambda thing: thing.id in roles):
+        role = roles.get(thing.id)
+        told = f"{thing.id}, {thing.category}" if role is None else f"role {role.name}, {thing.id}, {thing.category}"
+        box = space_box(thing, "other" if role is None else f"asked {role.colour}", told)
+        if box is not None:
+            yield box
 
 
 def frame_facts(shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str]) -> str:
@@ -189,7 +201,7 @@ def frame_facts(shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str])
     if isinstance(shot.verdict, Match) and shot.scenario is not None:
         parts.append(_margins(shot))
         parts.append(_witness(shot.verdict, shot.scenario.source, texts))
-    return "".join([*parts, _sensors(sensors)])
+    return "".join([*parts, _sensors(shot, sensors)])
 
 
 def frame_page(shot: Shot, picture: str, sensors: Sequence[Sensor]) -> str:

@@ -21,7 +21,6 @@ __all__ = ["Sensor", "SensorFiles", "can_make_thumbnails", "roots_of"]
 
 _FORMATS = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG", ".webp": "WEBP"}
 """Images by extension; Pillow must not try others, of which some run other programs."""
-_SIZE = (320, 200)
 _MOST_PIXELS = 50_000_000
 """Pixels up to which an image is opened: four times the largest camera in use."""
 _INSIDE_BYTES = 10_000_000
@@ -72,6 +71,7 @@ class SensorFiles:
         thumbnails: Whether small images are made.
         inside: Whether they are put into the page as far as that is reasonable, so that it can be sent as one file.
         most: Small images of one frame at most, those in front first.
+        size: Width and height in pixels that a small image has at most.
     """
 
     roots: tuple[Path, ...]
@@ -80,6 +80,7 @@ class SensorFiles:
     thumbnails: bool = False
     inside: bool = False
     most: int = 12
+    size: tuple[int, int] = (320, 200)
     _made: dict[Path, str | None] = field(default_factory=dict[Path, str | None], init=False, repr=False)
     _bytes: int = field(default=0, init=False, repr=False)
 
@@ -113,7 +114,7 @@ class SensorFiles:
         if not self.thumbnails or file.suffix.lower() not in _FORMATS:
             return None
         if file not in self._made:
-            small = _small(file)
+            small = _small(file, self.size)
             self._made[file] = None if small is None else self._kept(file, small)
         return self._made[file]
 
@@ -129,7 +130,7 @@ class SensorFiles:
         return name
 
 
-def _small(file: Path) -> bytes | None:
+def _small(file: Path, size: tuple[int, int]) -> bytes | None:
     """A small JPEG of an image; None of what is none, is broken, or is too large."""
     images: Any = import_module("PIL.Image")
     into = io.BytesIO()
@@ -142,8 +143,8 @@ def _small(file: Path) -> bytes | None:
             if opened.width * opened.height > _MOST_PIXELS:
                 return None
             # before anything is decoded: a JPEG is then read at a fraction of its size
-            opened.draft("RGB", _SIZE)
-            opened.thumbnail(_SIZE)
+            opened.draft("RGB", size)
+            opened.thumbnail(size)
             opened.convert("RGB").save(into, "JPEG", quality=75)
     except (OSError, ValueError, SyntaxError, images.DecompressionBombError):
         return None

@@ -11,9 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.store.labels import LabelObject, Recording
+from scenicq.geometry.camera import Camera
+from scenicq.store.labels import LabelObject, OutOfPlane, Recording
 
-__all__ = ["MemberColumns", "Memberships", "RecordingColumns", "columns_of", "to_json"]
+__all__ = ["OUT_OF_PLANE", "MemberColumns", "Memberships", "RecordingColumns", "columns_of", "to_json"]
+
+OUT_OF_PLANE = ("z", "pitch", "roll")
+"""Columns of height and tilt."""
+_FLAT = OutOfPlane()
 
 _encode = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode
 
@@ -26,6 +31,7 @@ class MemberColumns:
         id, category, source_class, track: As in `LabelObject`.
         x, y, heading, width, length, height, vx, vy: Metres, radians and metres per second, shape (n,).
         attributes: JSON texts; None where there is nothing.
+        z, pitch, roll: As in `OutOfPlane`, shape (n,); None where nothing is known of any.
     """
 
     id: Sequence[str]
@@ -41,6 +47,9 @@ class MemberColumns:
     vy: NDArray[np.float64]
     track: Sequence[str | None]
     attributes: Sequence[str | None]
+    z: NDArray[np.float64] | None = None
+    pitch: NDArray[np.float64] | None = None
+    roll: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,6 +63,7 @@ class RecordingColumns:
         objects: Of all labels, those of one label together, in the order of the labels.
         object_counts, sensor_counts: How many each label has, shape (labels,).
         channels, paths: Sensor files of all labels.
+        cameras: The camera of each sensor file, None for what is none or not calibrated; empty where none is.
     """
 
     name: str
@@ -67,6 +77,7 @@ class RecordingColumns:
     sensor_counts: NDArray[np.int64]
     channels: Sequence[str]
     paths: Sequence[str]
+    cameras: Sequence[Camera | None] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +110,7 @@ def columns_of(recording: Recording) -> RecordingColumns:
         sensor_counts=np.array([len(label.sensors) for label in labels], dtype=np.int64),
         channels=[channel for label in labels for channel in label.sensors],
         paths=[path for label in labels for path in label.sensors.values()],
+        cameras=[label.cameras.get(channel) for label in labels for channel in label.sensors],
     )
 
 
@@ -108,6 +120,7 @@ def to_json(values: Mapping[str, Any]) -> str | None:
 
 
 def _members(members: Sequence[LabelObject]) -> MemberColumns:
+    space = [member.out_of_plane or _FLAT for member in members]
     return MemberColumns(
         id=[member.id for member in members],
         category=[member.category for member in members],
@@ -122,6 +135,9 @@ def _members(members: Sequence[LabelObject]) -> MemberColumns:
         vy=_reals([None if member.velocity is None else member.velocity[1] for member in members]),
         track=[member.track for member in members],
         attributes=[to_json(member.attributes) for member in members],
+        z=_reals([each.z for each in space]),
+        pitch=_reals([each.pitch for each in space]),
+        roll=_reals([each.roll for each in space]),
     )
 
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-__all__ = ["Label", "LabelObject", "Motion", "Recording"]
+from scenicq.geometry.camera import Camera
+
+__all__ = ["Label", "LabelObject", "Motion", "OutOfPlane", "Recording"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,22 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
+class OutOfPlane:
+    """How an object lies in space, beyond what the map's plane shows; None where it is not known.
+
+    Attributes:
+        z: Height of the centre of the box, metres, map frame; of the ego that of the point by which its source places
+            it, such as the rear axle.
+        pitch: Radians about the axis to the left, positive with the front down.
+        roll: Radians about the axis ahead, positive with the left side up.
+    """
+
+    z: float | None = None
+    pitch: float | None = None
+    roll: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class LabelObject:
     """One annotated object of a label.
 
@@ -46,6 +64,7 @@ class LabelObject:
         attributes: Everything else that the source says of the object.
         motion: What the store has computed of its track; None for what was not read from a store. It is no part of the
             label, and does not count where labels are compared.
+        out_of_plane: Height and tilt; None where nothing of them is known, or was read.
     """
 
     id: str
@@ -61,6 +80,7 @@ class LabelObject:
     track: str | None = None
     attributes: Mapping[str, str | float | bool] = field(default_factory=dict[str, str | float | bool])
     motion: Motion | None = field(default=None, compare=False)
+    out_of_plane: OutOfPlane | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +97,7 @@ class Label:
         objects: The other annotated objects, in the order of the source.
         params: Global parameters (weather, time of day ...).
         sensors: Path of the sensor file of each channel, as the source gives it.
+        cameras: Where the camera was and how it sees, of those channels for which the source says it.
     """
 
     frame: str
@@ -87,6 +108,7 @@ class Label:
     objects: tuple[LabelObject, ...] = ()
     params: Mapping[str, str | float | bool] = field(default_factory=dict[str, str | float | bool])
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
+    cameras: Mapping[str, Camera] = field(default_factory=dict[str, Camera])
 
     @property
     def has_ego(self) -> bool:

@@ -171,6 +171,7 @@ def _manifest(content: dict[str, Any]) -> Manifest:
         by_recording={name: _counts(counts) for name, counts in content["by_recording"].items()},
         left_out=tuple(_left_out(entry) for entry in content["left_out"]),
         provenance=_provenance(content["provenance"]),
+        schema=_whole(content["schema"]),
     )
 
 

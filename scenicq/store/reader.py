@@ -19,7 +19,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from scenicq.store.labels import Label, LabelObject, Motion
+from scenicq.store.camera_rows import CAMERA_COLUMNS, cameras_of
+from scenicq.store.columns import OUT_OF_PLANE
+from scenicq.store.labels import Label, LabelObject, Motion, OutOfPlane
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import ArrowTable
 
@@ -45,6 +47,7 @@ def read_labels(
     wanted: Collection[str] | None,
     *,
     motion: bool = True,
+    space: bool = True,
 ) -> Iterator[Label]:
     """Labels in the order of the store.
 
@@ -53,8 +56,10 @@ def read_labels(
         rows: Rows of `labels` to look at, counted over all parts, in order; None for all.
         wanted: Frames to yield; None for all that are looked at.
         motion: Whether what is computed of motion is read, too.
+        space: Whether heights, tilts and cameras are read, too.
     """
-    more = MOTION_COLUMNS if motion else []
+    more = [*(MOTION_COLUMNS if motion else []), *(OUT_OF_PLANE if space else [])]
+    of_sensors = ["channel", "path", *(CAMERA_COLUMNS if space else [])]
     of_labels = [*LABEL_COLUMNS, *EGO_COLUMNS, *(f"ego_{name}" for name in more)]
     first = 0
     for labels, objects, sensors in parts:
@@ -71,7 +76,7 @@ def read_labels(
             if len(chosen):
                 with (
                     RowFile(objects, [*OBJECT_COLUMNS, *more]) as object_rows,
-                    RowFile(sensors, ["channel", "path"]) as sensor_rows,
+                    RowFile(sensors, of_sensors) as sensor_rows,
                 ):
                     for start in range(0, len(chosen), _BATCH):
                         table = frame_rows.take(chosen[start : start + _BATCH])
@@ -144,21 +149,23 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
 
     Args:
         frames: `LABEL_COLUMNS` and `EGO_COLUMNS` of each label; its counts say how many rows of the others are its own.
-        objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS`, too.
-        sensors: Channels and paths, label by label.
+        objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS` and `OUT_OF_PLANE`, too.
+        sensors: Channels and paths, label by label; it may have `CAMERA_COLUMNS`.
     """
-    others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], _motions(objects, ""))
-    egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)], _motions(frames, "ego_"))
-    channels = zip(_values(sensors, "channel"), _values(sensors, "path"), strict=True)
+    others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], objects, "")
+    egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)], frames, "ego_")
+    channels = zip(_values(sensors, "channel"), _values(sensors, "path"), cameras_of(sensors), strict=True)
     first = 0
     columns = [_values(frames, name) for name in LABEL_COLUMNS]
     for ego, (frame, recording, time, map_name, params, count, sensor_count, *_) in zip(
         egos, zip(*columns, strict=True), strict=True
     ):
-        paths = dict(next(channels) for _ in range(sensor_count))
+        files = [next(channels) for _ in range(sensor_count)]
+        paths = {channel: path for channel, path, _ in files}
+        cameras = {channel: camera for channel, _, camera in files if camera is not None}
         mine = tuple(others[first : first + count])
         first += count
-        yield Label(frame, recording, time, map_name, ego, mine, params, paths)
+        yield Label(frame, recording, time, map_name, ego, mine, params, paths, cameras)
 
 
 def _motions(table: ArrowTable, prefix: str) -> Iterable[Motion | None]:
@@ -172,7 +179,17 @@ def _motions(table: ArrowTable, prefix: str) -> Iterable[Motion | None]:
     )
 
 
-def _objects(columns: list[list[Any]], motions: Iterable[Motion | None]) -> list[LabelObject]:
+def _spaces(table: ArrowTable, prefix: str) -> Iterable[OutOfPlane | None]:
+    """Height and tilt of each row, where the table has them."""
+    names = [prefix + name for name in OUT_OF_PLANE]
+    if names[0] not in table.column_names or all(table[name].null_count == len(table) for name in names):
+        return repeat(None)
+    rows = zip(*(_values(table, name) for name in names), strict=True)
+    return (None if row == (None, None, None) else OutOfPlane(*row) for row in rows)
+
+
+def _objects(columns: list[list[Any]], table: ArrowTable, prefix: str) -> list[LabelObject]:
+    motions, spaces = _motions(table, prefix), _spaces(table, prefix)
     return [
         LabelObject(
             id,
@@ -188,6 +205,7 @@ def _objects(columns: list[list[Any]], motions: Iterable[Motion | None]) -> list
             track,
             attributes,
             motion,
+            space,
         )
         for (
             id,
@@ -203,7 +221,7 @@ def _objects(columns: list[list[Any]], motions: Iterable[Motion | None]) -> list
             vy,
             track,
             attributes,
-        ), motion in zip(zip(*columns, strict=True), motions, strict=False)
+        ), motion, space in zip(zip(*columns, strict=True), motions, spaces, strict=False)
     ]
 
 

@@ -17,27 +17,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.columns import MemberColumns, RecordingColumns
+from scenicq.store.camera_rows import CAMERA_COLUMNS, cameras_of
+from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, RecordingColumns
 from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Manifest
 from scenicq.store.map_validation import check_regions
 from scenicq.store.row_owners import check_counts
-from scenicq.store.schema import ArrowTable
+from scenicq.store.schema import ADDED, ArrowTable
 from scenicq.store.segment import MapIndexes, SegmentWriter, read_segments
 from scenicq.store.validation import read_sound
 from scenicq.store.writer import DatasetWriter
 
 __all__ = ["rebuild", "recordings_of"]
 
-_PROPERTIES = ("class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy", "track")
+_REALS = ("x", "y", "heading", "width", "length", "height", "vx", "vy")
+_PROPERTIES = ("class", "source_class", *_REALS, "track", "attributes", *OUT_OF_PLANE)
 _SOURCES = {
     "labels": [
         *("frame", "recording", "timestamp_us", "map", "params"),
         *("object_count", "first_object", "sensor_count", "first_sensor"),
-        *(f"ego_{name}" for name in (*_PROPERTIES, "attributes")),
+        *(f"ego_{name}" for name in _PROPERTIES),
     ],
-    "objects": ["id", *_PROPERTIES, "attributes"],
-    "sensors": ["channel", "path"],
+    "objects": ["id", *_PROPERTIES],
+    "sensors": ["channel", "path", *CAMERA_COLUMNS],
 }
 """The columns that are not computed."""
 
@@ -117,15 +119,19 @@ def recordings_of(
             sensor_counts=sensor_counts,
             channels=channels["channel"].to_pylist(),
             paths=channels["path"].to_pylist(),
+            cameras=cameras_of(channels),
         )
 
 
 def _sources(dataset: Dataset, number: int) -> dict[str, ArrowTable]:
     """The tables of a part that others are computed from, without what is computed in them."""
-    parts = {table: dataset.manifest.tables[table][number] for table in _SOURCES}
-    rows = {
-        table: read_sound(table, dataset.place.file(part), part.path, _SOURCES[table]) for table, part in parts.items()
-    }
+    manifest = dataset.manifest
+    parts = {table: manifest.tables[table][number] for table in _SOURCES}
+    later = {name for version, names in ADDED.items() if version > manifest.schema for name in names}
+    rows: dict[str, ArrowTable] = {}
+    for table, part in parts.items():
+        there = [name for name in _SOURCES[table] if name.removeprefix("ego_") not in later]
+        rows[table] = read_sound(table, dataset.place.file(part), part.path, there)
     check_counts(rows, {table: part.path for table, part in parts.items()})
     return rows
 
@@ -134,9 +140,8 @@ def _members(rows: ArrowTable, prefix: str, ids: list[str]) -> MemberColumns:
     texts: dict[str, list[Any]] = {
         name: rows[prefix + name].to_pylist() for name in ("class", "source_class", "track", "attributes")
     }
-    reals = {
-        name: _reals(rows[prefix + name]) for name in ("x", "y", "heading", "width", "length", "height", "vx", "vy")
-    }
+    known = [name for name in OUT_OF_PLANE if prefix + name in rows.column_names]
+    reals = {name: _reals(rows[prefix + name]) for name in (*_REALS, *known)}
     return MemberColumns(
         id=ids,
         category=texts["class"],

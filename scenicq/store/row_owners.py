@@ -18,6 +18,7 @@ import pyarrow.types as kinds
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
+from scenicq.store.camera_rows import CAMERA_COLUMNS, camera_problem, cameras_of
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M, ArrowTable
 from scenicq.store.validation import invalid
 
@@ -29,7 +30,7 @@ PART_COLUMNS = {
     "objects": {"frame", "recording", "timestamp_us", "ordinal", "id", "class", "x", "y", "heading", "ego_right",
                 "ego_ahead", "ego_distance", "relative_heading"},
     "memberships": {"frame", "object", "distance"},
-    "sensors": {"frame", "recording", "timestamp_us", "channel"},
+    "sensors": {"frame", "recording", "timestamp_us", "channel", *CAMERA_COLUMNS},
 }  # fmt: skip
 """The columns of each table by which the tables of a part are compared."""
 
@@ -55,6 +56,7 @@ def check_part(tables: Mapping[str, ArrowTable], names: Mapping[str, str], maps:
         _check_copies(tables[table], labels, owners[table], names[table])
     _check_objects(tables["objects"], labels, owners["objects"], names["objects"])
     _check_unique(tables["sensors"], "channel", owners["sensors"], names["sensors"])
+    _check_cameras(tables["sensors"], names["sensors"])
     _check_class_counts(labels, tables["objects"], owners["objects"], file)
     _check_memberships(tables, names, owners["objects"])
 
@@ -153,6 +155,19 @@ def _check_unique(rows: ArrowTable, column: str, owner: NDArray[np.int64], file:
     again = np.ones(len(pairs), dtype=bool)
     again[first] = False
     _refuse(again, "occurs twice in a label", file, column)
+
+
+def _check_cameras(rows: ArrowTable, file: str) -> None:
+    """A sensor file has a whole camera, or nothing of one."""
+    wide, high, seen, pose = CAMERA_COLUMNS
+    there = ~np.isnan(_reals(rows[wide]))
+    _refuse(np.isnan(_reals(rows[high])) == there, "is there without the width, or is not", file, high)
+    for name, numbers in ((seen, 4), (pose, 7)):
+        wrong = np.diff(rows[name].combine_chunks().offsets.to_numpy()) != np.where(there, numbers, 0)
+        _refuse(wrong, f"has not the {numbers} numbers of a camera, or has numbers without one", file, name)
+    for row, camera in enumerate(cameras_of(rows) if there.any() else ()):
+        if camera is not None and (problem := camera_problem(camera)) is not None:
+            invalid(file, problem, row)
 
 
 def _check_class_counts(labels: ArrowTable, objects: ArrowTable, owner: NDArray[np.int64], file: str) -> None:

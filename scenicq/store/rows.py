@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
 from scenicq.store.arrays import lists_at, number_array, repeated_texts
-from scenicq.store.columns import MemberColumns, Memberships, RecordingColumns
+from scenicq.store.camera_rows import camera_columns
+from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, Memberships, RecordingColumns
 from scenicq.store.motion import motion_of
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
 
@@ -91,6 +92,7 @@ def recording_rows(
                 "frame": repeated_texts(columns.frames, columns.sensor_counts),
                 "channel": columns.channels,
                 "path": columns.paths,
+                **camera_columns(columns.cameras or [None] * len(columns.paths)),
             },
         ),
     }
@@ -182,7 +184,11 @@ def _properties(members: MemberColumns) -> dict[str, Any]:
     reals = ("x", "y", "heading", "width", "length", "height", "vx", "vy")
     texts = {"class": members.category, "source_class": members.source_class}
     texts |= {"track": members.track, "attributes": members.attributes}
-    return texts | {name: getattr(members, name) for name in reals}
+    found = texts | {name: getattr(members, name) for name in reals}
+    for name in OUT_OF_PLANE:
+        values = getattr(members, name)
+        found[name] = np.full(len(members.x), np.nan) if values is None else values
+    return found
 
 
 def _motion(

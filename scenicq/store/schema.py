@@ -19,6 +19,7 @@ from typing import Any, TypeAlias
 import pyarrow as pa
 
 __all__ = [
+    "ADDED",
     "GEO_METADATA",
     "MEMBERSHIP_RADIUS_M",
     "SCHEMAS",
@@ -39,7 +40,10 @@ SCHEMA_VERSION = 4
 """Changes with every change of a table that a reader could notice."""
 
 UPGRADABLE = frozenset({2, 3})
-"""Older versions whose labels, objects, sensors and maps are the same: `scenicq index` computes the rest anew."""
+"""Older versions of which `scenicq index` makes this one: it computes anew what is computed."""
+
+ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}
+"""Columns of the source that came with a version (of egos with `ego_` before); older datasets know nothing there."""
 
 MEMBERSHIP_RADIUS_M = 2.0
 """`memberships` lists the regions within this distance: a position tolerance up to it can be prefiltered."""
@@ -49,6 +53,10 @@ _TEXT, _REAL, _COUNT = pa.string(), pa.float64(), pa.int32()
 
 def _required(name: str, kind: Any) -> Any:
     return pa.field(name, kind, nullable=False)
+
+
+def _out_of_plane(prefix: str) -> list[Any]:
+    return [pa.field(f"{prefix}{name}", _REAL) for name in ("z", "pitch", "roll")]
 
 
 def _motion(prefix: str) -> list[Any]:
@@ -84,6 +92,7 @@ SCHEMAS: dict[str, Any] = {
             pa.field("ego_vy", _REAL),
             pa.field("ego_track", _TEXT),
             pa.field("ego_attributes", _TEXT),  # JSON; null where there is none
+            *_out_of_plane("ego_"),
             *_motion("ego_"),
             _required("ego_road_directions", pa.list_(_REAL)),  # * of every lane at the position; empty: undefined
             pa.field("ego_lane", _TEXT),  # * the lane at the position; of several the one with the nearest centreline
@@ -115,6 +124,7 @@ SCHEMAS: dict[str, Any] = {
             pa.field("vy", _REAL),
             pa.field("track", _TEXT),
             pa.field("attributes", _TEXT),
+            *_out_of_plane(""),
             *_motion(""),
             pa.field("ego_right", _REAL),  # * position in the ego's frame; null where the ego has no heading
             pa.field("ego_ahead", _REAL),  # *
@@ -156,7 +166,18 @@ SCHEMAS: dict[str, Any] = {
             _required("successors", pa.list_(_TEXT)),
         ]
     ),
-    "sensors": pa.schema([_required("frame", _TEXT), _required("channel", _TEXT), _required("path", _TEXT)]),
+    # One row a sensor file. Cameras: all four are known, or none.
+    "sensors": pa.schema(
+        [
+            _required("frame", _TEXT),
+            _required("channel", _TEXT),
+            _required("path", _TEXT),
+            pa.field("image_width", _COUNT),
+            pa.field("image_height", _COUNT),
+            _required("intrinsics", pa.list_(_REAL)),  # fx, fy, cx, cy in pixels; empty: unknown
+            _required("camera_pose", pa.list_(_REAL)),  # x, y, z, and a quaternion w, x, y, z, frame of the map
+        ]
+    ),
     # One row a frame, in order of `hash`: where to find a frame without reading the names of all.
     "frame_index": pa.schema([_required("hash", pa.uint64()), _required("row", pa.int64())]),
 }

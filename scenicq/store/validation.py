@@ -35,8 +35,10 @@ _MOST_BYTES = 1 << 32
 _LONGEST_NAME, _LONGEST_JSON = 1 << 12, 1 << 20
 """Characters of a text."""
 _HALF_TURN = math.pi + 1e-6
-_PLACES = frozenset({"x", "y", "ego_x", "ego_y"})
-_TURNS = frozenset({"heading", "ego_heading", "relative_heading", "road_directions", "ego_road_directions"})
+_PLACES = frozenset({"x", "y", "z", "ego_x", "ego_y", "ego_z"})
+_TURNS = frozenset(
+    "heading ego_heading relative_heading road_directions ego_road_directions pitch roll ego_pitch ego_roll".split()
+)
 _NOT_NEGATIVE = frozenset({"object_count", "first_object", "sensor_count", "first_sensor", "ordinal", "distance"})
 _SIZES = frozenset({"width", "length", "height", "ego_width", "ego_length", "ego_height", "ego_distance"})
 _TEXT_KEYS = frozenset({"frame", "recording", "map"})

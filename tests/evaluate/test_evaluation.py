@@ -11,19 +11,26 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shapely.geometry import Polygon
 
 from scenicq.errors import DataError
 from scenicq.evaluate.detection import detect
 from scenicq.evaluate.evaluation import Evaluation, evaluate
 from scenicq.evaluate.pages import write_pages
+from scenicq.evaluate.region_of_interest import RegionOfInterest
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows
 from scenicq.evaluate.simulation import read_simulated
+from scenicq.geometry.features import MapFeature
 from scenicq.importers.ingest import ingest
+from scenicq.importers.motion import euler
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, Predictions
+from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query, read_program
 from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
+from scenicq.store.writer import write_dataset
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 PARKED = SAMPLES / "parked"
@@ -184,7 +191,21 @@ def test_what_does_not_fit_is_told(street: Dataset, results: list[Result], predi
         return lambda: evaluate({"a": results}, street, found, **more)
 
     without = np.flatnonzero(predictions.frame < len(predictions.frames) - 1)
-    names = ("frame", "category", "x", "y", "heading", "width", "length", "height", "vx", "vy", "score")
+    names = (
+        "frame",
+        "category",
+        "x",
+        "y",
+        "heading",
+        "width",
+        "length",
+        "height",
+        "vx",
+        "vy",
+        "score",
+        "z",
+        "attribute",
+    )
     fewer = replace(
         predictions, frames=predictions.frames[:-1], **{name: getattr(predictions, name)[without] for name in names}
     )
@@ -202,6 +223,21 @@ def test_what_does_not_fit_is_told(street: Dataset, results: list[Result], predi
     refused("file-invalid", lambda: evaluate([{**record(results[0]), "frame": "other"}], street, predictions))
     cast = {"correspondence": {"parkedCar": "nobody"}}
     refused("file-invalid", lambda: evaluate([{**record(results[0]), **cast}], street, predictions))
+
+
+def test_results_say_which_dataset_they_are_of(
+    street: Dataset, results: list[Result], predictions: Predictions
+) -> None:
+    def of(dataset: str) -> list[dict[str, Any]]:
+        return [record(each) | {"dataset": dataset} for each in results]
+
+    mine = name_origin(street)
+    assert evaluation_record(evaluate(of(mine), street, predictions))["dataset"] == mine
+    assert not any("has changed" in each.message for each in evaluate(of(mine), street, predictions).warnings)
+    older = evaluate(of(mine.partition("@")[0] + "@0"), street, predictions)
+    assert sum("the dataset has changed" in each.message for each in older.warnings) == 1
+    told = refused("option-invalid", lambda: evaluate(of("elsewhere@0"), street, predictions))
+    assert "different datasets" in told
 
 
 def test_boxes_of_the_ego_frame(street: Dataset, predictions: Predictions) -> None:
@@ -250,3 +286,88 @@ def test_simulated_runs(tmp_path: Path) -> None:
         file.write_text(text)
         refused("file-invalid", lambda: read_simulated(file))
     refused("file-missing", lambda: read_simulated(tmp_path / "none.csv"))
+
+
+def lone_box(frame: str, **values: float) -> Predictions:
+    """One prediction of a car."""
+    columns = {"x": 0.0, "y": 0.0, "heading": 0.0, "width": 2.0, "length": 4.0, "height": 1.5, "vx": math.nan,
+               "vy": math.nan, "score": 0.5, "z": math.nan, **values}  # fmt: skip
+    zero = np.zeros(1, dtype=np.int32)
+    return Predictions("one.feather", ARGOVERSE2, [frame], zero, ["REGULAR_VEHICLE"], zero, attributes=[],
+                       attribute=np.full(1, -1, dtype=np.int8),
+                       **{name: np.array([value]) for name, value in columns.items()})  # fmt: skip
+
+
+def tilted(folder: Path, *, height: float | None = 2.0) -> Dataset:
+    """An ego with its front down by 0.1 and its left side up by 0.2; in its frame a car 10 m ahead and 1 m above."""
+    ego = LabelObject("ego", "Car", "EGO_VEHICLE", 100.0, 50.0, 0.5, out_of_plane=OutOfPlane(height, 0.1, 0.2))
+    pose = euler(0.2, 0.1, 0.5 + math.pi / 2, (100.0, 50.0, 2.0))
+    car = pose.then(euler(0.0, 0.0, 0.3, (10.0, 0.0, 1.0)))
+    x, y, z = car.origin
+    other = LabelObject("a", "Car", "REGULAR_VEHICLE", x, y, car.heading, 2.0, 4.0, 1.5,
+                        attributes={"num_interior_pts": 9},
+                        out_of_plane=OutOfPlane(z, car.pitch, car.roll))  # fmt: skip
+    label = Label("r/1", "r", 0, "town", ego, (other,))
+    road = MapFeature("d", "drivable", Polygon([(0, 0), (100, 0), (100, 200), (0, 200)]), {})
+    yard = MapFeature("e", "drivable", Polygon([(190, 0), (200, 0), (200, 10), (190, 10)]), {})
+    write_dataset(folder, [Recording("r", "town", (label,))], {"town": (road, yard)}, name="d")
+    return open_dataset(folder)
+
+
+def test_boxes_of_a_tilted_ego_are_compared_in_space(tmp_path: Path) -> None:
+    dataset = tilted(tmp_path / "d")
+    found = detect(dataset, replace(lone_box("r/1", x=10.3, y=0.4, z=1.2, heading=0.7), of_ego=True))
+    assert not found.flat
+    assert found.owner[1.0].tolist() == [0]
+    assert found.owner[0.5].tolist() == [-1]
+    assert found.errors[0, [0, 2]].tolist() == pytest.approx([math.hypot(0.3, 0.4, 0.2), 0.4])
+    far = detect(dataset, replace(lone_box("r/1", x=10.0, z=3.1), of_ego=True))
+    assert far.owner[2.0].tolist() == [-1]
+
+
+def test_without_heights_boxes_are_compared_in_the_plane(tmp_path: Path) -> None:
+    dataset = tilted(tmp_path / "d", height=None)
+    found = detect(dataset, replace(lone_box("r/1", x=10.0, z=9.0), of_ego=True))
+    assert found.flat
+    assert found.owner[4.0].tolist() == [0]
+    result = {"frame": "r/1", "verdict": "match", "recording": "r", "timestamp_us": 0, "correspondence": {},
+              "witness": {}}  # fmt: skip
+    warned = evaluate([result], dataset, replace(lone_box("r/1", x=10.0, z=9.0), of_ego=True)).warnings
+    assert "heights-unknown" in {each.code for each in warned}
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "heading", "counts"),
+    [(106.5, 100, 0.0, False), (106.5, 100, math.pi / 2, True), (203.5, 5, 0.0, False), (99, 100, 0.0, True)],
+)
+def test_boxes_away_from_the_drivable_area_do_not_count(
+    tmp_path: Path, x: float, y: float, heading: float, *, counts: bool
+) -> None:
+    """A corner must lie within 5 m of it, and inside the box of whole metres around it."""
+    dataset = tilted(tmp_path / "d")
+    area = RegionOfInterest(dataset, detect(dataset, lone_box("r/1", x=100, y=50)).frames, 5.0)
+    placed = lone_box("r/1", x=x, y=y, heading=heading)
+    assert area.holds(placed, placed.frame).tolist() == [counts]
+
+
+def test_attributes_of_the_nuscenes_task(street: Dataset, tmp_path: Path) -> None:
+    """An attribute is right or wrong where the label has one; other classes have no such error."""
+    told = {"a": {"vehicle": "parked"}, "b": {"vehicle": "moving"}, "c": {}}
+    cars = tuple(
+        LabelObject(name, "Car", "vehicle.car", 10.0 * place, 0.0, 0.0, 2.0, 4.0, 1.5,
+                    attributes={"num_lidar_pts": 1, **told[name]})
+        for place, name in enumerate("abc")
+    )  # fmt: skip
+    label = Label("f", "r", 0, "none", LabelObject("ego", "Car", "ego", 0.0, 5.0, 0.0), cars)
+    write_dataset(tmp_path / "d", [Recording("r", "none", (label,))], {}, name="d")
+    boxes = [
+        {"translation": [10 * place, 0, 0], "size": [2, 4, 1.5], "rotation": [0.5**0.5, 0, 0, 0.5**0.5],
+         "detection_name": "car", "detection_score": 0.9 - place / 10, "attribute_name": name}
+        for place, name in enumerate(["vehicle.parked", "vehicle.parked", "vehicle.moving"])
+    ]  # fmt: skip
+    file = tmp_path / "boxes.json"
+    file.write_text(json.dumps({"results": {"f": boxes}}))
+    found = detect(open_dataset(tmp_path / "d"), read_predictions(file))
+    assert found.errors[:2, 4].tolist() == [0, 1]
+    assert math.isnan(found.errors[2, 4])
+    assert {"barrier", "traffic_cone"} == NUSCENES.no_attribute

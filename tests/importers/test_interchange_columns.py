@@ -21,6 +21,14 @@ from scenicq.store.labels import Recording
 
 CLASSES = {"car": "Car", "adult": "Adult"}
 JUNK = [None, True, False, 0, -1, 2.5, float("nan"), 10**400, "", "x", "ego", [], [1, None], [1, True], {}, {"a": [1]}]
+CAMERA = {
+    "path": "a.jpg",
+    "width": 640,
+    "height": 360,
+    "intrinsics": [500, 500.5, 320, 180],
+    "position": [1, 2, 1.5],
+    "rotation": [0.5, -0.5, 0.5, -0.5],
+}
 
 reals = st.floats(-1e6, 1e6) | st.integers(-1000, 1000)
 optional_sizes = st.none() | st.floats(0.1, 20)
@@ -34,6 +42,9 @@ members = st.fixed_dictionaries(
         "velocity": st.none() | st.tuples(reals, reals).map(list),
         "track": st.sampled_from([None, "", "t1"]),
         "attributes": scalars,
+        "z": st.none() | reals,
+        "pitch": st.none() | reals,
+        "roll": st.none() | st.floats(-4, 4),
     },
 )
 objects = st.builds(lambda entry, name: entry | {"class": name}, members, st.sampled_from(sorted(CLASSES)))
@@ -52,7 +63,11 @@ def recordings(draw: st.DrawFn) -> list[dict[str, Any]]:
             "ego": draw(egos),
             "objects": [entry | {"id": f"o{n}"} for n, entry in enumerate(draw(st.lists(objects, max_size=3)))],
             "params": draw(scalars),
-            "sensors": draw(st.sampled_from([None, {}, {"CAM": "a.jpg", "LIDAR": "b.bin"}])),
+            "sensors": draw(
+                st.sampled_from(
+                    [None, {}, {"CAM": "a.jpg", "LIDAR": "b.bin"}, {"CAM": CAMERA, "REAR": {"path": "r.jpg"}}]
+                )
+            ),
         }
         for number, time in enumerate(times)
     ]

@@ -1,8 +1,11 @@
 """Observed motion: what a label says counts first, the rest comes from its track, never across a gap."""
 
+import hashlib
+import json
 import math
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from scenicq.errors import DataError, Source
@@ -11,7 +14,9 @@ from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.motion import motion_of
+from scenicq.store.parquet import part_path
 from scenicq.store.rebuild import rebuild
+from scenicq.store.schema import ADDED, SCHEMA_VERSION
 from scenicq.store.writer import write_dataset
 
 CAR = ("Car", "car")
@@ -100,16 +105,47 @@ def test_labels_from_a_store_carry_it(tmp_path):
     assert labels[1].ego.motion.acceleration == 0.0
 
 
+def make_older(folder, version):
+    """Take from a dataset the columns of the source that its version did not have."""
+    manifest = folder / "dataset.json"
+    content = json.loads(manifest.read_text())
+    assert content["schema"] == SCHEMA_VERSION
+    added = {name for later, names in ADDED.items() if later > version for name in names}
+    (description,) = (folder / "segments").iterdir()
+    texts = {manifest: manifest.read_text(), description: description.read_text()}
+    for table in ("labels", "objects", "sensors"):
+        (part,) = content["tables"][table]
+        file = folder / part["path"]
+        rows = pq.read_table(file)
+        pq.write_table(rows.drop_columns([n for n in rows.column_names if n.removeprefix("ego_") in added]), file)
+        data = file.read_bytes()
+        digest = hashlib.sha256(data).hexdigest()
+        named = part_path(table, 0, digest)
+        file.rename(folder / named)
+        new = {
+            part["path"]: named,
+            part["sha256"]: digest,
+            f'"bytes": {part["bytes"]}': f'"bytes": {len(data)}',
+            f"[{part['bytes']},": f"[{len(data)},",
+        }
+        for before, after in new.items():
+            texts = {changed: text.replace(before, after) for changed, text in texts.items()}
+    texts[manifest] = texts[manifest].replace(f'"schema": {SCHEMA_VERSION}', f'"schema": {version}')
+    for changed, text in texts.items():
+        changed.write_text(text)
+
+
 def test_an_older_dataset_is_brought_up_to_date(tmp_path):
     write_dataset(tmp_path / "d", [recording([0, 0.5, 1.0], along([(0, 0), (0, 2), (0, 8)]))], {}, name="d")
     manifest = tmp_path / "d" / "dataset.json"
     before = manifest.read_text()
-    manifest.write_text(before.replace('"schema": 4', '"schema": 2'))
-    with pytest.raises(DataError, match="version 2") as refused:
-        open_dataset(tmp_path / "d")
-    assert "scenicq index" in refused.value.diagnostics[0].hints[0]
-    rebuild(open_dataset(tmp_path / "d", older=True))
-    assert manifest.read_text() == before
+    for version in (2, 3):
+        make_older(tmp_path / "d", version)
+        with pytest.raises(DataError, match=f"version {version}") as refused:
+            open_dataset(tmp_path / "d")
+        assert "scenicq index" in refused.value.diagnostics[0].hints[0]
+        rebuild(open_dataset(tmp_path / "d", older=True, check=False))
+        assert manifest.read_text() == before
 
 
 def test_a_derived_speed_is_compared_and_read(tmp_path):

@@ -40,12 +40,15 @@ class LogDensity:
         error: Standard error of it.
         fixed: Features that the program fixes by an equality, which have no density and count nothing.
         reason: Why it is not known.
+        log_weight: Logarithm of how much a frame counts where the frames that match are to be spread as the program
+            spreads its scenes; over the results of a map weights are 1 in the mean. None where it is not known.
     """
 
     log: float | None
     error: float = 0.0
     fixed: tuple[str, ...] = ()
     reason: str = ""
+    log_weight: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +105,7 @@ def record(result: Result) -> dict[str, Any]:
     if density is not None:
         found["log_density"] = density.log
         found["log_density_error"] = None if density.log is None else density.error
+        found["log_weight"] = density.log_weight
         if density.reason:
             found["no_density"] = density.reason
     return found

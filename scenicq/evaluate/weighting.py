@@ -1,0 +1,123 @@
+"""Frames spread as a program spreads its scenes: how much each frame that matches counts.
+
+The frames of a dataset that match are not spread as the program would draw them: some gaps, some roads are more
+frequent on the way. A frame counts by the density with which the program generates its values of random variables, over
+that with which the dataset has them (importance sampling). The second is estimated from the frames themselves, by a
+kernel density estimate with reflection at the ends of what is seen (Silverman 1986, sections 2.10 and 4.5). So weights
+are as smooth as that: what a dataset has hardly ever still counts too little, the more so the more variables there are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.evaluate.comparison import Share, percent
+from scenicq.evaluate.resampling import FEW, effective_number, rate_interval
+
+__all__ = ["Weighted", "log_weights", "weighted"]
+
+Reals = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_MOST = 2000
+"""Frames of which the estimate is made, at most."""
+_CHUNK = 500
+
+
+def log_weights(log_density: Reals, values: Reals, finite: Sequence[Hashable], seed: int = 0) -> Reals:
+    """Logarithms of the weights of frames, which are 1 in the mean; shape (n,).
+
+    Args:
+        log_density: Of the program at the values of each frame, up to a constant, shape (n,); finite.
+        values: Of the continuous random variables, shape (n, variables).
+        finite: What the frame has of features without a density; frames count as neighbours where it is the same.
+        seed: Of the choice of frames that the estimate is made of, where there are many.
+    """
+    count = len(log_density)
+    if not count:
+        return np.zeros(0)
+    kinds: dict[Hashable, int] = {}
+    kind = np.array([kinds.setdefault(each, len(kinds)) for each in finite])
+    spread = values.std(axis=0)
+    points = values[:, spread > 0] / spread[spread > 0]
+    chosen = np.arange(count)
+    if count > _MOST:
+        chosen = np.random.default_rng(seed).choice(count, _MOST, replace=False)
+    dimension = points.shape[1]
+    # Silverman's rule for a normal kernel
+    width = (4 / (dimension + 2) / len(chosen)) ** (1 / (dimension + 4))
+    low, high = (points.min(axis=0), points.max(axis=0)) if dimension else (points, points)
+    found = np.empty(count)
+    for start in range(0, count, _CHUNK):
+        mine = slice(start, start + _CHUNK)
+        near = (kind[mine, None] == kind[None, chosen]).astype(np.float64)
+        for axis in range(dimension):
+            one, other = points[mine, None, axis], points[None, chosen, axis]
+            away = (one - other, one + other - 2 * low[axis], one + other - 2 * high[axis])
+            near *= sum(np.exp(-np.square(each) / (2 * width * width)) for each in away)
+        with np.errstate(divide="ignore"):
+            found[mine] = log_density[mine] - np.log(near.sum(axis=1))
+    # where none of the frames that were chosen is near, the estimate says nothing: such a frame counts as the most
+    found = np.where(np.isfinite(found), found, found[np.isfinite(found)].max(initial=0.0))
+    return found - found.max() - math.log(float(np.exp(found - found.max()).mean()))
+
+
+@dataclass(frozen=True, slots=True)
+class Weighted:
+    """How often objects are missed where frames are spread as the program spreads its scenes.
+
+    Attributes:
+        about: Which objects, such as "role parkedCar".
+        share: How often they are missed; its counts are sums of weights, which are 1 in the mean.
+        objects: How many have a weight.
+        left_out: How many have none: the program has no density there.
+        equal: How many objects of one weight would tell as much (Kish).
+        recordings: How many equally large recordings would tell as much.
+    """
+
+    about: str
+    share: Share
+    objects: int
+    left_out: int
+    equal: float
+    recordings: float
+
+    @property
+    def sentence(self) -> str:
+        """All of it in one line."""
+        if not self.objects:
+            return f"{self.about} as the program spreads it: no density is known"
+        text = f"missed {percent(self.share)} of {self.about} as the program spreads it"
+        text += f"; {self.objects} objects tell as much as {self.equal:.0f} of one weight"
+        if self.left_out:
+            text += f", {self.left_out} without a density are left out"
+        return text + (": too few recordings for a verdict" if self.recordings < FEW else "")
+
+
+def weighted(about: str, missed: Bools, log_weight: Reals, recording: NDArray[np.int64], weights: Reals) -> Weighted:
+    """The share of some objects that was missed, each counting by its weight.
+
+    Args:
+        about: Which objects.
+        missed: Whether each was missed, shape (n,).
+        log_weight: Logarithm of the weight of each, nan without, shape (n,).
+        recording: Number of the recording of each, shape (n,).
+        weights: How often each recording counts in each resample, shape (resamples, recordings).
+    """
+    known = ~np.isnan(log_weight)
+    missed, recording, weight = missed[known], recording[known], np.exp(log_weight[known])
+    recordings = weights.shape[1]
+    of = np.bincount(recording, weights=weight, minlength=recordings).astype(np.float64)
+    lost = np.bincount(recording, weights=weight * missed, minlength=recordings).astype(np.float64)
+    total = float(of.sum())
+    rate = float(lost.sum()) / total if total else math.nan
+    with np.errstate(invalid="ignore", divide="ignore"):
+        resampled = (weights @ lost) / (weights @ of)
+    number = effective_number(of)
+    share = Share(float(lost.sum()), total, rate, rate_interval(resampled, rate, number))
+    return Weighted(about, share, len(weight), int((~known).sum()), effective_number(weight), number)
