@@ -11,6 +11,9 @@ param timestep = 0.1
 class _Steered(Vehicle, Steers):
     blueprint: None
 
+    def setVelocity(self, velocity):
+        self.velocity = Vector(*velocity)
+
     @property
     def isCar(self):
         return True
@@ -18,6 +21,9 @@ class _Steered(Vehicle, Steers):
 
 class Car(Car):
     blueprint: None
+
+    def setVelocity(self, velocity):
+        self.velocity = Vector(*velocity)
 
 
 class NPCCar(Car):

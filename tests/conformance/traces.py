@@ -125,8 +125,6 @@ def judge(
     last = len(each.states) - 1
     spans = [(int(one["frames"]["last"].rpartition("/")[2]), one["verdict"], one["correspondence"]) for one in found]
     hidden = HIDDEN.search(text) is not None
-    if each.kind == "whole" and end != last:
-        row.said.append(f"{each.name}: replayed, Scenic says {said} of {last}")
     slack = 1 if each.kind == "jitter" else 0  # what is measured from the first sample is measured from a noisy one
     if end is None:
         if hidden:
@@ -168,6 +166,10 @@ def compare(name: str, path: Path, original: Original, work: Path, seeds: int) -
         except ValueError as error:
             row.said.append(f"refused: {str(error)[:300]}")
             return row
+        # what a behavior has ended is cut off for the rest of a program that ends otherwise
+        last = len(recorded[0].states) - 1
+        if expected_end(said[0], open_ended=not ends) != last and trace["end"] != "terminatedByBehavior":
+            row.said.append(f"whole: replayed, Scenic says {said[0]} of {last}")
         for each, verdict in zip(recorded, said, strict=True):
             judge(row, each, verdict, found.get(each.name, []), text=text, ends=ends)
     return row
