@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from programs import HEADER, PROGRAMS
 from scenes import STREET, compiled, drawn, label_of
@@ -112,6 +112,7 @@ def test_what_surely_matches_is_not_decided_one_by_one(name, monkeypatch):
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=64)
 
 
+@settings(derandomize=True, deadline=None, max_examples=100, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.tuples(numbers, numbers, numbers), min_size=1, max_size=20))
 def test_columns_are_what_numbers_are(rows):
     values, lows, highs = (np.array(each) for each in zip(*rows, strict=True))
