@@ -61,7 +61,7 @@ def test_each_program_finds_its_recording(town, name):
     assert told(records) == FOUND[name]
     for each in records:
         assert list(each) == [
-            "recording", "start_us", "end_us", "frames", "verdict", "correspondence", "witness", "open_ended"
+            "recording", "start_us", "end_us", "frames", "verdict", "correspondence", "witness", "open_ended", "dataset"
         ]  # fmt: skip
         assert each["verdict"] == "match"
         assert each["open_ended"] == (name in MORE_OPTIONS)
