@@ -14,6 +14,7 @@ from pathlib import Path
 import click
 
 from scenicq.match.verdict import NoMatch
+from scenicq.query.execution.result_origin import ORIGIN, name_origin
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query
 from scenicq.store.atomic_files import sole_writer
@@ -71,6 +72,7 @@ def _deliver(
     started = time.perf_counter()
     unlisted = 0
     file, report = wanted.file, wanted.report
+    origin = name_origin(query.dataset)
     exporter = None
     if wanted.export is not None:
         from scenicq.exporters.export import Exporter  # noqa: PLC0415 - takes long to load
@@ -85,12 +87,13 @@ def _deliver(
                 sink,
                 query.roles,
                 query.dataset.short_frames,
+                origin=origin,
                 ranked=wanted.ranked,
                 over_time=query.is_over_time(),
             )
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
-                writer.write(record(result))
+                writer.write(record(result) | {ORIGIN: origin})
             unlisted += wanted.form == "ids" and isinstance(result.verdict, NoMatch)
             if exporter is not None:
                 exporter.add(result)

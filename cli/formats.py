@@ -11,6 +11,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, BinaryIO, Protocol
 
+from scenicq.query.execution.result_origin import ORIGIN
 from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
 
 from .report import CONTROL as _CONTROL
@@ -52,7 +53,7 @@ _INTERVAL_COLUMNS: tuple[str, ...] = (
 
 
 class Writer(Protocol):
-    """Writes results one by one."""
+    """Writes results one by one: records, which name their dataset if it is known."""
 
     def write(self, record: Mapping[str, Any]) -> None:
         """Write one result as `scenicq.query.execution.results.record` gives it."""
@@ -112,7 +113,9 @@ class _Csv:
         self._rows.writeheader()
 
     def write(self, record: Mapping[str, Any]) -> None:
-        row = _flat(record, self._names) | {name: record.get(name) for name in DENSITY_COLUMNS if name in self._names}
+        row = _flat(record, self._names) | {
+            name: record.get(name) for name in (*DENSITY_COLUMNS, ORIGIN) if name in self._names
+        }
         self._rows.writerow({name: safe_cell(value) for name, value in row.items()})
         self._text.flush()
 
@@ -121,10 +124,10 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, roles: Sequence[str], *, ranked: bool, over_time: bool) -> None:
+    def __init__(self, sink: BinaryIO, roles: Sequence[str], origin: str, *, ranked: bool, over_time: bool) -> None:
         import pyarrow.parquet as pq  # noqa: PLC0415 - takes long to load
 
-        self._schema = result_schema(roles, ranked=ranked, over_time=over_time)
+        self._schema = result_schema(roles, origin=origin, ranked=ranked, over_time=over_time)
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Mapping[str, Any]] = []
 
@@ -148,6 +151,7 @@ def make_writer(
     roles: Callable[[], Sequence[str]],
     shorten: Callable[[], Callable[[str], str]] | None = None,
     *,
+    origin: str = "",
     ranked: bool = False,
     over_time: bool = False,
 ) -> Writer:
@@ -158,18 +162,20 @@ def make_writer(
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
         shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
+        origin: The dataset that the results come from; "" where it is not known.
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
     """
     names = _INTERVAL_COLUMNS if over_time else _COLUMNS
     if name == "parquet":
-        return _Parquet(sink, roles(), ranked=ranked, over_time=over_time)
+        return _Parquet(sink, roles(), origin, ranked=ranked, over_time=over_time)
     text = Text(sink)
     match name:
         case "table":
             return Table(text, shorten, over_time=over_time)
         case "csv":
-            return _Csv(text, (*names, *(DENSITY_COLUMNS if ranked else ())))
+            more = (*(DENSITY_COLUMNS if ranked else ()), *((ORIGIN,) if origin else ()))
+            return _Csv(text, (*names, *more))
         case "ids":
             return _Lines(text, _name)
         case _:

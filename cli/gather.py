@@ -11,6 +11,7 @@ from scenicq.exporters.forms import FORMS
 from scenicq.query.execution.partitions import Gathered
 from scenicq.query.execution.partitions import gather as find_pieces
 from scenicq.query.execution.record_reader import noted_question, read_record
+from scenicq.query.execution.result_origin import ORIGIN
 from scenicq.query.execution.result_tables import roles_of
 
 from .deliver import Wanted, deliver
@@ -64,8 +65,9 @@ def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Pat
 
 def _write(gathered: Gathered, file: Path | None, form: str) -> None:
     with destination(file) as sink, writing(file):
-        over_time = "frames" in next(gathered.records(), dict[str, Any]())
-        writer = make_writer(form, sink, lambda: roles_of(gathered.records()), over_time=over_time)
+        first = next(gathered.records(), dict[str, Any]())
+        origin, over_time = first.get(ORIGIN, ""), "frames" in first
+        writer = make_writer(form, sink, lambda: roles_of(gathered.records()), origin=origin, over_time=over_time)
         for each in gathered.records():
             writer.write(each)
         writer.finish()

@@ -11,6 +11,7 @@ import click
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.partitions import fingerprint, gather, is_done, partitions, write_partition
 from scenicq.query.execution.record_reader import note_question
+from scenicq.query.execution.result_origin import ORIGIN, name_origin
 from scenicq.query.execution.results import Funnel, record
 from scenicq.query.execution.run import Query
 
@@ -38,7 +39,9 @@ def _whole(query: Query, shard: Shard, bar: ProgressBar) -> Iterator[dict[str, A
     Raises:
         DataError: deadline-passed.
     """
-    yield from map(record, query.results(bar.advance))
+    origin = name_origin(query.dataset)
+    for result in query.results(bar.advance):
+        yield record(result) | {ORIGIN: origin}
     if query.funnel.cut:
         number, count = shard
         message = f"shard {number}/{count} was not finished by the --deadline, and a shard is kept whole or not at all"

@@ -13,6 +13,7 @@ from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.following import follow
 from scenicq.compiler.known_properties import settled
+from scenicq.compiler.lanes_ahead import lanes_ahead
 from scenicq.compiler.lookups import among
 from scenicq.compiler.road_attributes import worked_out
 from scenicq.compiler.values import Builtin, ModelValue, describe, fail
@@ -66,6 +67,8 @@ def method_of(run: Runner, value: NetworkElement, name: str) -> Builtin | None:
         return nominal_directions(run, run.network)
     if name == "maneuversAt" and isinstance(value, Intersection):
         return Builtin(name, lambda span, point: _maneuvers_at(run, value, point, span))
+    if name == "lanesAhead" and isinstance(value, Lane):
+        return Builtin(name, lambda span, distance=50: build.constant(lanes_ahead(run, value, distance, span), span))
     if name == "shiftedBy" and isinstance(value, LaneSection):
         return Builtin(name, lambda span, offset: _shifted(run, value, offset, span))
     if name == "flowFrom" and value.orientation is not None:

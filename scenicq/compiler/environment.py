@@ -72,6 +72,15 @@ class Budget:
         self.depth -= 1
 
 
+_SYNONYMS = {
+    "crosswalk": "crossing", "zebra": "crossing", "walkway": "sidewalk", "footpath": "sidewalk", "pavement": "sidewalk",
+    "junction": "intersection", "crossroads": "intersection", "street": "road", "roadway": "road", "kerb": "curb",
+    "Person": "Pedestrian", "Walker": "Pedestrian", "Adult": "Pedestrian", "Bike": "Bicycle", "Cyclist": "Bicycle",
+    "Bicyclist": "Bicycle", "Motorbike": "Motorcycle", "Motorcyclist": "Motorcycle", "Lorry": "Truck",
+}  # fmt: skip
+"""What people call what the driving model has."""
+
+
 class Environment:
     """Names and their values, inside those of an enclosing environment.
 
@@ -149,6 +158,8 @@ class Environment:
             current = current.parent
         close = get_close_matches(name, sorted(known), 1, 0.75)
         hints = (f"`{close[0]}` has a similar name",) if close else ()
+        if not close and _SYNONYMS.get(name) in known:
+            hints = (f"`{_SYNONYMS[name]}` is what Scenic calls it",)
         if not close and "roadDirection" not in known:
             hints = ("names such as `road` and `Car` come with `model scenic.domains.driving.model`",)
         raise fail("unknown-name", f"`{name}` is not defined", span, "not found", hints)

@@ -26,6 +26,7 @@ from scenicq.evaluate.weighting import Weighted, weighted
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
 from scenicq.query.execution.result_files import read_records
+from scenicq.query.execution.result_origin import ORIGIN, check_origins, name_origin
 from scenicq.query.execution.results import Result, record
 from scenicq.store.dataset import Dataset
 
@@ -101,6 +102,7 @@ class Evaluation:
     """A model judged on the frames of scenarios.
 
     Attributes:
+        dataset: The dataset and its version, as `name_origin` says it.
         predictions: Name of the file.
         distance_m: Centre distance within which an object counts as found.
         least_score: Score from which a prediction counts, but for average precision.
@@ -109,6 +111,7 @@ class Evaluation:
         detection: Labels and predictions, for pictures.
     """
 
+    dataset: str
     predictions: str
     distance_m: float
     least_score: float
@@ -155,8 +158,9 @@ def evaluate(
     detection = detect(dataset, predictions, missing)
     rng = np.random.default_rng(seed)
     judge = _Judge(detection, distance_m, least_score, rng)
-    found = [judge.scenario(read_matched(name, _records(each), detection.frames, detection.objects))
-             for name, each in named.items()]  # fmt: skip
+    doubts: list[Diagnostic] = []
+    found = [judge.scenario(read_matched(name, _own(name, _records(each), dataset, doubts), detection.frames,
+                                         detection.objects)) for name, each in named.items()]  # fmt: skip
     found = _corrected(found)
     if runs is not None:
         missing_runs = [each.name for each in found if each.name not in runs]
@@ -166,7 +170,13 @@ def evaluate(
             raise DataError(Diagnostic("file-invalid", message, hints=(hint,)))
         found = [replace(each, simulated=verdict(runs[each.name], _decisive(each))) for each in found]
     return Evaluation(
-        predictions.name, distance_m, least_score, tuple(found), tuple(_warnings(found, detection)), detection
+        name_origin(dataset),
+        predictions.name,
+        distance_m,
+        least_score,
+        tuple(found),
+        (*doubts, *_warnings(found, detection)),
+        detection,
     )
 
 
@@ -180,6 +190,20 @@ def _records(results: Results) -> Iterator[Mapping[str, Any]]:
     else:
         for each in results:
             yield record(each) if isinstance(each, Result) else each
+
+
+def _own(
+    name: str, records: Iterable[Mapping[str, Any]], dataset: Dataset, doubts: list[Diagnostic]
+) -> Iterator[Mapping[str, Any]]:
+    """The records, once it is sure that they do not name another dataset; another version of it is a doubt."""
+    mine = {ORIGIN: name_origin(dataset)}
+    seen: set[Any] = set()
+    for each in records:
+        if each.get(ORIGIN) not in seen:
+            seen.add(each.get(ORIGIN))
+            doubt = check_origins((f"{name} (results)", [each]), (dataset.name, [mine]))
+            doubts += [] if doubt is None else [doubt]
+        yield each
 
 
 def _decisive(scenario: ScenarioEvaluation) -> Comparison:

@@ -103,6 +103,7 @@ def _slice(each: Slice) -> dict[str, Any]:
 def evaluation_record(evaluation: Evaluation) -> dict[str, Any]:
     """All figures as nested values, ready for JSON."""
     return {
+        "dataset": evaluation.dataset,
         "predictions": evaluation.predictions,
         "found_within_m": evaluation.distance_m,
         "least_score": evaluation.least_score,

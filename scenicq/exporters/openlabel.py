@@ -2,12 +2,14 @@
 
 The frame of reference is the map's. It has no height, so boxes have z = 0 at their centre. An object whose size or
 heading is not known has no box, but a position and what is known of the rest. Maps have no place in the format.
+The keys are those that the published schema demands.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,8 @@ from scenicq.store.labels import Label, LabelObject
 __all__ = ["write_openlabel"]
 
 _MAP = "map"
+_UUID = re.compile("[0-9a-fA-F]{8}(-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}")
+"""What an object may be called by, besides a whole number: other names of tracks are its `name` only."""
 
 
 def write_openlabel(dataset: Dataset, matched: Mapping[str, Matched], folder: Path, scenario: str) -> list[Diagnostic]:
@@ -58,6 +62,7 @@ def _members(label: Label) -> tuple[LabelObject, ...]:
 
 
 def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str, Matched], scenario: str) -> None:
+    keys: dict[str, str] = {}
     objects: dict[str, dict[str, Any]] = {}
     frames: dict[str, Any] = {}
     tags: dict[str, Any] = {}
@@ -67,8 +72,9 @@ def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str,
             roles.setdefault(member, []).append(role)
         members: dict[str, Any] = {}
         for member in _members(label):
-            key = member.track or member.id if member.id != "ego" else "ego"
-            objects.setdefault(key, {"name": key, "type": member.category})
+            name = member.track or member.id if member.id != "ego" else "ego"
+            key = keys.setdefault(name, name if _UUID.fullmatch(name) else str(len(keys)))
+            objects.setdefault(key, {"name": name, "type": member.category})
             members[key] = {"object_data": _data(member, roles.get(member.id, []))}
         properties: dict[str, Any] = {"timestamp": f"{label.timestamp_us / 1e6:.6f}", "frame_id": label.frame}
         if label.sensors:

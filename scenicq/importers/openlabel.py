@@ -1,8 +1,8 @@
 """ASAM OpenLABEL 1.0 JSON with cuboids: a file is a recording, a frame of it a label. There is no map.
 
 A cuboid lies in a coordinate system; systems have parents, by poses that are fixed or given for a frame. The map frame
-is the one without a parent. The ego is an object called `ego`, or else a system of a vehicle, at its origin; files that
-have neither have no ego: see `ego_choice`.
+is the one without a parent. The ego is an object whose key or name is `ego`, or else a system of a vehicle, at its
+origin; files that have neither have no ego: see `ego_choice`.
 """
 
 from __future__ import annotations
@@ -174,12 +174,14 @@ def _objects(
         try:
             known = fields.optional_record(objects, name)
             kind = fields.optional_text(known, "type") or "unknown"
-            if kind in _PSEUDO or fields.optional_text(known, "name") in _PSEUDO:
+            own = fields.optional_text(known, "name")
+            if kind in _PSEUDO or own in _PSEUDO:
                 continue
             data = fields.optional_record(fields.record(value, "it"), "object_data")
             cuboids = fields.optional_items(data, "cuboid")
             if cuboids:  # an object that a frame only names, or that has a box in an image, has no place
-                found.append(_object(name, kind, fields.record(cuboids[0], "the cuboid"), world, classes))
+                played = "ego" if own == "ego" else name
+                found.append(_object(played, kind, fields.record(cuboids[0], "the cuboid"), world, classes))
         except InvalidError as error:
             report.left_out("object", "record-invalid", f"{where}: object `{name}`: {error}")
     return found

@@ -20,6 +20,7 @@ from scenicq.match.verdict import NoMatch
 from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import Picture, Text
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.result_origin import ORIGIN, name_origin
 from scenicq.query.execution.result_tables import result_schema, result_table
 from scenicq.query.execution.results import Funnel, Result, record
 from scenicq.query.execution.run import Query
@@ -54,7 +55,7 @@ class FrameResult:
     @property
     def record(self) -> Mapping[str, Any]:
         """The values that a line of `scenicq match --format jsonl` has."""
-        return record(self.result)
+        return record(self.result) | {ORIGIN: self.matches.origin}
 
     @property
     def frame(self) -> str:
@@ -116,16 +117,19 @@ class Matches(Sequence[FrameResult]):
 
     Attributes:
         query: Dataset, program and options.
+        origin: The dataset and its version, as results name it.
     """
 
     query: Query
     _found: list[FrameResult] = field(default_factory=list["FrameResult"])
     _rest: Iterator[Result] | None = None
     _backdrops: dict[str, Backdrop] = field(default_factory=dict[str, Backdrop])
+    origin: str = field(init=False)
 
     def __post_init__(self) -> None:
         """Compile the program, so that its errors come now."""
         self.query.plans()
+        self.origin = name_origin(self.query.dataset)
 
     def __iter__(self) -> Iterator[FrameResult]:
         """The results in the order of recording, time and frame."""
@@ -169,7 +173,8 @@ class Matches(Sequence[FrameResult]):
 
     def to_arrow(self) -> pa.Table:
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
-        return result_table((each.record for each in self._all()), result_schema(self.query.roles()))
+        schema = result_schema(self.query.roles(), origin=self.origin)
+        return result_table((each.record for each in self._all()), schema)
 
     def to_pandas(self) -> Any:
         """The results as a data frame; pandas is to be installed."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,9 +11,13 @@ from scenicq.report.frames import badge, frame_facts
 from scenicq.report.picture import Shot, View, draw_shot, ground, plane_of, view_of
 from scenicq.report.runs import Run
 from scenicq.report.sensors import Sensor
+from scenicq.report.sheet import tile
 from scenicq.report.svg import element, escape
 
-__all__ = ["Card", "draw_card"]
+__all__ = ["TILE_LETTERS", "Card", "best_frame", "draw_card", "draw_tile"]
+
+TILE_LETTERS = 10.0
+"""Height of names in small pictures, in hundredths of the way from the middle to an edge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,14 +74,46 @@ def _inline(card: Card) -> str:
     ]
     return element(
         "svg",
-        ground(plane, bounds),
-        card.backdrop.draw(plane, bounds),
+        element("g", ground(plane, bounds), card.backdrop.draw(plane, bounds), id=f"map-{card.number}"),
         *groups,
         class_="picture",
         role="img",
         aria_label=_told(card.shots[0]),
         viewBox=" ".join(map(str, views[0].box(plane))),
     )
+
+
+def best_frame(run: Run, shots: Sequence[Shot]) -> int:
+    """Index of the frame in which the farthest of the roles is nearest to the ego, of equal ones the middle one.
+
+    Args:
+        run: The run.
+        shots: Its frames.
+    """
+    middle = (len(shots) - 1) / 2
+    far = [max((math.hypot(r.thing.x - s.label.ego.x, r.thing.y - s.label.ego.y) for r in s.roles), default=0.0)
+           for s in shots]  # fmt: skip
+    return min(range(len(run.results)), key=lambda place: (round(far[place], 1), abs(place - middle)))
+
+
+def draw_tile(card: Card, image: str | None = None) -> str:
+    """The best frame of a run as a small picture that leads to the run.
+
+    Args:
+        card: What the run's card is made of.
+        image: Address of the small picture beside the report; None if it is drawn in it, over the card's map.
+    """
+    best = best_frame(card.run, card.shots)
+    shot, plane = card.shots[best], plane_of(card.shots[0].label)
+    told = _told(shot)
+    if image is not None:
+        picture = f'<img loading="lazy" width="320" height="320" src="{escape(image)}" alt="{escape(told)}">'
+    else:
+        view = view_of(shot.label, shot.roles)
+        below = element("use", href=f"#map-{card.number}")
+        picture = element("svg", below, draw_shot(shot, plane, view, TILE_LETTERS), class_="small", role="img",
+                          aria_label=told, viewBox=" ".join(map(str, view.box(plane))))  # fmt: skip
+    return tile(card.run, card.number, best, picture)
 
 
 def _beside(card: Card, pictures: tuple[str, ...]) -> str:

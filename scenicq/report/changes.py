@@ -10,6 +10,7 @@ from typing import Literal, cast
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.result_files import Record
+from scenicq.query.execution.result_origin import check_origins
 from scenicq.report.frames import table
 from scenicq.report.page import page
 from scenicq.report.svg import element, escape
@@ -86,18 +87,19 @@ def changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> list[C
 
 
 def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) -> Diagnostic | None:
-    """Refuse results of different datasets, as far as they show it.
+    """Refuse results of different datasets: by the names that they give, else as far as recordings and times show it.
 
     Args:
         before: Records of the first file by frame.
         after: Records of the second.
 
     Returns:
-        A warning where the files have no recording in common; None where all is well.
+        A warning where the files are of different versions or have no recording in common; None where all is well.
 
     Raises:
-        DataError: option-invalid, where a frame of both has another recording or time.
+        DataError: option-invalid, where the names differ, or a frame of both has another recording or time.
     """
+    doubt = check_origins(("A", before.values()), ("B", after.values()))
     for frame in sorted(before.keys() & after.keys()):
         old, new = ((each["recording"], each.get("timestamp_us")) for each in (before[frame], after[frame]))
         if old != new:
@@ -105,10 +107,10 @@ def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) ->
             message += f"{new[0]} at {new[1]} in B"
             raise DataError(Diagnostic("option-invalid", message))
     recordings = [{each["recording"] for each in records.values()} for records in (before, after)]
-    if before and after and recordings[0].isdisjoint(recordings[1]):
+    if doubt is None and before and after and recordings[0].isdisjoint(recordings[1]):
         message = "the files have no recording in common: they may be of different datasets"
         return Diagnostic("option-invalid", message, severity="warning")
-    return None
+    return doubt
 
 
 def _cast(roles: Mapping[str, str]) -> str:

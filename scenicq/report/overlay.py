@@ -11,6 +11,7 @@ import numpy as np
 from scenicq.errors import Span
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import features
+from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.verdict import Match, Verdict
@@ -93,7 +94,8 @@ def draw_overlay(
             rough = "" if place.exact else " rough"
             told = element("title", escape(f"where {role.name} may be{'' if place.exact else ', at most'}"))
             classes = f"place {kind}{rough} {role.colour}{_red(broken, role, 'position')}"
-            parts.append(element("path", told, class_=classes, d=area_path(place.shapes, plane)))
+            area = (shapes.union_all(place.shapes),) if place.fixed else place.shapes
+            parts.append(element("path", told, class_=classes, d=area_path(area, plane)))
     for role in roles:
         headings = allowed_headings(scenario, role.index, observed)
         for low, high in headings or ():

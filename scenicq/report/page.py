@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from importlib import resources
 
 from scenicq import __version__
-from scenicq.report.hatching import hatching
 from scenicq.report.legend import legend
 from scenicq.report.picture import stylesheet
 from scenicq.report.svg import element, escape
@@ -56,9 +55,8 @@ def page(title: str, body: Sequence[str], *, script: bool = True) -> str:
         f'<meta name="generator" content="{GENERATOR} {escape(__version__)}">'
         f"{element('title', escape(title))}<style>{style}</style>"
     )
-    patterns = element("svg", hatching(), class_="patterns", width=0, height=0, aria_hidden="true")
     end = f"<script>{code}</script>" if script else ""
-    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{"".join(body)}{patterns}{end}</body></html>\n'
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{"".join(body)}{end}</body></html>\n'
 
 
 def _select(name: str, label: str, options: Sequence[tuple[str, str]]) -> str:
@@ -91,7 +89,9 @@ def _toolbar(recordings: Sequence[str], kinds: Sequence[str]) -> str:
     )
 
 
-def runs_section(cards: Sequence[str], recordings: Sequence[str], kinds: Sequence[str], note: str) -> str:
+def runs_section(
+    cards: Sequence[str], recordings: Sequence[str], kinds: Sequence[str], note: str, what: str = "run"
+) -> str:
     """The runs, with what filters and sorts them.
 
     Args:
@@ -99,6 +99,7 @@ def runs_section(cards: Sequence[str], recordings: Sequence[str], kinds: Sequenc
         recordings: Names of all their recordings.
         kinds: Kinds of verdicts that there are: match, unknown, near.
         note: What the reader should know, or nothing.
+        what: What a card is about: a run, or an interval.
     """
     empty = element("p", "No frame matches. The funnel says what excluded them.", class_="hint") if not cards else ""
     return element(
@@ -108,6 +109,6 @@ def runs_section(cards: Sequence[str], recordings: Sequence[str], kinds: Sequenc
         empty,
         _toolbar(recordings, kinds) if cards else "",
         legend() if cards else "",
-        element("div", *cards, id="runs"),
+        element("div", *cards, id="runs", data_what=what),
         aria_labelledby="runs-title",
     )

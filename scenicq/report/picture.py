@@ -16,22 +16,40 @@ from scenicq.geometry.shapes import XY, Bounds
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.query.explain.frame_explanation import Explanation
 from scenicq.report.backdrop import Backdrop
-from scenicq.report.hatching import hatching
+from scenicq.report.distances import draw_distances, measured_distances
 from scenicq.report.overlay import Blame, blames, draw_blame, draw_overlay, draw_witness
-from scenicq.report.scene import Role, box_of, draw_object, draw_text, find_roles
+from scenicq.report.scene import Role, box_of, draw_object, draw_text, find_roles, observed_by
 from scenicq.report.svg import Plane, element, escape
 from scenicq.store.labels import Label
 
-__all__ = ["Shot", "Style", "View", "caption", "draw", "draw_shot", "ground", "plane_of", "stylesheet", "view_of"]
+__all__ = [
+    "LETTERS",
+    "Shot",
+    "Style",
+    "View",
+    "caption",
+    "draw",
+    "draw_shot",
+    "ground",
+    "plane_of",
+    "stylesheet",
+    "view_of",
+]
 
 Style = Literal["adaptive", "light", "none"]
 
-_NEAREST, _FARTHEST = 25.0, 100.0
+_NEAREST, _FARTHEST = 25.0, 250.0
 """Metres from the middle to the edge of a picture, at least and at most."""
 _BARS = (1, 2, 5, 10, 20, 50)
 _SMALL = 0.06
 """Boxes smaller than this share of the picture's half get a ring around them if they play a role."""
-_LETTER = 0.62
+_LEAST = 0.014
+"""Radius of a person's dot by the picture's half, at least."""
+LETTERS = 6.0
+"""Height of names, in hundredths of a picture's half."""
+_METRES = 0.8
+"""Height of the length of a distance by that of names."""
+_LETTER = 0.7
 """Width of a letter by its height, about."""
 _MARGIN = 2.0
 """Metres drawn beyond the edges, so that no outline seems to end there."""
@@ -162,13 +180,14 @@ def ground(plane: Plane, bounds: Bounds) -> str:
     return element("rect", class_="ground", x=left, y=top, width=right - left, height=bottom - top)
 
 
-def draw_shot(shot: Shot, plane: Plane, view: View) -> str:
+def draw_shot(shot: Shot, plane: Plane, view: View, letters: float = LETTERS) -> str:
     """All of a picture but the map: overlay, boxes, names, scale and north.
 
     Args:
         shot: The frame.
         plane: Where the picture lies.
         view: What is shown.
+        letters: Height of names, in hundredths of the way from the middle to an edge.
     """
     label, scenario, bounds = shot.label, shot.scenario, view.bounds
     roles = shot.roles
@@ -182,14 +201,17 @@ def draw_shot(shot: Shot, plane: Plane, view: View) -> str:
         reach = math.hypot(*box_of(thing)[:2])
         if abs(thing.x - view.center[0]) < view.half + reach and abs(thing.y - view.center[1]) < view.half + reach:
             role = by_id.get(thing.id)
-            parts.append(draw_object(thing, plane, role=role, blamed=role is not None and role.index in guilty))
+            blamed = role is not None and role.index in guilty
+            parts.append(draw_object(thing, plane, role=role, blamed=blamed, least=_LEAST * view.half))
     for role in roles:
         if math.hypot(*box_of(role.thing)[:2]) < _SMALL * view.half:
             x, y = plane.at(role.thing.x, role.thing.y)
             parts.append(element("circle", class_=f"ring {role.colour}", cx=x, cy=y, r=round(_SMALL * 50 * view.half)))
     if scenario is not None:
         parts += [draw_witness(shot.verdict, roles, plane, bounds), draw_blame(broken, roles, plane)]
-    parts += [draw_text(roles, plane, bounds, round(view.half * 6)), _furniture(plane, view)]
+        ways = measured_distances(scenario, observed_by(roles), view.drawn)
+        parts.append(draw_distances(ways, plane, round(view.half * letters * _METRES)))
+    parts += [draw_text(roles, plane, bounds, round(view.half * letters)), _furniture(plane, view)]
     return "".join(parts)
 
 
@@ -235,6 +257,7 @@ def draw(
     pixels: int = 900,
     style: Style = "adaptive",
     captioned: bool = True,
+    letters: float = LETTERS,
 ) -> str:
     """A frame as a file of SVG.
 
@@ -246,6 +269,7 @@ def draw(
         style: "adaptive" to dark surroundings, "light" for renderers that know no media queries, or "none" for a page
             that has the style.
         captioned: Whether lines of text below say what it shows.
+        letters: Height of names, in hundredths of the way from the middle to an edge.
     """
     plane = plane_of(shot.label)
     view = view_of(shot.label, shot.roles, half)
@@ -268,7 +292,7 @@ def draw(
     ]
     picture = element(
         "svg",
-        ground(plane, view.bounds) + backdrop.draw(plane, view.drawn) + draw_shot(shot, plane, view),
+        ground(plane, view.bounds) + backdrop.draw(plane, view.drawn) + draw_shot(shot, plane, view, letters),
         class_="picture",
         x=left,
         y=top,
@@ -279,7 +303,7 @@ def draw(
     return element(
         "svg",
         element("title", escape(shot.label.frame)),
-        element("style", stylesheet(dark=style == "adaptive")) + hatching() if style != "none" else "",
+        element("style", stylesheet(dark=style == "adaptive")) if style != "none" else "",
         element("rect", class_="paper", x=left, y=top, width=width, height=f"{height:.0f}"),
         picture,
         *texts,

@@ -89,7 +89,9 @@ def _told(thing: LabelObject, role: str) -> str:
     return ", ".join(filter(None, said))
 
 
-def draw_object(thing: LabelObject, plane: Plane, *, role: Role | None = None, blamed: bool = False) -> str:
+def draw_object(
+    thing: LabelObject, plane: Plane, *, role: Role | None = None, blamed: bool = False, least: float = 0.0
+) -> str:
     """An object's box with its front marked; what the label does not know is dashed, or a dot without heading.
 
     Args:
@@ -97,11 +99,12 @@ def draw_object(thing: LabelObject, plane: Plane, *, role: Role | None = None, b
         plane: Where the picture lies.
         role: Its role, if it has one.
         blamed: Whether it is part of what excludes the frame.
+        least: Radius in metres of the dot under people, whose boxes may be too small to see.
     """
     width, length, measured = box_of(thing)
     classes = ["box", "ego" if thing.id == "ego" else "other", role.colour if role else "", "blamed" if blamed else ""]
-    if not measured:
-        classes.append("nominal")
+    person = class_matches("Pedestrian", thing.category, "fine")
+    classes += ["person"] * person + ["nominal"] * (not measured)
     told = element("title", escape(_told(thing, role.name if role else "")))
     if thing.heading is None:
         x, y = plane.at(thing.x, thing.y)
@@ -112,6 +115,9 @@ def draw_object(thing: LabelObject, plane: Plane, *, role: Role | None = None, b
         nose = plane.to_picture(np.array([(thing.x, thing.y), front]))
         shape = element("path", class_="outline", d=points_path(outline.tolist(), closed=True))
         shape += element("path", class_="nose", d=points_path(nose.tolist(), closed=False))
+    if person:
+        x, y = plane.at(thing.x, thing.y)
+        shape = element("circle", class_="dot", cx=x, cy=y, r=round(100 * max(least, width / 2))) + shape
     return element("g", told, shape, class_=" ".join(filter(None, classes)))
 
 

@@ -18,8 +18,6 @@ from scenicq.temporal.truth import TRUE
 __all__ = ["interval_runs"]
 
 _WORDS = ("false", "unknown", "true")
-_ROW, _LABEL, _WIDTH = 16, 300, 560
-"""Pixels: height of a band, width of what it says, width of the band."""
 
 
 def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tuple[int, int]]) -> Iterator[Run]:
@@ -72,32 +70,21 @@ def _key(tracks: RecordingTracks, name: str) -> TrackKey:
 
 
 def _drawn(bands: tuple[Band, ...]) -> str:
-    if not bands:
-        return ""
     rows: list[str] = []
-    for number, band in enumerate(bands):
-        y, step = number * _ROW, _WIDTH / len(band.values)
-        weight = "bold" if band.is_requirement else "normal"
-        short = band.what if len(band.what) <= 46 else f"{band.what[:45]}\N{HORIZONTAL ELLIPSIS}"
-        rows.append(element("text", escape(short), x=0, y=y + 12, font_size=11, font_weight=weight))
-        for place, length, value in _pieces(band.values):
-            x = round(_LABEL + place * step, 1)
-            told = element("title", escape(f"{band.what}: {_WORDS[value]} at {length} of {len(band.values)} samples"))
-            rows.append(
-                element("rect", told, x=x, y=y + 2, width=round(length * step, 1), height=_ROW - 4,
-                        class_=f"band {_WORDS[value]}")
-            )  # fmt: skip
-    # the script moves it with the slider
-    step = _WIDTH / len(bands[0].values)
-    rows.append(
-        element("line", class_="now", x1=_LABEL + step / 2, x2=_LABEL + step / 2, y1=0, y2=len(bands) * _ROW,
-                data_left=_LABEL, data_step=step)
-    )  # fmt: skip
-    said = "; ".join(f"{band.what}: {_summary(band.values)}" for band in bands)
-    return element(
-        "svg", *rows, class_="timeline", role="img", aria_label=f"Timeline. {said}",
-        viewBox=f"0 0 {_LABEL + _WIDTH} {len(bands) * _ROW}",
-    )  # fmt: skip
+    for band in bands:
+        count = len(band.values)
+        strips = [
+            element("rect", element("title", escape(f"{band.what}: {_WORDS[value]} at {length} of {count} samples")),
+                    x=place, y=0, width=length, height=10, class_=f"band {_WORDS[value]}")
+            for place, length, value in _pieces(band.values)
+        ]  # fmt: skip
+        # the script moves it with the slider
+        strips.append(element("line", class_="now", x1=0.5, x2=0.5, y1=0, y2=10))
+        strip = element("svg", *strips, class_="strip", role="img", viewBox=f"0 0 {count} 10",
+                        preserveAspectRatio="none", aria_label=_summary(band.values))  # fmt: skip
+        told = element("b" if band.is_requirement else "span", escape(band.what))
+        rows.append(element("li", told, strip))
+    return element("ul", *rows, class_="timeline", aria_label="Timeline") if rows else ""
 
 
 def _pieces(values: tuple[int, ...]) -> Iterator[tuple[int, int, int]]:

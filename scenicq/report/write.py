@@ -6,7 +6,7 @@ import contextlib
 import shutil
 import tempfile
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic, ScenarioError
@@ -18,14 +18,15 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain
 from scenicq.report.backdrop import Backdrop
-from scenicq.report.cards import Card, draw_card
+from scenicq.report.cards import TILE_LETTERS, Card, best_frame, draw_card, draw_tile
 from scenicq.report.frames import variable_texts
 from scenicq.report.overview import funnel_section, how_section, program_section
 from scenicq.report.page import GENERATOR, page, runs_section
-from scenicq.report.picture import Shot, draw
+from scenicq.report.picture import LETTERS, Shot, draw
 from scenicq.report.runs import Run, find_runs, frame_numbers
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.report.shares import program_lines
+from scenicq.report.sheet import sheet_section, timelines_section, to_picture
 from scenicq.report.svg import element, escape
 from scenicq.report.timelines import interval_runs
 
@@ -178,6 +179,7 @@ class _Report:
         self.worlds: dict[str, _World | None] = {}
         self.files = SensorFiles(roots_of(query.dataset, sensors), folder, work, can_make_thumbnails())
         self.pictured = 0
+        self.tiles: list[str] = []
 
     def world(self, name: str) -> _World | None:
         """The scenario over a map, None if it does not fit."""
@@ -214,9 +216,14 @@ class _Report:
         world = next((found for name in dataset.maps if (found := self.world(name))), None)
         lines, rest = program_lines(world.scenario, funnel.excluded) if world else ([], dict(funnel.excluded))
         name = Path(self.query.source.name).name
-        told = (
-            f"{funnel.matches:,} {'match' if funnel.matches == 1 else 'matches'}, {funnel.unknowns:,} unknown of "
-            f"{funnel.frames:,} frames in {dataset.manifest.name or dataset.name}"
+        number = f"{funnel.matches:,} {'match' if funnel.matches == 1 else 'matches'}"
+        if over_time:
+            number = f"{funnel.matches:,} {'interval matches' if funnel.matches == 1 else 'intervals match'}"
+        told = f"{number}, {funnel.unknowns:,} unknown {'in' if over_time else 'of'} {funnel.frames:,} frames"
+        told += (
+            f" of {dataset.manifest.name or dataset.name}"
+            if over_time
+            else f" in {dataset.manifest.name or dataset.name}"
         )
         head = element("header", element("h1", escape(name)), element("p", escape(told)))
         overview = element(
@@ -227,8 +234,10 @@ class _Report:
         )
         main = element(
             "main",
+            sheet_section(self.tiles, len(cards)),
+            timelines_section(runs, over_time=over_time),
             overview,
-            runs_section(cards, recordings, [run.kind for run in runs], note),
+            runs_section(cards, recordings, [run.kind for run in runs], note, "interval" if over_time else "run"),
             how_section(self.query, command, elapsed_s),
         )
         skip = element("a", "Skip to the frames", href="#runs-title", class_="skip")
@@ -238,31 +247,41 @@ class _Report:
         """The cards of runs."""
         frames = [result.frame for run in runs for result in run.results]
         labels = {label.frame: label for label in self.query.dataset.labels(frames)} if frames else {}
+        pictured = to_picture(runs)
         with LazySolver(self.query.options.solver) as solver:
             for number, run in enumerate(runs, 1):
                 world = self.world(labels[run.results[0].frame].map)
                 if world is None:
                     continue
-                shots: list[Shot] = []
-                for result in run.results:
-                    label = labels[result.frame]
-                    matcher = Matcher(world.scenario, self.query.options.match, solver)
-                    # of the frames of a run that match the first is explained
-                    matched = result.verdict if isinstance(result.verdict, Match) else None
-                    asked = isinstance(result.verdict, NoMatch) or (matched is not None and not shots)
-                    why = explain(matcher, label) if asked else None
-                    if why is not None and matched is not None and why.correspondence != matched.correspondence:
-                        why = None
-                    shots.append(Shot(label, world.scenario, result.verdict, why))
+                matcher = Matcher(world.scenario, self.query.options.match, solver)
+                shots = [Shot(labels[each.frame], world.scenario, each.verdict) for each in run.results]
+                best = best_frame(run, shots)
+                for place, shot in enumerate(shots):
+                    # of the frames of a run that match the first and the best are explained
+                    if isinstance(shot.verdict, NoMatch) or place in (0, best):
+                        shots[place] = self.explained(matcher, shot)
                 sensors = tuple(self.files.find(shot.label.sensors) for shot in shots)
                 pictures = None if inline else tuple(self.picture(shot, world.backdrop) for shot in shots)
-                yield draw_card(Card(number, run, tuple(shots), sensors, world.backdrop, world.texts, pictures))
+                card = Card(number, run, tuple(shots), sensors, world.backdrop, world.texts, pictures)
+                if number in pictured:
+                    image = None if inline else self.picture(shots[best], world.backdrop, TILE_LETTERS)
+                    self.tiles.append(draw_tile(card, image))
+                yield draw_card(card)
 
-    def picture(self, shot: Shot, backdrop: Backdrop) -> str:
+    def explained(self, matcher: Matcher, shot: Shot) -> Shot:
+        """A frame with why it matches or does not, but for a match that is explained by another correspondence."""
+        if isinstance(shot.verdict, Unknown):
+            return shot
+        why = explain(matcher, shot.label)
+        if isinstance(shot.verdict, Match) and why.correspondence != shot.verdict.correspondence:
+            return shot
+        return replace(shot, explanation=why)
+
+    def picture(self, shot: Shot, backdrop: Backdrop, letters: float = LETTERS) -> str:
         """Write a picture beside the page; its address."""
         self.pictured += 1
         name = f"pictures/{self.pictured:06}.svg"
         target = self.work / name
         target.parent.mkdir(exist_ok=True)
-        target.write_text(draw(shot, backdrop, captioned=False), encoding="utf-8", newline="\n")
+        target.write_text(draw(shot, backdrop, captioned=False, letters=letters), encoding="utf-8", newline="\n")
         return name

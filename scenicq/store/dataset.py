@@ -13,6 +13,7 @@ from pathlib import Path
 
 import duckdb
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic, ScenicqError
 from scenicq.geometry.features import MapFeature
@@ -186,10 +187,20 @@ class Dataset:
             end: Row to end before.
             motion: Whether what is computed of motion is read, too.
         """
+        return self.labels_in(part, np.arange(first, end), motion=motion)
+
+    def labels_in(self, part: int, rows: NDArray[np.int64], *, motion: bool = True) -> Iterator[Label]:
+        """Some labels of one part, in order.
+
+        Args:
+            part: Number of the part.
+            rows: Rows of its labels, in order.
+            motion: Whether what is computed of motion is read, too.
+        """
         labels, objects, sensors = (self.files(table)[part] for table in ("labels", "objects", "sensors"))
         with self.blamed():
             parts = [(labels, objects, sensors)]
-            yield from read_labels(parts, np.arange(first, end), None, motion=motion, space=False)
+            yield from read_labels(parts, rows, None, motion=motion, space=False)
 
     def verify(self) -> None:
         """Compare every file with its checksum.

@@ -37,6 +37,8 @@ class SimpleParser(OperatorParser):
             hint = "`==` compares"
         elif self.text and self.starts_specifier(self.index):
             hint = f"a comma separates specifiers: write `, {self.text} ...`"
+            if before == ",":
+                hint = "no comma stands between the class and its first specifier"
         message = f"`{self.text}` does not continue the statement" if self.text else "the statement is not complete"
         return self.fail(message, label="an operator or the end of the line can stand here", hint=hint)
 

@@ -47,7 +47,7 @@ from scenicq.geometry.angles import heading_of_array, normalize_array
 from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.temporal.samples import FIXED, MOVING, Samples
+from scenicq.temporal.samples import FIXED, MOVING, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["AtomColumns", "HiddenVariable", "reads_start"]
@@ -105,22 +105,18 @@ class AtomColumns:
         scenario: The scenario.
         samples: The samples.
         assignment: Values of random variables.
-        start: The first sample of a run, at which what is not current is read; None where each sample is one.
+        start: For each sample the first one of its run, at which what is not current is read; None where each is one.
     """
 
     scenario: Scenario
-    samples: Samples
+    samples: Observed
     assignment: Mapping[Identity, Value] = field(default_factory=dict["Identity", "Value"])
-    start: int | None = None
+    start: NDArray[np.int64] | None = None
     _features: dict[tuple[int, str], _Column | None] = field(default_factory=dict["tuple[int, str]", "_Column | None"])
 
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
         """The same with values of random variables; what is observed is shared."""
         return AtomColumns(self.scenario, self.samples, assignment, self.start, self._features)
-
-    def started(self, start: int) -> AtomColumns:
-        """The same for runs from one sample."""
-        return AtomColumns(self.scenario, self.samples, self.assignment, start, self._features)
 
     def expanded(self, condition: Node) -> Node:
         """A condition with the program's own value of what no label observes and what does not change."""
@@ -154,11 +150,16 @@ class AtomColumns:
 
     def number(self, node: Node) -> Numbers | None:
         """The values of an expanded scalar expression, nan where it has none; None if it is no number."""
+        found = self.scalar(node)
+        return None if found is None else found[0]
+
+    def scalar(self, node: Node) -> tuple[Numbers, NDArray[np.bool_]] | None:
+        """As `number`, with where the value is not known."""
         chosen = {id(each): 0 for each in postorder((node,)) if isinstance(each, DirectionAt)}
         column = self._evaluate(node, chosen, {})
         if not isinstance(column.data, np.ndarray) or column.data.dtype == np.bool_:
             return None
-        return np.where(column.status == _DEFINED, column.data, np.nan)
+        return np.where(column.status == _DEFINED, column.data, np.nan), column.status == _UNKNOWN
 
     def _definition(self, feature: Feature) -> Node | None:
         if feature.property in MOVING or self._feature(feature) is not None:
@@ -221,11 +222,14 @@ class AtomColumns:
         values: list[Value] = [value] * n
         return _Column(values, status)
 
-    def _as_at(self, start: int, column: _Column) -> _Column:
-        """The value at one sample, at each sample."""
-        if column.status[start] != _DEFINED:
-            return _Column(column.data, np.full(len(self.samples), column.status[start]))
-        return self._constant(column.at(start))
+    def _as_at(self, start: NDArray[np.int64], column: _Column) -> _Column:
+        """The values at some samples."""
+        data = column.data
+        if isinstance(data, tuple):
+            return _Column((data[0][start], data[1][start]), column.status[start])
+        if isinstance(data, list):
+            return _Column([data[sample] for sample in start.tolist()], column.status[start])
+        return _Column(data[start], column.status[start])
 
     def _feature(self, node: Feature) -> _Column | None:
         """What is observed of a feature; None if no sample has it."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -40,7 +41,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children, leaves, postorder
 from scenicq.temporal.atoms import AtomColumns
 
-__all__ = ["Cell", "UnclearVariable", "cells", "random_variables"]
+__all__ = ["Cell", "UnclearVariable", "affine_sides", "cells", "inside", "random_variables", "support"]
 
 _MOST_CELLS = 3000
 """Combinations of values that are tried for one binding."""
@@ -94,7 +95,7 @@ def cells(columns: AtomColumns, conditions: Sequence[Node]) -> Iterator[Cell]:
         exact = {identity: (cast(float, value), cast(float, value)) for identity, value in fixed.items()}
         for parts in itertools.product(*cuts):
             ranges = {leaf.identity: part for leaf, part in zip(continuous, parts, strict=True)}
-            values = {identity: _inside(*part) for identity, part in ranges.items()}
+            values = {identity: inside(*part) for identity, part in ranges.items()}
             yield Cell(fixed | values, exact | ranges)
 
 
@@ -113,7 +114,12 @@ def _known(node: Node) -> float:
     return node.value
 
 
-def _support(leaf: Leaf) -> tuple[float, float]:
+def support(leaf: Leaf) -> tuple[float, float]:
+    """The least and the greatest value of a continuous variable.
+
+    Raises:
+        UnclearVariable: It is no number, or its ends are random.
+    """
     match leaf:
         case Range():
             low, high = _known(leaf.low), _known(leaf.high)
@@ -131,7 +137,7 @@ def _cuts(
     columns: AtomColumns, leaf: Leaf, continuous: Sequence[Leaf], conditions: Sequence[Node]
 ) -> list[tuple[float, float]]:
     """The values at which some condition may change, and the open ranges between them."""
-    low, high = _support(leaf)
+    low, high = support(leaf)
     others = {each.identity for each in continuous} - {leaf.identity}
     found: set[float] = {end for end in (low, high) if math.isfinite(end)}
     for node in _comparisons(leaf, conditions):
@@ -151,8 +157,6 @@ def _comparisons(leaf: Leaf, conditions: Sequence[Node]) -> Iterator[Compare]:
             continue
         match node:
             case Compare():
-                if not all(_affine(child, leaf) for child in children(node)):
-                    raise UnclearVariable("a comparison that is not affine in a hidden random variable")
                 yield node
             case Logic():
                 pass
@@ -197,22 +201,46 @@ def _affine(root: Node, leaf: Leaf) -> bool:
     return True
 
 
-def _changes(columns: AtomColumns, leaf: Leaf, node: Compare) -> Iterator[float]:
-    """The values of a variable at which both sides of a comparison are equal, at some sample."""
-    sides: list[np.ndarray[tuple[int], np.dtype[np.float64]]] = []
+def affine_sides(
+    columns: AtomColumns, leaf: Leaf, node: Compare
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """The left side of a comparison minus the right one as a function of a variable, at each sample.
+
+    Args:
+        columns: What is observed, and values of the other variables.
+        leaf: The variable.
+        node: An expanded comparison; affine in the variable.
+
+    Returns:
+        The difference where the variable is 0, by how much it grows with it, and where it is not known.
+
+    Raises:
+        UnclearVariable: The comparison is not affine in the variable, or not of numbers.
+    """
+    if not all(_affine(child, leaf) for child in children(node)):
+        raise UnclearVariable("a comparison that is not affine in a hidden random variable")
+    sides: list[NDArray[np.float64]] = []
+    unknown: NDArray[np.bool_] | None = None
     for value in (0.0, 1.0):
         assigned = columns.assigned({**columns.assignment, leaf.identity: value})
-        left, right = (assigned.number(side) for side in (node.left, node.right))
+        left, right = (assigned.scalar(side) for side in (node.left, node.right))
         if left is None or right is None:
             raise UnclearVariable("a comparison of what are no numbers with a hidden random variable")
-        sides.append(left - right)
-    at_0, slope = sides[0], sides[1] - sides[0]
+        sides.append(left[0] - right[0])
+        unknown = left[1] | right[1]
+    assert unknown is not None
+    return sides[0], sides[1] - sides[0], unknown
+
+
+def _changes(columns: AtomColumns, leaf: Leaf, node: Compare) -> Iterator[float]:
+    """The values of a variable at which both sides of a comparison are equal, at some sample."""
+    at_0, slope, _ = affine_sides(columns, leaf, node)
     with np.errstate(all="ignore"):
         found = -at_0 / slope
     yield from set(found[np.isfinite(found)].tolist())
 
 
-def _inside(low: float, high: float) -> float:
+def inside(low: float, high: float) -> float:
     """A value between two, of which one or both may be infinite."""
     if math.isinf(low) and math.isinf(high):
         return 0.0

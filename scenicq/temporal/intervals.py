@@ -1,63 +1,41 @@
-"""The intervals of one recording that match: bindings and start samples in, intervals out (see `IntervalMatcher`).
+"""The intervals of recordings that match: bindings and start samples in, intervals out (see `IntervalMatcher`).
 
 A binding gives each object of the scenario a track, for the whole interval. A start is a sample whose label matches
-the initial scene under a binding. From the starts of one binding all runs are followed together, on columns over the
-samples in which all tracks live; where conditions hang on random variables of the scene, once for each cell of values.
+the initial scene under a binding. All runs of a block are followed side by side, on columns over the samples in which
+all tracks of a binding live (`stretches`); where conditions hang on random variables of the scene, by the values of
+these for which they hold (`thresholds`), or once for each cell of values (`hidden_runs`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import groupby
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.budget import TimeIsUp, limited, look
 from scenicq.errors import Span
-from scenicq.forest.nodes import Compare, CompareOp, Constant, Leaf, Logic, LogicOp, Node
-from scenicq.forest.scenario import Requirement, Scenario
-from scenicq.forest.simplify import roots_of
-from scenicq.forest.temporal import Atom, Dynamics
-from scenicq.forest.walk import leaves
-from scenicq.match.matcher import Matcher
+from scenicq.forest.condition import expand
+from scenicq.forest.nodes import Feature, Node
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.temporal import Atom
 from scenicq.match.options import MatchOptions
-from scenicq.match.verdict import Match, Unknown, WitnessValue
+from scenicq.match.verdict import WitnessValue
 from scenicq.smt.answer import Solver
-from scenicq.store.labels import Label
-from scenicq.store.tracks import RecordingTracks, TrackKey
-from scenicq.temporal.atoms import AtomColumns, HiddenVariable, reads_start
-from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
+from scenicq.store.tracks import TrackKey
+from scenicq.temporal.atoms import AtomColumns, reads_start
+from scenicq.temporal.hidden import random_variables
+from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
 from scenicq.temporal.interval_options import IntervalOptions
-from scenicq.temporal.runs import Run, runs_from
-from scenicq.temporal.samples import Samples
+from scenicq.temporal.presence import by_presence
+from scenicq.temporal.run_columns import RunColumns, Runs
+from scenicq.temporal.samples import MOVING
 from scenicq.temporal.selection import chosen
+from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Interval", "IntervalMatcher", "Start"]
-
-_MOST_JOINT = 32
-"""Starts of one binding that are matched again with values of random variables that the initial scene has, too."""
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """A sample whose label matches the initial scene, or may.
-
-    Attributes:
-        sample: Its number in the recording.
-        binding: The track of each object, by index.
-        verdict: A match, or unknown.
-        label: The label.
-        correspondence: The label object of each object, by name.
-    """
-
-    sample: int
-    binding: tuple[tuple[int, TrackKey], ...]
-    verdict: Match | Unknown
-    label: Label
-    correspondence: Mapping[str, str]
+__all__ = ["Interval", "IntervalMatcher"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +45,11 @@ class Interval:
     Attributes:
         start, end: First and last sample.
         truth: Whether it matches.
-        binding: As of `Start`.
-        witness: Values of random variables that prove a match, by their place in the program.
-        reason: Why it is unknown.
+        binding: The track of each object, by index.
+        recording: The number of the recording in its block.
+        origin: The number of the start in its table.
+        witness: Values of random variables of conditions over time that prove a match, by their place in the program.
+        reason: Why it is unknown; empty where it is so because its start is.
         broken: What keeps it from matching, in the program.
         cut_off: Whether the recording or a track ends before the program does.
     """
@@ -78,10 +58,25 @@ class Interval:
     end: int
     truth: int
     binding: tuple[tuple[int, TrackKey], ...]
+    recording: int = 0
+    origin: int = -1
     witness: Mapping[str, WitnessValue] = field(default_factory=dict["str", "WitnessValue"])
     reason: str = ""
     broken: Span | None = None
     cut_off: bool = False
+
+
+@dataclass(slots=True)
+class _Found:
+    """Runs of a block side by side: labels, not samples."""
+
+    starts: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    truth: Truth
+    origins: NDArray[np.int64]
+    broken: NDArray[np.object_]
+    cut_off: NDArray[np.bool_]
+    details: Mapping[int, tuple[str, Mapping[str, WitnessValue]]]
 
 
 @dataclass(eq=False)
@@ -101,216 +96,179 @@ class IntervalMatcher:
     solver: Solver | None = None
 
     def __post_init__(self) -> None:
-        """Find out what conditions over time share with the initial scene."""
-        still = replace(self.scenario, dynamics=None)
-        self._shared = {leaf.identity for leaf in leaves(*roots_of(still))}
+        """Make ready what the program says about time."""
+        dynamics = self.scenario.dynamics
+        self._runs = None if dynamics is None else RunColumns(dynamics)
+        # what is read at the start of a run is another value for each
+        still = [] if dynamics is None else [expand(each, self._own_value) for each in dynamics.conditions]
+        self._apart = any(map(reads_start, still))
 
-    def intervals(self, tracks: RecordingTracks, starts: Iterable[Start]) -> list[Interval]:
+    def _own_value(self, feature: Feature) -> Node | None:
+        """What the program says of a property that does not change, should no label tell."""
+        if feature.property in MOVING:
+            return None
+        return self.scenario.objects[feature.object].properties[feature.property].value
+
+    def intervals(self, table: StartTable, remember: Callable[[int], Remembered]) -> list[Interval]:
         """What became of each binding: the intervals to report, or else the one that came furthest.
 
         Args:
-            tracks: The recording.
-            starts: Its starts, in order of time.
+            table: The starts.
+            remember: The label of a start by its number, with who plays whom.
+
+        Returns:
+            By recording, then in order of time.
         """
-        by_binding: dict[tuple[tuple[int, TrackKey], ...], list[Start]] = {}
-        for start in starts:
-            by_binding.setdefault(start.binding, []).append(start)
-        found: list[Interval] = []
-        for binding, mine in by_binding.items():
-            runs = [*self._of_binding(tracks, binding, mine)]
-            positive = [each for each in runs if each.truth > FALSE]
-            least = self.options.min_duration_s or 0.0
-            kept = chosen(positive, tracks.seconds, self.options.intervals, least)
-            if kept:
-                found += kept
-            elif runs:
-                # what was cut off might have matched; else what was matched but is too short, else what came furthest
-                best = max(runs, key=lambda each: (each.cut_off, each.truth, each.end - each.start, -each.start))
-                found.append(replace(best, truth=int(FALSE)))
-        return sorted(found, key=lambda each: (each.start, each.end, each.binding))
+        order, bindings = _sorted(table)
+        table = table.chosen(order)
+        parts = [
+            part
+            for stretches in stretches_of(table, self.options.gap_s, apart=self._apart)
+            for part in self._followed(stretches, table, lambda number: remember(int(order[number])))
+        ]
+        found = [each for part in self._reported(parts, table, bindings) for each in part]
+        found = [replace(each, origin=int(order[each.origin])) for each in found]
+        return sorted(found, key=lambda each: (each.recording, each.start, each.end, each.binding))
 
-    def _of_binding(
-        self, tracks: RecordingTracks, binding: tuple[tuple[int, TrackKey], ...], starts: Sequence[Start]
-    ) -> Iterator[Interval]:
-        ends = self.life_ends(tracks, binding)
-        for end, group in groupby(starts, key=lambda start: int(ends[start.sample])):
-            mine = list(group)
-            samples = Samples(tracks, dict(binding), mine[0].sample, end + 1)
-            if self.scenario.dynamics is None:
-                yield from _static(samples, binding, mine)
-            else:
-                yield from self._dynamic(samples, binding, mine)
-
-    def life_ends(self, tracks: RecordingTracks, binding: tuple[tuple[int, TrackKey], ...]) -> NDArray[np.intp]:
-        """For each sample at which all tracks of a binding are observed, the last one of their common life."""
-        found = np.full(len(tracks), len(tracks) - 1)
-        for _, track in binding:
-            there = np.flatnonzero(~np.isnan(tracks.column(track, "x")))
-            breaks = np.flatnonzero(np.diff(tracks.seconds[there]) > self.options.gap_s)
-            last = there[np.append(breaks, len(there) - 1)] if len(there) else there
-            mine = np.arange(len(tracks))
-            if len(last):
-                mine = last[np.minimum(np.searchsorted(last, mine), len(last) - 1)]
-            found = np.minimum(found, np.maximum(mine, np.arange(len(tracks))))
-        return found
+    def _followed(
+        self, stretches: Stretches, table: StartTable, remember: Callable[[int], Remembered]
+    ) -> Iterator[_Found]:
+        """The runs of some stretches, those together in which the same features are observed."""
+        dynamics = self.scenario.dynamics
+        if dynamics is None:
+            yield _static(stretches, table)
+            return
+        for chosen_ in by_presence(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
+            some = stretches if len(chosen_) == len(stretches.labels) else stretches.some(chosen_)
+            columns = AtomColumns(self.scenario, some.places, start=some.heads())
+            expanded = [columns.expanded(condition) for condition in dynamics.conditions]
+            yield self._dynamic(some, table, columns, expanded, remember)
 
     def _dynamic(
-        self, samples: Samples, binding: tuple[tuple[int, TrackKey], ...], starts: Sequence[Start]
-    ) -> Iterator[Interval]:
-        dynamics = self.scenario.dynamics
-        assert dynamics is not None
-        columns = AtomColumns(self.scenario, samples)
-        expanded = [columns.expanded(condition) for condition in dynamics.conditions]
-        if any(map(reads_start, expanded)):
-            for start in starts:
-                from_it = columns.started(start.sample - samples.first)
-                yield from self._from_starts(dynamics, from_it, expanded, samples, binding, [start])
+        self, stretches: Stretches, table: StartTable, columns: AtomColumns, expanded: Sequence[Node],
+        remember: Callable[[int], Remembered],
+    ) -> _Found:  # fmt: skip
+        assert self._runs is not None
+        details: dict[int, tuple[str, Mapping[str, WitnessValue]]] = {}
+        if random_variables(expanded):
+            hidden = HiddenRuns(self._runs, self.scenario, self.match, self.solver)
+            runs, details = hidden.follow(stretches, columns, expanded, remember)
         else:
-            yield from self._from_starts(dynamics, columns, expanded, samples, binding, starts)
+            known: dict[int, Truth] = {}
 
-    def _from_starts(
-        self, dynamics: Dynamics, columns: AtomColumns, expanded: Sequence[Node], samples: Samples,
-        binding: tuple[tuple[int, TrackKey], ...], starts: Sequence[Start],
-    ) -> Iterator[Interval]:  # fmt: skip
-        """What becomes of runs that share the values of all conditions."""
-        if not random_variables(expanded):
-            for run, start in zip(_follow(dynamics, columns, expanded, samples, starts), starts, strict=True):
-                yield _interval(run, start, samples, binding)
+            def atom(each: Atom) -> Truth:
+                if each.number not in known:
+                    known[each.number] = columns.truth_of(expanded[each.number])
+                return known[each.number]
+
+            runs = self._runs.follow(stretches, atom)
+        return _found(stretches, table, runs, details)
+
+    def _reported(
+        self, parts: Sequence[_Found], table: StartTable, bindings: NDArray[np.int64]
+    ) -> Iterator[list[Interval]]:
+        """What is reported of each binding."""
+        if not parts:
             return
-        try:
-            with limited(self.match.timeout_s):
-                found = list(self._over_cells(dynamics, columns, expanded, samples, binding, starts))
-            yield from found
-        except (UnclearVariable, HiddenVariable, TimeIsUp) as error:
-            reason = "timeout" if isinstance(error, TimeIsUp) else str(error) or "a hidden random variable over time"
-            for start in starts:
-                yield Interval(start.sample, samples.end - 1, int(UNKNOWN), binding, reason=reason)
+        starts, ends, truth, origins, cut_off = (
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("starts", "ends", "truth", "origins", "cut_off")
+        )
+        broken: list[Span | None] = []
+        for part in parts:
+            broken.extend(cast("list[Span | None]", part.broken.tolist()))
+        details = {number: each for part in parts for number, each in part.details.items()}
+        times = table.block.times_us
+        lasting = (times[ends] - times[starts]) / 1e6
+        least = self.options.min_duration_s or 0.0
+        order = np.lexsort((starts, bindings[origins]))
+        groups = bindings[origins][order]
+        for mine in np.split(order, np.flatnonzero(np.diff(groups)) + 1):
+            kept = mine[chosen(starts[mine], ends[mine], truth[mine], lasting[mine], self.options.intervals, least)]
+            matches = len(kept) > 0
+            if not matches:
+                # what was cut off might have matched; else what was matched but is too short, else what came furthest
+                rank = np.lexsort((-starts[mine], ends[mine] - starts[mine], truth[mine], cut_off[mine]))
+                kept = mine[rank[-1:]]
+            numbers: list[int] = kept.tolist()
+            verdicts: list[int] = truth[kept].tolist() if matches else [int(FALSE)]
+            yield [
+                self._interval(
+                    table, int(origins[each]), (int(starts[each]), int(ends[each])), verdict,
+                    details.get(int(origins[each]), ("", {})), broken[each], cut_off=bool(cut_off[each]),
+                )
+                for each, verdict in zip(numbers, verdicts, strict=True)
+            ]  # fmt: skip
 
-    def _over_cells(
-        self, dynamics: Dynamics, columns: AtomColumns, expanded: Sequence[Node], samples: Samples,
-        binding: tuple[tuple[int, TrackKey], ...], starts: Sequence[Start],
-    ) -> Iterator[Interval]:  # fmt: skip
-        """The best that any values of the random variables make of each start."""
-        variables = random_variables(expanded)
-        joint = [leaf for leaf in variables if leaf.identity in self._shared]
-        found: list[list[tuple[Run, Cell]]] = [[] for _ in starts]
-        for cell in cells(columns, expanded):
-            look()
-            runs = _follow(dynamics, columns.assigned(cell.values), expanded, samples, starts)
-            for mine, run in zip(found, runs, strict=True):
-                mine.append((run, cell))
-        matched_again = 0
-        for start, mine in zip(starts, found, strict=True):
-            ranked = sorted(mine, key=lambda each: (-each[0].truth, -each[0].end))
-            best, cell = ranked[0]
-            reason = ""
-            if joint and best.truth > FALSE:
-                matched_again += 1
-                if matched_again > _MOST_JOINT:
-                    best, reason = replace(best, truth=int(UNKNOWN)), "budget"
-                else:
-                    best, cell, reason = self._jointly(start, joint, ranked)
-            interval = _interval(best, start, samples, binding)
-            if interval.truth == TRUE:
-                values = {_place(leaf): cell.values[leaf.identity] for leaf in variables}
-                witness = {**interval.witness, **{k: v for k, v in values.items() if isinstance(v, float)}}
-                interval = replace(interval, witness=witness)
-            yield replace(interval, reason=reason or interval.reason)
-
-    def _jointly(
-        self, start: Start, joint: Sequence[Leaf], ranked: Sequence[tuple[Run, Cell]]
-    ) -> tuple[Run, Cell, str]:
-        """The best run whose values of random variables the initial scene has, too."""
-        ids = dict(start.correspondence)
-        undecided: tuple[Run, Cell, str] | None = None
-        for (_, _), group in groupby(ranked, key=lambda each: (each[0].truth, each[0].end)):
-            same = list(group)
-            if same[0][0].truth == FALSE:
-                break
-            within = _within(joint, [cell for _, cell in same])
-            scenario = replace(
-                self.scenario,
-                requirements=(*self.scenario.requirements, Requirement(within, None)),
-                dynamics=None,
-            )
-            given = {name: id_ for name, id_ in ids.items() if name != self.scenario.objects[self.scenario.ego].name}
-            verdict = Matcher(scenario, self.match, self.solver).match(start.label, given=given)
-            if isinstance(verdict, Match):
-                values = [verdict.witness.get(_place(leaf)) for leaf in joint]
-                held = next((each for each in same if _holds(each[1], joint, values)), same[0])
-                return *held, ""
-            if isinstance(verdict, Unknown) and undecided is None:
-                undecided = replace(same[0][0], truth=int(UNKNOWN)), same[0][1], verdict.reason
-        run, cell = ranked[-1]
-        return undecided or (replace(run, truth=int(FALSE)), cell, "")
+    def _interval(
+        self, table: StartTable, origin: int, span: tuple[int, int], truth: int,
+        detail: tuple[str, Mapping[str, WitnessValue]], broken: Span | None, *, cut_off: bool,
+    ) -> Interval:  # fmt: skip
+        block = table.block
+        recording = int(block.recording_of[span[0]])
+        first, _ = block.runs[recording]
+        binding = tuple((index, block.key(int(members[origin]))) for index, members in sorted(table.members.items()))
+        reason, witness = detail
+        if truth == UNKNOWN and table.sure[origin]:
+            reason = reason or "unobserved"
+        return Interval(
+            span[0] - first, span[1] - first, truth, binding, recording, origin,
+            witness if truth == TRUE else {}, reason, broken, cut_off,
+        )  # fmt: skip
 
 
-def _follow(
-    dynamics: Dynamics, columns: AtomColumns, expanded: Sequence[Node], samples: Samples, starts: Sequence[Start]
-) -> list[Run]:
-    known: dict[int, Truth] = {}
+def _sorted(table: StartTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The order of starts by binding and time, and the number of each one's binding in that order.
 
-    def atom(each: Atom) -> Truth:
-        if each.number not in known:
-            known[each.number] = columns.truth_of(expanded[each.number])
-        return known[each.number]
-
-    return runs_from(dynamics, atom, samples.seconds(), [start.sample - samples.first for start in starts])
-
-
-def _interval(run: Run, start: Start, samples: Samples, binding: tuple[tuple[int, TrackKey], ...]) -> Interval:
-    truth = min(run.truth, int(TRUE if isinstance(start.verdict, Match) else UNKNOWN))
-    witness: Mapping[str, WitnessValue] = (
-        start.verdict.witness if isinstance(start.verdict, Match) else dict[str, WitnessValue]()
-    )
-    reason = "" if truth != UNKNOWN else "unobserved" if isinstance(start.verdict, Match) else start.verdict.reason
-    first = samples.first
-    return Interval(first + run.start, first + run.end, truth, binding, witness, reason, run.broken, run.cut_off)
+    A correspondence in which a track plays two objects, which a label can have twice, is left out.
+    """
+    tracks = np.column_stack([table.block.tracks(members) for _, members in sorted(table.members.items())])
+    ordered = np.sort(tracks, axis=1)
+    distinct = np.flatnonzero((ordered[:, 1:] != ordered[:, :-1]).all(axis=1))
+    tracks = tracks[distinct]
+    order = np.lexsort((table.labels[distinct], *tracks.T[::-1]))
+    changes = (tracks[order][1:] != tracks[order][:-1]).any(axis=1)
+    return distinct[order], np.concatenate(([0], np.cumsum(changes))) if len(order) else np.empty(0, np.int64)
 
 
-def _static(samples: Samples, binding: tuple[tuple[int, TrackKey], ...], starts: Sequence[Start]) -> Iterator[Interval]:
+def _found(
+    stretches: Stretches, table: StartTable, runs: Runs, details: Mapping[int, tuple[str, Mapping[str, WitnessValue]]]
+) -> _Found:
+    """The runs of stretches as labels of their block; a start that is not sure makes a run that is not."""
+    truth = np.minimum(runs.truth, np.where(table.sure[stretches.numbers], TRUE, UNKNOWN))
+    starts, ends = stretches.labels[stretches.starts], stretches.labels[runs.ends]
+    return _Found(starts, ends, truth, stretches.numbers, runs.broken, runs.cut_off, details)
+
+
+def _static(stretches: Stretches, table: StartTable) -> _Found:
     """Maximal runs of samples that each match, and those with samples among them of which that is not known."""
-    states = np.full(len(samples), FALSE)
-    for index, _ in binding:
-        states[~samples.present(index)] = UNKNOWN
-    at: dict[int, Start] = {}
-    for start in starts:
-        place = start.sample - samples.first
-        states[place] = TRUE if isinstance(start.verdict, Match) else UNKNOWN
-        at.setdefault(place, start)
-    for truth, possible in ((TRUE, states == TRUE), (UNKNOWN, states >= UNKNOWN)):
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], possible, [False])).astype(np.int8)))
-        for first, end in edges.reshape(-1, 2).tolist():
-            if truth == TRUE or (states[first:end] == UNKNOWN).any():
-                yield _interval(Run(first, end - 1, int(truth)), _nearest(at, first), samples, binding)
-
-
-def _nearest(at: Mapping[int, Start], sample: int) -> Start:
-    """The first start from a sample on."""
-    return at[min((place for place in at if place >= sample), default=max(at))]
-
-
-def _place(leaf: Leaf) -> str:
-    return leaf.span.place if leaf.span else type(leaf).__name__
-
-
-def _within(joint: Sequence[Leaf], some: Sequence[Cell]) -> Node:
-    """That random variables have values of some cells."""
-    options: list[Node] = []
-    for cell in some:
-        bounds: list[Node] = []
-        for leaf in joint:
-            low, high = cell.ranges[leaf.identity]
-            for op, end in ((CompareOp.GE, low), (CompareOp.LE, high)):
-                if np.isfinite(end):
-                    bounds.append(Compare(op, leaf, Constant(float(end))))
-        options.append(Logic(LogicOp.AND, tuple(bounds)) if bounds else Constant(True))
-    return options[0] if len(options) == 1 else Logic(LogicOp.OR, tuple(options))
-
-
-def _holds(cell: Cell, joint: Sequence[Leaf], values: Sequence[WitnessValue | None]) -> bool:
-    """Whether a witness has its values in a cell."""
-    return all(
-        isinstance(value, float) and cell.ranges[leaf.identity][0] <= value <= cell.ranges[leaf.identity][1]
-        for leaf, value in zip(joint, values, strict=True)
+    n = len(stretches.labels)
+    states = np.full(n, FALSE)
+    for members in stretches.places.members.values():
+        states[members < 0] = UNKNOWN
+    states[stretches.starts] = UNKNOWN
+    states[stretches.starts[table.sure[stretches.numbers]]] = TRUE
+    # runs end where stretches do
+    heads = np.zeros(n + 1, np.bool_)
+    heads[stretches.bounds] = True
+    pieces: list[tuple[NDArray[np.int64], NDArray[np.int64], Truth]] = []
+    for level in (TRUE, UNKNOWN):
+        possible = np.append(states >= level, False)
+        first = np.flatnonzero(possible[:-1] & (heads[:-1] | ~np.concatenate(([False], possible[:-2]))))
+        end = np.flatnonzero(possible[:-1] & (heads[1:] | ~possible[1:]))
+        if level == UNKNOWN:
+            open_ = np.concatenate(([0], np.cumsum(states == UNKNOWN)))
+            unsure = open_[end + 1] > open_[first]
+            first, end = first[unsure], end[unsure]
+        pieces.append((first, end, np.full(len(first), level)))
+    first, end, truth = (np.concatenate([piece[part] for piece in pieces]) for part in range(3))
+    # the first start from there on, which may lie behind the run
+    number = np.minimum(np.searchsorted(stretches.starts, first), len(stretches.starts) - 1)
+    last = (
+        np.searchsorted(stretches.starts, stretches.bounds[np.searchsorted(stretches.bounds, first, side="right")]) - 1
     )
+    origins = stretches.numbers[np.minimum(number, last)]
+    truth = np.minimum(truth, np.where(table.sure[origins], TRUE, UNKNOWN))
+    none = np.full(len(first), None, dtype=object)
+    labels = stretches.labels
+    return _Found(labels[first], labels[end], truth, origins, none, np.zeros(len(first), np.bool_), {})

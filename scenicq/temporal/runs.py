@@ -1,7 +1,8 @@
-"""Where runs of a dynamic program that start at some samples end, and what is true of them.
+"""Where runs of a dynamic program that start at some samples of one stretch end, and what is true of them.
 
 A run from sample i matches if it ends at j and everything holds on i..j. A program that says when it ends has one j for
-each i; any other may end anywhere, and then j is the last sample up to which everything holds.
+each i; any other may end anywhere, and then j is the last sample up to which everything holds. This is the general way;
+`run_columns` decides the runs of many stretches at once where a program allows it.
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ from scenicq.errors import Span
 from scenicq.forest.temporal import Atom, Dynamics
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.monitor_run import NEVER, Outcome, run_monitor
+from scenicq.temporal.occurrences import next_at
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Run", "runs_from"]
+__all__ = ["SLACK_S", "Run", "runs_from"]
 
 _MOST_CELLS = 4_000_000
 """Truth values of a formula in memory."""
-_SLACK_S = 1e-6
+SLACK_S = 1e-6
 """Seconds that floating point may be off."""
 
 
@@ -114,13 +116,13 @@ def _terminating(
         if termination.condition is not None:
             ended = np.maximum(ended, atom(termination.condition))
     after_s = min((each.after_s for each in dynamics.terminations if each.after_s is not None), default=math.inf)
-    sure, possible = _first_from(ended == TRUE), _first_from(ended >= UNKNOWN)
+    sure, possible = next_at(ended == TRUE), next_at(ended >= UNKNOWN)
     spans: list[tuple[int, int, bool]] = []
     for start in starts:
         outcomes = [outcomes[start] for outcomes in watched]
         late = n
         if math.isfinite(after_s):
-            late = int(np.searchsorted(seconds, float(seconds[start]) + after_s - _SLACK_S))
+            late = int(np.searchsorted(seconds, float(seconds[start]) + after_s - SLACK_S))
         last = min([int(sure[start]), max(late, start), *(outcome.ends for outcome in outcomes)])
         unclear = min([int(possible[start]), *(outcome.unclear for outcome in outcomes)])
         spans.append((min(unclear, last), last, unclear < last))
@@ -154,13 +156,6 @@ def _terminating(
             # where the end itself is not seen, it may still come
             found.append(Run(start, end, int(UNKNOWN if open_ends or last >= n else FALSE)))
     return found
-
-
-def _first_from(holds: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """For each sample the first one from there at which something holds; the number of samples where none does."""
-    n = len(holds)
-    places = np.where(holds, np.arange(n), n)
-    return np.minimum.accumulate(places[::-1])[::-1]
 
 
 def _monitored(truth: int, end: int, outcomes: Sequence[Outcome]) -> int:

@@ -1,16 +1,19 @@
-"""What a recording shows of the tracks that play roles, as columns over its samples."""
+"""What recordings show of the tracks that play roles, as columns."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.forest.nodes import Value
+from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
-__all__ = ["FIXED", "MOVING", "Binding", "Samples"]
+__all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "Observed", "Places", "Samples"]
 
 MOVING = frozenset({"position", "heading", "velocity", "speed", "angularSpeed", "acceleration"})
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
@@ -23,10 +26,64 @@ _COLUMNS = {
     "angularSpeed": "yaw_rate", "acceleration": "acceleration",
 }  # fmt: skip
 
+WITH_COLUMNS = MOVING | _COLUMNS.keys()
+"""Properties that the store has columns of."""
+
 Binding = Mapping[int, TrackKey]
 """The track of each object of the scenario, by the object's index."""
 
-Numbers = np.ndarray[tuple[int], np.dtype[np.float64]]
+Numbers = NDArray[np.float64]
+
+
+class Observed(Protocol):
+    """Some samples with who plays whom in each."""
+
+    def __len__(self) -> int:
+        """The number of samples."""
+        ...
+
+    def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
+        """The values of a property of an object, nan where there is none: one column, or two of a vector.
+
+        Of what is no number, a list with None where there is none; None if no sample has it.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Places:
+    """Samples of any recordings of a block, under any bindings.
+
+    Attributes:
+        block: The recordings.
+        members: By object of the scenario, who plays it at each place; -1 where it is not observed.
+        size: How many places there are.
+    """
+
+    block: TrackBlock
+    members: Mapping[int, NDArray[np.int64]]
+    size: int
+
+    def __len__(self) -> int:
+        """The number of places."""
+        return self.size
+
+    def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
+        """See `Observed`."""
+        mine = self.members[index]
+
+        def said() -> list[Value]:
+            codes, answers = self.block.said()
+            values: list[Value] = [each.get(name) for each in answers]
+            return [values[code] for code in codes[mine].tolist()]
+
+        return _observed(name, lambda column: self.block.numbers(column)[mine], said)
+
+    def at(self, chosen: NDArray[Any]) -> Places:
+        """Some of the places, by their numbers or a truth value for each."""
+        members = {index: mine[chosen] for index, mine in self.members.items()}
+        size = int(chosen.sum()) if chosen.dtype == np.bool_ else len(chosen)
+        return Places(self.block, members, size)
 
 
 @dataclass(eq=False, slots=True)
@@ -48,34 +105,37 @@ class Samples:
         """The number of samples."""
         return self.end - self.first
 
-    def seconds(self) -> Numbers:
-        """Time of each sample since the first of the recording."""
-        return self.tracks.seconds[self.first : self.end]
-
-    def present(self, index: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """At which samples an object is observed."""
-        return ~np.isnan(self._column(index, "x"))
-
     def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
-        """The values of a property, nan where there is none: one column, or two of a vector.
+        """See `Observed`."""
+        track = self.binding[index]
 
-        Of what is no number, a list with None where there is none; None if no sample has it.
-        """
-        if name == "position":
-            return self._column(index, "x"), self._column(index, "y")
-        if name in ("velocity", "speed"):
-            vx, vy = self._column(index, "motion_vx"), self._column(index, "motion_vy")
-            return (np.hypot(vx, vy),) if name == "speed" else (vx, vy)
-        if name in _COLUMNS:
-            found = self._column(index, _COLUMNS[name])
-            return None if name not in MOVING and np.isnan(found).all() else (found,)
-        said = self.tracks.attributes(self.binding[index])[self.first : self.end]
-        values: list[Value] = [each.get(name) for each in said]
-        if all(value is None for value in values):
-            return None
-        if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
-            return (np.array([np.nan if value is None else value for value in values], dtype=np.float64),)
-        return values
+        def said() -> list[Value]:
+            return [each.get(name) for each in self.tracks.attributes(track)[self.first : self.end]]
 
-    def _column(self, index: int, name: str) -> Numbers:
-        return self.tracks.column(self.binding[index], name)[self.first : self.end]
+        return _observed(name, lambda column: self.tracks.column(track, column)[self.first : self.end], said)
+
+
+def _observed(
+    name: str, column: Callable[[str], Numbers], said: Callable[[], Sequence[Value]]
+) -> tuple[Numbers, ...] | list[Value] | None:
+    """The values of a property; arguments as `Observed.observed`.
+
+    Args:
+        name: Of the property.
+        column: A column of the store by its name.
+        said: The values that labels give beside the columns, None where there is none.
+    """
+    if name == "position":
+        return column("x"), column("y")
+    if name in ("velocity", "speed"):
+        vx, vy = column("motion_vx"), column("motion_vy")
+        return (np.hypot(vx, vy),) if name == "speed" else (vx, vy)
+    if name in _COLUMNS:
+        found = column(_COLUMNS[name])
+        return None if name not in MOVING and np.isnan(found).all() else (found,)
+    values = [*said()]
+    if all(value is None for value in values):
+        return None
+    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
+        return (np.array([np.nan if value is None else value for value in values], dtype=np.float64),)
+    return values

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import re
 
 import pyarrow.parquet as pq
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from scenicq.forest.scenario import BuiltIn
 from scenicq.query.execution.result_tables import read_row
 
-KEYS = ["frame", "recording", "timestamp_us", "verdict", "correspondence", "witness", "sensors"]
+KEYS = ["frame", "recording", "timestamp_us", "verdict", "correspondence", "witness", "sensors", "dataset"]
 FRAMES = [f"03-busy-intersection/{number:02}" for number in range(9, 14)]
 
 
@@ -103,7 +104,12 @@ def test_a_file_s_extension_says_its_format(run, crossroads, crossing, tmp_path)
     assert [channel for channel, _ in table.column("sensors").to_pylist()[0]] == ["CAM_FRONT"]
     lines = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
     assert table.column("correspondence").to_pylist() == [line["correspondence"] for line in lines]
+    (origin,) = {line.pop("dataset") for line in lines}
+    assert table.schema.metadata[b"scenicq.dataset"].decode() == origin
     assert [read_row(row) for row in table.to_pylist()] == lines
+    cells = csv.DictReader(io.StringIO((tmp_path / "a.csv").read_text()))
+    assert {row["dataset"] for row in cells} == {origin}
+    assert re.fullmatch("crossroads@[0-9a-f]{8}", origin)
     assert (tmp_path / "a.txt").read_text().split() == FRAMES
     assert [json.loads(line)["frame"] for line in (tmp_path / "a.jsonl").read_text().splitlines()] == FRAMES
     assert (tmp_path / "a.csv").read_text().count("\n") == 1 + len(FRAMES)

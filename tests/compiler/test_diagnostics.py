@@ -91,3 +91,14 @@ def test_files_beside_the_program_can_be_imported() -> None:
 
     scenario = compiled("from lib import place\nego = place(1)\nplace(2)\n", 3, loader=loader)
     assert [thing.properties["width"].value.value for thing in scenario.objects] == [3.0, 3.0]  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(("name", "known"), [("crosswalk", "crossing"), ("junction", "intersection"), ("kerb", "curb")])
+def test_what_people_call_it_names_what_scenic_calls_it(name, known):
+    with pytest.raises(ScenarioError, match=f"`{known}` is what Scenic calls it"):
+        compiled(f"model scenic.domains.driving.model\nego = new Car\nother = new Object on {name}\n")
+
+
+def test_a_comma_after_the_class_is_told():
+    with pytest.raises(ScenarioError, match="no comma stands between the class and its first specifier"):
+        compiled("ego = new Object, with width 1\n")

@@ -25,6 +25,7 @@ from scenicq.importers.ingest import ingest
 from scenicq.importers.motion import euler
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, Predictions
+from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query, read_program
 from scenicq.store.dataset import Dataset, open_dataset
@@ -222,6 +223,21 @@ def test_what_does_not_fit_is_told(street: Dataset, results: list[Result], predi
     refused("file-invalid", lambda: evaluate([{**record(results[0]), "frame": "other"}], street, predictions))
     cast = {"correspondence": {"parkedCar": "nobody"}}
     refused("file-invalid", lambda: evaluate([{**record(results[0]), **cast}], street, predictions))
+
+
+def test_results_say_which_dataset_they_are_of(
+    street: Dataset, results: list[Result], predictions: Predictions
+) -> None:
+    def of(dataset: str) -> list[dict[str, Any]]:
+        return [record(each) | {"dataset": dataset} for each in results]
+
+    mine = name_origin(street)
+    assert evaluation_record(evaluate(of(mine), street, predictions))["dataset"] == mine
+    assert not any("has changed" in each.message for each in evaluate(of(mine), street, predictions).warnings)
+    older = evaluate(of(mine.partition("@")[0] + "@0"), street, predictions)
+    assert sum("the dataset has changed" in each.message for each in older.warnings) == 1
+    told = refused("option-invalid", lambda: evaluate(of("elsewhere@0"), street, predictions))
+    assert "different datasets" in told
 
 
 def test_boxes_of_the_ego_frame(street: Dataset, predictions: Predictions) -> None:

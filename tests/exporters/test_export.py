@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pyarrow.feather
 import pytest
 
 from scenicq.errors import DataError
 from scenicq.exporters.export import EXPORTS, Exporter
+from scenicq.exporters.forms import FORMS
 from scenicq.importers.ingest import ingest
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.results import Result
@@ -129,11 +133,73 @@ def test_openlabel_has_a_tag_a_match_and_roles(tmp_path: Path) -> None:
     assert len(content["tags"]) == len(content["frames"]) == 3
     assert content["metadata"]["schema_version"] == "1.0.0"
     label = next(iter(dataset.labels()))
-    other = content["frames"]["0"]["objects"][label.objects[0].track or ""]["object_data"]
+    (key,) = [key for key, each in content["objects"].items() if each["name"] == label.objects[0].track]
+    other = content["frames"]["0"]["objects"][key]["object_data"]
     assert {"name": "role", "val": "other"} in other["text"]
     box = other["cuboid"][0]["val"]
     assert box[:2] == [label.objects[0].x, label.objects[0].y]
     assert box[6:8] == [label.objects[0].length, label.objects[0].width]
+
+
+UID = "-?[0-9]+|[0-9a-fA-F]{8}(-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}"
+VALUES = {"text": str, "num": int | float, "boolean": bool, "vec": list, "cuboid": list}
+
+
+def _check_values(data: Mapping[str, Any], kinds: set[str]) -> None:
+    assert set(data) <= kinds
+    for kind, entries in data.items():
+        for each in entries:
+            assert isinstance(each["name"], str)
+            assert isinstance(each["val"], VALUES[kind])
+            if kind in ("vec", "cuboid"):
+                assert all(isinstance(value, int | float) for value in each["val"])
+                assert kind == "vec" or len(each["val"]) in (9, 10)
+
+
+@pytest.mark.parametrize("source", ["nuscenes_tiny", "argoverse2_tiny", "crossroads"])
+def test_openlabel_has_the_keys_that_the_schema_demands(tmp_path: Path, source: str) -> None:
+    """What version 1.0.0 of the published schema requires and allows of all that is written."""
+    dataset = dataset_of(source, tmp_path)
+    for text in export("openlabel", dataset, results(dataset), tmp_path / "out").values():
+        (root,) = (whole := json.loads(text)).values()
+        assert set(whole) == {"openlabel"}
+        assert set(root) == {
+            *("metadata", "ontologies", "coordinate_systems", "objects", "frames", "frame_intervals", "tags"),
+        }
+        assert root["metadata"]["schema_version"] == "1.0.0"
+        for group in ("objects", "ontologies", "tags"):
+            assert all(re.fullmatch(UID, key) for key in root[group])
+        assert all(set(each) == {"name", "type"} for each in root["objects"].values())
+        assert all({"type", "parent"} <= set(each) for each in root["coordinate_systems"].values())
+        assert all(set(each) == {"frame_start", "frame_end"} for each in root["frame_intervals"])
+        for key, frame in root["frames"].items():
+            assert key.isdecimal()
+            assert set(frame) == {"objects", "frame_properties"}
+            assert isinstance(frame["frame_properties"]["timestamp"], str)
+            streams = frame["frame_properties"].get("streams", {})
+            assert all(set(each) == {"uri"} for each in streams.values())
+            for name, member in frame["objects"].items():
+                assert re.fullmatch(UID, name)
+                assert name in root["objects"]
+                assert set(member) == {"object_data"}
+                _check_values(member["object_data"], set(VALUES))
+        for tag in root["tags"].values():
+            assert isinstance(tag["type"], str)
+            assert tag["ontology_uid"] in root["ontologies"]
+            _check_values(tag["tag_data"], {"text", "num", "boolean", "vec"})
+
+
+def test_openlabel_comes_back_with_its_ego(tmp_path: Path) -> None:
+    dataset = dataset_of("nuscenes_tiny", tmp_path)
+    exporter = Exporter("openlabel", dataset, tmp_path / "out")
+    for result in results(dataset):
+        exporter.add(result)
+    exporter.finish()
+    ingest(tmp_path / "out", tmp_path / "again")
+    before, after = next(dataset.labels()), next(open_dataset(tmp_path / "again").labels())
+    assert after.has_ego
+    assert (after.ego.x, after.ego.y) == pytest.approx((before.ego.x, before.ego.y))
+    assert len(after.objects) == len(before.objects)
 
 
 def test_openlabel_holds_what_is_known_and_counts_the_rest(tmp_path: Path) -> None:
@@ -164,8 +230,8 @@ def test_openlabel_holds_what_is_known_and_counts_the_rest(tmp_path: Path) -> No
     (file,) = (tmp_path / "out").iterdir()
     content = json.loads(file.read_text())["openlabel"]
     frame = content["frames"]["0"]
-    assert set(frame["objects"]) == {"o", "p", "q"}
-    car, person, bicycle = (frame["objects"][name]["object_data"] for name in "opq")
+    assert {key: each["name"] for key, each in content["objects"].items()} == {"0": "o", "1": "p", "2": "q"}
+    car, person, bicycle = (frame["objects"][key]["object_data"] for key in "012")
     assert car["cuboid"][0]["val"] == pytest.approx([1, 2, 0, 0, 0, 0.5, 4, 2, 1.5])
     assert {"name": "colour", "val": "red"} in car["text"]
     assert {"name": "role", "val": "ego"} in car["text"]
@@ -212,3 +278,7 @@ def test_what_cannot_be_exported(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert code("paths", tmp_path / "file" / "out") == "target-unwritable"
     assert not (tmp_path / "out").exists()
+
+
+def test_the_command_offers_the_forms_that_there_are():
+    assert tuple(EXPORTS) == FORMS

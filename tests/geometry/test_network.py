@@ -13,6 +13,7 @@ from scenicq.geometry.elements import Lane, LaneGroup, MissingElementError, Road
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.membership import contains
 from scenicq.geometry.network import Network
+from scenicq.geometry.regions import PolylineSet
 
 
 def area(identifier: str, kind: str, bounds: tuple[float, float, float, float], **properties: Any) -> MapFeature:
@@ -160,7 +161,11 @@ def test_regions() -> None:
     assert not contains(network.drivableRegion, 9, 5)
     assert contains(network.walkableRegion, 9, 5)
     assert contains(network.walkableRegion, 0, 37)
+    assert isinstance(network.curbRegion, PolylineSet)
+    assert "_made" not in vars(network.curbRegion)  # until somebody asks where the curbs are
     assert contains(network.curbRegion, 8, 3)
+    assert "_made" in vars(network.curbRegion)
+    assert network.curbRegion.orientation is not None
     parking = network.region("parking")
     assert parking is not None
     assert contains(parking, 25, 5)

@@ -121,9 +121,34 @@ def test_results_of_different_datasets_are_refused():
     for other in (_line("a", time=5), _line("a", time=1, recording="q")):
         with pytest.raises(DataError, match="of different datasets"):
             check_datasets(mine, of(other))
+    for name, refused in (("town@1", False), ("town@2", False), ("city@1", True)):
+        named = of(_line("a", time=1, dataset=name)), of(_line("a", time=1, dataset="town@1"))
+        if refused:
+            with pytest.raises(DataError, match=r"different datasets: A is of city \(version 1\), B of town"):
+                check_datasets(*named)
+        else:
+            told = check_datasets(*named)
+            assert (told is None) == (name == "town@1")
+            assert told is None or told.severity == "warning"
+    assert check_datasets(of(_line("a", time=1, dataset="town@1")), mine) is None
+    with pytest.raises(DataError, match="of different datasets"):
+        check_datasets(of(_line("a", time=1, dataset="town@1")), of(_line("a", time=2, dataset="town@2")))
     doubt = check_datasets(mine, of(_line("z", recording="q")))
     assert doubt is not None
     assert doubt.severity == "warning"
+
+
+@pytest.mark.parametrize("kind", ["jsonl", "csv", "parquet"])
+def test_every_format_names_its_dataset(run, crossroads, scenarios, tmp_path, kind):
+    file = tmp_path / f"a.{kind}"
+    assert run("match", scenarios / "02_crossing_cars.scenic", crossroads, "-o", file).exit_code == 0
+    other = tmp_path / "b.jsonl"
+    frame = next(iter(read_results(file).values()))
+    other.write_text(json.dumps({**frame, "dataset": "elsewhere@00000000"}) + "\n")
+    done = run("report", file, other)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "different datasets: A is of crossroads" in done.stderr
+    assert "B of elsewhere" in done.stderr
 
 
 def test_the_command_refuses_them(run, tmp_path):

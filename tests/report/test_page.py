@@ -15,6 +15,8 @@ from .browser import CHROMIUM, DRIVER, browser
 
 pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no Chromium with its driver")
 
+HANGS_S = 120
+"""What has not happened by then never will."""
 RIGHT, LEFT, ESCAPE = "\ue014", "\ue012", "\ue00c"
 STATE = """
 const run = document.querySelector(arguments[0]);
@@ -143,12 +145,52 @@ def test_the_command_is_copied(opened):
     address = opened.run("return location.href")
     opened.command("Browser.grantPermissions", permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])
     opened.click("#copy")
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + HANGS_S
     while not (told := opened.run("return document.getElementById('copied').textContent")):
         assert time.monotonic() < deadline
     assert told == "Copied"
     assert opened.run("return navigator.clipboard.readText()") == "scenicq match 'a b.scenic' town"
     assert opened.run("return location.href") == address
+
+
+def test_the_first_screen_is_a_contact_sheet(opened):
+    opened.resize(1400, 900)
+    top = "return document.querySelector(arguments[0]).getBoundingClientRect().top"
+    assert opened.run(top, ".tile") < 300 < opened.run(top, ".program") > opened.run(top, ".recordings")
+    runs = opened.run("return document.querySelectorAll('.run').length")
+    assert opened.run("return document.querySelectorAll('.tile').length") == min(runs, 20)
+    names = opened.run("return new Set([...document.querySelectorAll('.run')].map(e => e.dataset.recording)).size")
+    assert opened.run("return document.querySelectorAll('.recordings li').length") == names
+
+
+def test_a_small_picture_leads_to_its_frame(opened):
+    opened.resize(1280, 900)
+    far = "return [...document.querySelectorAll('.tile')].findIndex(e => Number(e.dataset.frame) > 1)"
+    number = opened.run(far)
+    assert number >= 0
+    frame, run = opened.run(
+        "const t = document.querySelectorAll('.tile')[arguments[0]]; t.click(); "
+        "return [t.dataset.frame, t.dataset.run]",
+        number,
+    )
+    assert _state(opened, f"#{run}")["at"].startswith(f"{frame} /")
+    assert opened.run("return location.hash") == f"#{run}"
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_no_value_is_cut_off(opened, width):
+    opened.resize(width, 800, phone=width < 500)
+    cut = """
+    return [...document.querySelectorAll('td, th, code, .told, .recordings li > *, .which, h1, h3, summary')]
+      .filter(e => e.checkVisibility() && getComputedStyle(e).display !== 'inline')
+      .filter(e => {
+        if (e.scrollWidth > e.clientWidth + 1) return true;
+        const box = e.getBoundingClientRect();
+        return box.right > document.documentElement.clientWidth + 1 || box.left < -1;
+      })
+      .map(e => [e.tagName, e.className.baseVal ?? e.className, e.textContent.slice(0, 60)]);
+    """
+    assert opened.run(cut) == []
 
 
 @pytest.mark.parametrize(("width", "phone"), [(1280, False), (390, True), (320, True)])
@@ -197,14 +239,14 @@ def test_pictures_beside_the_page_are_loaded_as_they_are_seen(chromium, report):
     chromium.open(report[1])
     loaded = "const i = document.querySelector(arguments[0]); return i.complete && i.naturalWidth > 0"
     while not chromium.run(loaded, "#run-1 img.picture"):
-        assert time.monotonic() - started < 120
+        assert time.monotonic() - started < HANGS_S
     run = _long_run(chromium)
     source = "return document.querySelector(arguments[0]).getAttribute('src')"
     before = chromium.run(source, f"{run} img.picture")
     chromium.click(f"{run} .on")
     assert chromium.run(source, f"{run} img.picture") != before
     while not chromium.run(loaded, f"{run} img.picture"):
-        assert time.monotonic() - started < 120
+        assert time.monotonic() - started < HANGS_S
     assert chromium.console() == []
 
 

@@ -12,11 +12,15 @@ import shapely
 from scenicq.geometry.boxes import corners
 from scenicq.geometry.regions import DifferenceOf, Disc, IntersectionOf, PolygonSet, Rectangle, Sector, UnionOf
 from scenicq.match.verdict import Match
+from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.report.backdrop import Backdrop
+from scenicq.report.distances import measured_distances
 from scenicq.report.outlines import allowed_headings, allowed_place, outline
-from scenicq.report.picture import caption, draw, view_of
+from scenicq.report.picture import Shot, caption, draw, view_of
 from scenicq.report.png import can_make_png, png
 from scenicq.report.scene import observed_by
 from scenicq.report.svg import Plane, element, escape
+from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label, LabelObject
 
 from .reading import Drawn
@@ -210,6 +214,61 @@ def test_the_picture_of_the_readme_is_what_the_tool_draws(shoot, request):
     if request.config.getoption("--update-golden"):
         file.write_text(drawn, encoding="utf-8")
     assert file.read_text(encoding="utf-8") == drawn, "`make golden` draws it again"
+
+
+def test_roles_of_one_area_make_no_pattern(shoot):
+    shot, backdrop = shoot("03-busy-intersection/10", "02_crossing_cars.scenic")
+    text = draw(shot, backdrop)
+    areas = Drawn(text).with_class("place", "fixed")
+    assert len(areas) == 3
+    assert "<pattern" not in text
+    assert len(Drawn(text).pieces(areas[1])) == 1, "the intersection is one outline"
+
+
+def test_distances_of_requirements_are_drawn(crossroads, tmp_path):
+    program = tmp_path / "far.scenic"
+    program.write_text(
+        "model scenic.domains.driving.model\nego = new Car\nother = new Car\n"
+        "require 3 < (distance from ego to other) < 40\nrequire (distance from other to intersection) < 50\n"
+        "require (distance from ego to other) > 1\n"
+    )
+    dataset = open_dataset(crossroads)
+    query = Query(dataset, read_program(program), QueryOptions())
+    found = next(each for each in query.results() if each.recording == "05-two-lane-traffic")
+    (label,) = dataset.labels([found.frame])
+    scenario, network = query.compile(label.map)
+    shot = Shot(label, scenario, found.verdict)
+    ways = measured_distances(scenario, observed_by(shot.roles), LARGE)
+    other = shot.roles[1].thing
+    assert len(ways) == 2, "each distance once"
+    assert ways[0] == ((label.ego.x, label.ego.y), (other.x, other.y))
+    intersection = shapely.union_all(outline(network.region("intersection"), LARGE))
+    assert math.dist(*ways[1]) == pytest.approx(intersection.distance(shapely.Point(other.x, other.y)))
+    text = draw(shot, Backdrop(network), half=100)
+    told = [each.text for each in Drawn(text).with_class("metres")]
+    assert f"{math.dist(*ways[0]):.1f} m" in told
+    assert len(Drawn(text).with_class("distance")) == len(told) == 1 + (math.dist(*ways[1]) > 5)
+
+
+@pytest.mark.parametrize("half", [50, 100])
+def test_people_are_large_enough_to_be_seen(shoot, half):
+    shot, backdrop = shoot("02-pedestrian-crosses/10")
+    drawn = Drawn(draw(shot, backdrop, half=half))
+    dots = drawn.with_class("dot")
+    assert dots
+    assert len(dots) == len(drawn.with_class("person"))
+    # of a picture of 900 pixels at least six
+    assert all(2 * int(dot.get("r")) / (2 * half * 100) * 900 >= 6 for dot in dots)
+
+
+def test_captions_fit(shoot):
+    shot, backdrop = shoot("03-busy-intersection/10")
+    name = "WMWMWMWM-0510-35b0-a2fa-b4cea13a6d76"
+    label = replace(shot.label, frame=f"{name}/315973165959643000", recording=name, map=name)
+    root = Drawn(draw(replace(shot, label=label), backdrop)).root
+    width = float(root.get("viewBox").split()[2])
+    for each in Drawn(draw(replace(shot, label=label), backdrop)).with_class("caption"):
+        assert len(each.text) * 0.69 * float(each.get("font-size")) < width
 
 
 def test_small_roles_have_a_ring(shoot):

@@ -1,6 +1,7 @@
 """The report of a query as a file: complete, self-contained, escaped, replaced only where it is ours."""
 
 import json
+import math
 import re
 import shutil
 from collections import Counter
@@ -19,8 +20,11 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query, QueryOptions, read_program
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.report import write
-from scenicq.report.runs import find_runs, frame_numbers
+from scenicq.report.cards import best_frame
+from scenicq.report.picture import Shot
+from scenicq.report.runs import Run, find_runs, frame_numbers
 from scenicq.report.shares import program_lines
+from scenicq.report.sheet import TILES, timelines_section, to_picture
 from scenicq.report.write import check_target, write_report
 from scenicq.store.dataset import open_dataset
 
@@ -57,7 +61,8 @@ def _loads(page):
     """Addresses that a page loads by itself."""
     links = {("a", "href")}
     names = {"src", "href", "srcset", "data", "poster", "action", "xlink:href"}
-    return [v for tag, name, v in page.attributes if name in names and (tag, name) not in links]
+    found = [v for tag, name, v in page.attributes if name in names and (tag, name) not in links]
+    return [address for address in found if not address.startswith("#")]
 
 
 def test_a_report_needs_nothing_but_itself(query, tmp_path):
@@ -136,12 +141,73 @@ def test_more_frames_than_fit_have_pictures_beside(query, tmp_path, monkeypatch)
     monkeypatch.setattr(write, "INLINE", 3)
     page = Page(write_report(found, results, tmp_path / "r").read_text(encoding="utf-8"))
     pictures = sorted(path.name for path in (tmp_path / "r" / "pictures").iterdir())
-    assert len(pictures) == len(results)
-    assert sorted(page.values("data-picture")) == [f"pictures/{name}" for name in pictures]
+    # one a frame, and a small one of the run
+    assert len(pictures) == len(results) + 1
+    beside = [f"pictures/{name}" for name in pictures]
+    assert set(beside) == {*page.values("data-picture"), *page.values("src")} - {None}
     assert set(page.values("loading")) == {"lazy"}
     monkeypatch.setattr(write, "INLINE", 300)
     write_report(found, results, tmp_path / "r")
     assert sorted(path.name for path in (tmp_path / "r").iterdir()) == ["index.html"]
+
+
+def test_small_pictures_are_of_every_recording_first():
+    def run(recording, first):
+        return Run(recording, (Result(f"{recording}/{first}", recording, 0, Match({}, {})),), first, 99)
+
+    runs = [run("a", number) for number in range(1, 2 * TILES, 2)] + [run("b", 1), run("c", 1)]
+    found = to_picture(runs)
+    assert len(found) == TILES
+    assert {runs[number - 1].recording for number in found} == {"a", "b", "c"}
+    assert to_picture(runs[:3]) == {1, 2, 3}
+
+
+def test_the_best_frame_has_its_roles_nearest(query):
+    found, results = query
+    scenario, _ = found.compile("crossroads")
+    labels = {label.frame: label for label in found.dataset.labels([each.frame for each in results])}
+    (run,) = find_runs(results, frame_numbers(found.dataset, {results[0].recording}))
+    shots = [Shot(labels[each.frame], scenario, each.verdict) for each in results]
+
+    def farthest(shot):
+        ego = shot.label.ego
+        return max(math.dist((role.thing.x, role.thing.y), (ego.x, ego.y)) for role in shot.roles)
+
+    best = best_frame(run, shots)
+    assert farthest(shots[best]) < min(map(farthest, shots)) + 0.1
+    alone = [replace(shot, verdict=Match({}, {}), scenario=None) for shot in shots]
+    assert best_frame(run, alone) == 2
+
+
+def test_a_recording_has_one_timeline():
+    def run(recording, first, count, verdict):
+        results = tuple(Result(f"{recording}/{n}", recording, n, verdict) for n in range(count))
+        return Run(recording, results, first, 40)
+
+    no = NoMatch(Cause("tolerance", ""), {})
+    runs = [run("<b>", 3, 5, Match({}, {})), run("a", 1, 1, Match({}, {})), run("<b>", 20, 1, no)]
+    page = Page(timelines_section(runs))
+    assert page.tags.count("li") == 2
+    text = " ".join(page.texts)
+    assert "5 matches, 1 near miss in 40 frames" in text
+    assert "1 match in 40 frames" in text
+    assert "<b>" in page.texts
+    assert page.values("href") == ["#run-1", "#run-3", "#run-2"]
+    assert "match: frames 3\N{EN DASH}7" in page.values("aria-label")
+    assert timelines_section([]) == ""
+
+
+def test_bands_of_an_interval_say_all_of_what_holds(crossroads, tmp_path):
+    program = read_program(Path(__file__).parents[2] / "sample_data" / "over_time" / "02_cut_in.scenic")
+    query = Query(open_dataset(crossroads), program, OPTIONS)
+    results = list(query.results())
+    page = Page(write_report(query, results, tmp_path / "r").read_text(encoding="utf-8"))
+    classes = page.values("class")
+    assert "timeline" in classes
+    assert classes.count("now") == sum(tag == "svg" and value == "strip" for tag, _, value in page.attributes) - 1
+    assert "require eventually abs(to_the_left(other)) < 0.5" in page.texts
+    shown = [text for text in page.texts if "always" in text or "eventually" in text]
+    assert not any(text.endswith("\N{HORIZONTAL ELLIPSIS}") for text in shown)
 
 
 def test_what_is_left_out_is_told(query, tmp_path, monkeypatch):

@@ -280,7 +280,7 @@ def life_end(trace: Trace, binding: dict[str, str], i: int) -> int:
             return -1
         last = i
         for k in own[1:]:
-            if trace[k].time - trace[last].time > GAP_S:
+            if round(trace[k].time - trace[last].time, 6) > GAP_S:
                 break
             last = k
         end = min(end, last)

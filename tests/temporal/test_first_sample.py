@@ -9,7 +9,7 @@ from scenicq.errors import Source
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset
-from scenicq.temporal.intervals import IntervalOptions
+from scenicq.temporal.interval_options import IntervalOptions
 
 OBJECTS = """
 ego = new Object at (Range(-99, 99), Range(-99, 99)), facing 0

@@ -58,7 +58,7 @@ def longest(trace: Trace, spans):
     """Of overlapping intervals the longest, the earliest of equals, one after the other."""
     left, kept = set(spans), []
     while left:
-        best = max(left, key=lambda span: (trace[span[1]].time - trace[span[0]].time, -span[0]))
+        best = max(left, key=lambda span: (round(trace[span[1]].time - trace[span[0]].time, 6), -span[0]))
         kept.append(best)
         left = {span for span in left if span[1] < best[0] or best[1] < span[0]}
     return sorted(kept)

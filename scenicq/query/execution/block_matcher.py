@@ -22,7 +22,15 @@ from scenicq.match.verdict import Verdict
 from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
-from scenicq.query.prefilter.executor import Block, Candidate, candidates, names, run_prefilter
+from scenicq.query.prefilter.executor import (
+    Block,
+    Candidate,
+    CandidateRows,
+    candidate_rows,
+    candidates,
+    names,
+    run_prefilter,
+)
 from scenicq.query.prefilter.plan import Plan, make_plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
@@ -146,20 +154,33 @@ class Decider:
 
     def _recordings(self, world: CompiledMap, matcher: Matcher, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
-        from scenicq.query.execution.recording_matcher import RecordingMatcher  # noqa: PLC0415 - takes long to load
+        # takes long to load
+        from scenicq.query.execution.recording_matcher import RecordingMatcher, Survivors  # noqa: PLC0415
         from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
         assert self._connection is not None
         intervals = IntervalMatcher(world.scenario, self.options, self.time, self._solver)
         recordings = RecordingMatcher(self.dataset, matcher, intervals)
-        if not world.plan.stages:
-            labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=world.motion)]
-            missed, left = np.full(len(labels), -1, np.int16), iter(labels)
+        connection, plan = self._connection, world.plan
+        rows: CandidateRows | None = None
+        if not plan.stages:
+            # recordings are of one map
+            every = np.concatenate([np.arange(*run) for run in block.runs])
+            missed = np.full(len(every), -1, np.int16)
+
+            def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
+                labels = self.dataset.labels_in(block.part, wanted, motion=world.motion)
+                return (Candidate(label, None) for label in labels)
         else:
-            missed = run_prefilter(self.dataset, self._connection, world.plan, block)
-            left = iter(())
-            if (missed < 0).any():
-                left = candidates(self._connection, world.plan, motion=world.motion)
+            missed = run_prefilter(self.dataset, connection, plan, block)
+            every = np.concatenate([np.arange(*run) for run in block.runs])
+            if plan.roles and (missed < 0).any():
+                rows = candidate_rows(connection, plan)
+
+            def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
+                return candidates(connection, plan, motion=world.motion, among=wanted)
+
+        left = Survivors(every[missed < 0], rows, plan.roles, read)
         return Decided(missed, [], [], recordings.decide(block, left))
 
     def _matched(self, matcher: Matcher, left: Iterator[Candidate]) -> Iterator[list[Result]]:

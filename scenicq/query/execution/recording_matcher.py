@@ -1,30 +1,31 @@
-"""The recordings of a block decided: starts from the labels that are left, then intervals, recording by recording."""
+"""The recordings of a block decided: the labels that are left side by side, then intervals."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
 
-from scenicq.forest.groups import Condition
-from scenicq.forest.scenario import Requirement, Scenario
-from scenicq.match.explanation import Finding
+import numpy as np
+from numpy.typing import NDArray
+
 from scenicq.match.matcher import Matcher
-from scenicq.match.problem.candidates import Candidates
-from scenicq.match.problem.constraints import describe_constraint
-from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
+from scenicq.match.search.group_plan import relevant_properties
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
+from scenicq.query.execution.recording_starts import DecidedStart, label_of, start_table, starts_of
 from scenicq.query.execution.results import IntervalSpan, Result
-from scenicq.query.prefilter.executor import Block, Candidate
+from scenicq.query.prefilter.executor import Block, Candidate, CandidateRows
+from scenicq.store.classes import class_matches
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
-from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader, track_of
-from scenicq.temporal.intervals import Interval, IntervalMatcher, Start
-from scenicq.temporal.start_columns import StartColumns
-from scenicq.temporal.truth import TRUE, UNKNOWN, Truth
+from scenicq.store.track_block import TrackBlock
+from scenicq.store.tracks import TrackKey
+from scenicq.temporal.hidden_runs import Remembered
+from scenicq.temporal.intervals import Interval, IntervalMatcher
+from scenicq.temporal.starts import Cast, StartSearch
+from scenicq.temporal.truth import TRUE, UNKNOWN
 
-__all__ = ["DecidedRecordings", "RecordingMatcher", "lost_recording", "starts_of"]
+__all__ = ["DecidedRecordings", "RecordingMatcher", "Survivors", "lost_recording"]
 
 CUT_OFF = "recording-ends"
 """The cause of what might have matched, had the recording or a track gone on."""
@@ -32,7 +33,7 @@ CUT_OFF = "recording-ends"
 
 @dataclass(slots=True)
 class DecidedRecordings:
-    """What became of the recordings of a block; complete once the results are taken.
+    """What became of the recordings of a block.
 
     Attributes:
         results: One for each interval, in order; of a binding without one, how far it came.
@@ -43,6 +44,23 @@ class DecidedRecordings:
     results: list[Result] = field(default_factory=list[Result])
     counts: Counter[str] = field(default_factory=Counter[str])
     failed: Counter[str] = field(default_factory=Counter[str])
+
+
+@dataclass(frozen=True, slots=True)
+class Survivors:
+    """The labels of a block that the prefilter has left.
+
+    Attributes:
+        labels: Their rows in the part.
+        rows: Who may play the roles; None where anybody of the class may.
+        roles: The objects of the scenario that `rows` is about.
+        read: Reads some of them, by their rows. With `rows`, they have the label objects of these alone.
+    """
+
+    labels: NDArray[np.int64]
+    rows: CandidateRows | None
+    roles: tuple[int, ...]
+    read: Callable[[NDArray[np.int64]], Iterator[Candidate]]
 
 
 @dataclass(eq=False)
@@ -61,169 +79,163 @@ class RecordingMatcher:
 
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
-        options = self.matcher.options
-        self._columns = StartColumns(self.matcher.scenario, options)
-        self._rest = self.matcher
-        if self._columns.by_role:
-            self._rest = Matcher(self._columns.rest(), options, self.matcher.solver)
+        self._search = StartSearch(self.matcher)
+        self._relevant = relevant_properties(self.matcher.scenario, self.matcher.options)
 
-    def decide(self, block: Block, left: Iterable[Candidate]) -> DecidedRecordings:
+    def decide(self, rows: Block, left: Survivors) -> DecidedRecordings:
         """Decide a block of whole recordings.
 
         Args:
-            block: The block.
-            left: Its labels that may be starts, in order.
+            rows: The block.
+            left: Its labels that may be starts.
         """
-        found = DecidedRecordings()
-        with ExitStack() as stack:
-            reader: TrackReader | None = None
-            rows: dict[str, tuple[int, int]] = {}
-            for name, group in groupby(left, key=lambda each: each.label.recording):
-                candidates = list(group)
-                if reader is None:
-                    reader = stack.enter_context(TrackReader(self.dataset, block.part))
-                    names = reader.names([first for first, _ in block.runs])
-                    rows = dict(zip(names, block.runs, strict=True))
-                tracks = reader.read(*rows[name])
-                starts = self._starts(tracks, candidates, found)
-                self._recording(tracks, starts, found)
-        found.counts["recordings"] += len(block.runs)
+        found = DecidedRecordings(counts=Counter(recordings=len(rows.runs)))
+        if not len(left.labels):
+            return found
+        with TrackBlock(self.dataset, rows.part, rows.runs) as block:
+            arrays, decided, undecided = self._starts(block, left, found)
+            table = start_table(self.matcher.scenario, block, arrays, decided)
+            by_number = dict(enumerate(decided, len(table) - len(decided)))
+
+            def remember(number: int) -> Remembered:
+                if number in by_number:
+                    return by_number[number].label, by_number[number].correspondence
+                members = {index: int(mine[number]) for index, mine in table.members.items()}
+                return label_of(self.matcher.scenario, block, members, rows.map, self._relevant)
+
+            intervals = self.intervals.intervals(table, remember)
+            found.counts["starts"] += len(np.unique(table.labels)) + len(undecided)
+            found.counts["bindings"] += len({(each.recording, each.binding) for each in intervals})
+            found.counts["cut off"] += sum(each.cut_off for each in intervals)
+            results = [(int(block.recording_of[at]), _undecided(block, at, verdict)) for at, verdict in undecided]
+            results += self._results(block, intervals, by_number, remember)
+            found.results += [result for _, result in sorted(results, key=lambda each: each[0])]
         return found
 
+    # --- starts
+
     def _starts(
-        self, tracks: RecordingTracks, candidates: Iterable[Candidate], found: DecidedRecordings
-    ) -> list[tuple[Candidate, list[Finding]]]:
-        """How labels can be the start, those that can."""
-        numbers = {frame: number for number, frame in enumerate(tracks.frames)}
-        known: dict[tuple[int, TrackKey], list[tuple[Requirement, Truth]]] = {}
-        starts: list[tuple[Candidate, list[Finding]]] = []
-        for candidate in candidates:
-            narrowed = self._narrowed(tracks, candidate, numbers[candidate.label.frame], known)
-            if isinstance(narrowed, Requirement):
-                found.failed[describe_constraint(self.matcher.scenario, Condition(narrowed, narrowed.condition))] += 1
-                continue
-            among, matcher = narrowed
-            findings = list(matcher.findings(candidate.label, among=among))
+        self, block: TrackBlock, left: Survivors, found: DecidedRecordings
+    ) -> tuple[Mapping[int, NDArray[np.int64]], list[DecidedStart], list[tuple[int, Unknown]]]:
+        """Starts that arrays have, those that the matcher has decided, and the labels that stay undecided."""
+        labels = left.labels - block.first_label
+        arrays: Mapping[int, NDArray[np.int64]] = {}
+        cast = self._cast(block, labels, left)
+        sure = np.ones(len(labels), np.bool_)
+        codes, classes = block.categories()
+        own: list[int] = np.unique(codes[block.ego(labels)]).tolist()
+        if cast is not None and all(classes[code] for code in own):
+            starts = self._search.decide(block, cast)
+            arrays, cast, sure = starts.members, starts.left, starts.sure
+            labels = cast.labels
+            found.failed.update(starts.failed)
+        decided: list[DecidedStart] = []
+        undecided: list[tuple[int, Unknown]] = []
+        read = left.read(labels + block.first_label) if len(labels) else iter(())
+        for at, candidate, members, among, known in self._asked(block, left, labels, cast, sure, read):
+            matcher = self._search.rest if known else self.matcher
+            label = candidate.label
+            findings = list(matcher.findings(label, among=among))
             for each in findings:
                 if isinstance(each.verdict, NoMatch):
                     found.failed[each.verdict.cause.what] += 1
-            kept = [each for each in findings if not isinstance(each.verdict, NoMatch)]
-            found.counts["starts"] += bool(kept)
-            if kept:
-                starts.append((candidate, kept))
-        return starts
-
-    def _narrowed(
-        self,
-        tracks: RecordingTracks,
-        candidate: Candidate,
-        sample: int,
-        known: dict[tuple[int, TrackKey], list[tuple[Requirement, Truth]]],
-    ) -> tuple[Candidates | None, Matcher] | Requirement:
-        """Who may play whom, and who decides the rest; or the requirement that nobody satisfies."""
-        label, scenario = candidate.label, self.matcher.scenario
-        if not self._columns.by_role or not label.has_ego:
-            return candidate.among, self.matcher
-        among = dict(candidate.among or {})
-        sure = True
-        for role in self._columns.by_role:
-            numbers = (0,) if role == scenario.ego else among.get(role, range(1, len(label.objects) + 1))
-            kept: list[int] = []
-            blamed: Requirement | None = None
-            for number in numbers:
-                key = track_of(label, label.objects[number - 1] if number else label.ego)
-                if (role, key) not in known:
-                    known[role, key] = self._columns.decide(tracks, role, key)
-                broken = self._columns.excluded(known[role, key], sample)
-                if broken is None:
-                    kept.append(number)
-                    sure = sure and all(truth[sample] == TRUE for _, truth in known[role, key])
-                blamed = blamed or broken
-            if not kept and blamed is not None:
-                return blamed
-            if role != scenario.ego:
-                among[role] = tuple(kept)
-        return among, self._rest if sure else self.matcher
-
-    def _recording(
-        self, tracks: RecordingTracks, starts: Iterable[tuple[Candidate, list[Finding]]], found: DecidedRecordings
-    ) -> None:
-        numbers = {frame: number for number, frame in enumerate(tracks.frames)}
-        mine: list[Start] = []
-        for candidate, findings in starts:
-            sample = numbers[candidate.label.frame]
-            for start in starts_of(self.matcher.scenario, candidate.label, sample, findings):
-                if isinstance(start, Start):
-                    mine.append(start)
+            for start in starts_of(self.matcher.scenario, block, label, members, findings):
+                if isinstance(start, Unknown):
+                    undecided.append((at, start))
                 else:
-                    found.results.append(_undecided(tracks, sample, start))
-        intervals = self.intervals.intervals(tracks, mine)
-        found.counts["bindings"] += len({start.binding for start in mine})
-        found.counts["cut off"] += sum(each.cut_off for each in intervals)
-        found.results += [self.result(tracks, each) for each in intervals]
+                    decided.append(start)
+        return arrays, decided, undecided
 
-    def result(self, tracks: RecordingTracks, interval: Interval) -> Result:
+    def _cast(self, block: TrackBlock, labels: NDArray[np.int64], left: Survivors) -> Cast | None:
+        """Who may play whom, if that is a matter of the label's own ego."""
+        scenario, options = self.matcher.scenario, self.matcher.options
+        if options.ego != "label" or options.exact:
+            return None
+        if left.rows is not None:
+            may = {index: left.rows.may[:, place] for place, index in enumerate(left.roles)}
+            return Cast(labels, block.members(left.rows.rows), may)
+        members = _objects_of(block, labels)
+        codes, classes = block.categories()
+        fits: dict[str, NDArray[np.bool_]] = {}
+        may: dict[int, NDArray[np.bool_]] = {}
+        for thing in scenario.objects:
+            if thing.index != scenario.ego:
+                if thing.category not in fits:
+                    own = [bool(each) and class_matches(thing.category, each, options.classes) for each in classes]
+                    fits[thing.category] = np.array(own, dtype=np.bool_)[codes[members]]
+                may[thing.index] = fits[thing.category]
+        return Cast(labels, members, may)
+
+    def _asked(
+        self, block: TrackBlock, left: Survivors, labels: NDArray[np.int64], cast: Cast | None,
+        sure: NDArray[np.bool_], read: Iterator[Candidate],
+    ) -> Iterator[tuple[int, Candidate, list[int], Mapping[int, tuple[int, ...]] | None, bool]]:  # fmt: skip
+        """Labels for the matcher, with their members, who may play whom, and whether plain requirements hold."""
+        members = _objects_of(block, labels) if cast is None else cast.members
+        ends = np.searchsorted(block.label_of[members], np.append(labels, len(block))).tolist()
+        for place, (at, candidate) in enumerate(zip(labels.tolist(), read, strict=True)):
+            mine = slice(ends[place], ends[place + 1])
+            among: Mapping[int, tuple[int, ...]] | None = candidate.among
+            if cast is not None:
+                among = {index: tuple((np.flatnonzero(may[mine]) + 1).tolist()) for index, may in cast.may.items()}
+            own = [int(block.ego(np.array([at]))[0]), *members[mine].tolist()]
+            yield at, candidate, own, among, bool(sure[place])
+
+    # --- results
+
+    def _results(
+        self, block: TrackBlock, intervals: Sequence[Interval], decided: Mapping[int, DecidedStart],
+        remember: Callable[[int], Remembered],
+    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
+        """Intervals as results, with the recordings that they are of."""
+        witnesses = self._witnesses(intervals, decided, remember)
+        for each in intervals:
+            start = decided.get(each.origin)
+            reason = start.verdict.reason if start is not None and isinstance(start.verdict, Unknown) else ""
+            yield each.recording, self._result(block, each, witnesses.get(each.origin, {}), each.reason or reason)
+
+    def _witnesses(
+        self, intervals: Sequence[Interval], decided: Mapping[int, DecidedStart],
+        remember: Callable[[int], Remembered],
+    ) -> Mapping[int, Mapping[str, WitnessValue]]:  # fmt: skip
+        """The witnesses of the initial scenes of intervals that match, by the numbers of their starts."""
+        wanted = sorted({each.origin for each in intervals if each.truth == TRUE})
+        verdicts: dict[int, Verdict] = {each: decided[each].verdict for each in wanted if each in decided}
+        rest = [each for each in wanted if each not in decided]
+        scenario = self.matcher.scenario
+        others = [thing.index for thing in scenario.objects if thing.index != scenario.ego]
+        among = {index: (number,) for number, index in enumerate(others, 1)}
+        labels: list[tuple[Label, Mapping[int, tuple[int, ...]] | None]] = [(remember(each)[0], among) for each in rest]
+        verdicts.update(zip(rest, self._search.rest.match_all(labels), strict=True))
+        return {number: each.witness for number, each in verdicts.items() if isinstance(each, Match)}
+
+    def _result(
+        self, block: TrackBlock, interval: Interval, witness: Mapping[str, WitnessValue], reason: str
+    ) -> Result:
         """An interval as a result."""
         scenario = self.matcher.scenario
         roles = {scenario.objects[index].name: _named(track) for index, track in interval.binding}
+        first, _ = block.runs[interval.recording]
+        start, end = first + interval.start, first + interval.end
         verdict: Verdict
         if interval.truth == TRUE:
-            verdict = Match(roles, interval.witness)
+            verdict = Match(roles, {**witness, **interval.witness})
         elif interval.truth == UNKNOWN:
-            verdict = Unknown(interval.reason, Cause("over time"), roles)
+            verdict = Unknown(reason, Cause("over time"), roles)
         else:
-            verdict = NoMatch(_cause(tracks, interval), roles)
+            verdict = NoMatch(_cause(block.seconds(end), interval), roles)
         dynamics = scenario.dynamics
-        span = IntervalSpan(
-            tracks.frames[interval.end],
-            int(tracks.times_us[interval.end]),
-            interval.end - interval.start + 1,
-            dynamics is None or not dynamics.terminates,
-        )
-        start = interval.start
-        return Result(tracks.frames[start], tracks.name, int(tracks.times_us[start]), verdict, interval=span)
+        open_ended = dynamics is None or not dynamics.terminates
+        span = IntervalSpan(block.frame(end), int(block.times_us[end]), end - start + 1, open_ended)
+        name = block.name(interval.recording)
+        return Result(block.frame(start), name, int(block.times_us[start]), verdict, interval=span)
 
 
-def starts_of(scenario: Scenario, label: Label, sample: int, findings: Iterable[Finding]) -> Iterator[Start | Unknown]:
-    """The starts that a label makes; what is undecided without a whole correspondence stays as it is.
-
-    Interchangeable objects take their tracks in one order in all labels.
-    """
-    things = (label.ego, *label.objects)
-    for finding in findings:
-        verdict = finding.verdict
-        if isinstance(verdict, NoMatch):
-            continue
-        chosen = dict(finding.assignment)
-        if isinstance(verdict, Match) and finding.search is not None and finding.plan is not None:
-            chosen[scenario.ego] = finding.search.problem.ego
-            tracks = {index: track_of(label, things[number]) for index, number in chosen.items()}
-            for members in _classes(finding.plan.twins):
-                ordered = sorted(tracks[index] for index in members)
-                tracks.update(zip(sorted(members), ordered, strict=True))
-        else:
-            by_id = {thing.id: thing for thing in label.objects} | {"ego": label.ego}
-            names = {thing.name: thing.index for thing in scenario.objects}
-            whole = verdict.correspondence
-            if len(whole) < len(scenario.objects):
-                if isinstance(verdict, Unknown):
-                    yield verdict
-                continue
-            tracks = {names[name]: track_of(label, by_id[id_]) for name, id_ in whole.items()}
-        if len(set(tracks.values())) < len(tracks):
-            continue  # a track that a label has twice
-        yield Start(sample, tuple(sorted(tracks.items())), verdict, label, verdict.correspondence)
-
-
-def _classes(twins: Mapping[int, int]) -> list[list[int]]:
-    """Objects that are interchangeable with each other."""
-    found: dict[int, list[int]] = {}
-    first: dict[int, int] = {}
-    for index, earlier in sorted(twins.items()):
-        head = first.get(earlier, earlier)
-        first[index] = head
-        found.setdefault(head, [head]).append(index)
-    return list(found.values())
+def _objects_of(block: TrackBlock, labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The label objects of labels, in order."""
+    wanted = np.zeros(len(block) + 1, np.bool_)
+    wanted[labels] = True
+    return np.flatnonzero(wanted[block.label_of[: int(block.object_starts[-1])]])
 
 
 def _named(track: TrackKey) -> str:
@@ -232,8 +244,8 @@ def _named(track: TrackKey) -> str:
     return "ego" if kind == "ego" else name.rpartition("\n")[2]
 
 
-def _cause(tracks: RecordingTracks, interval: Interval) -> Cause:
-    seconds = float(tracks.seconds[interval.end])
+def _cause(seconds: float, interval: Interval) -> Cause:
+    """Why an interval that ends after some seconds of its recording does not match."""
     if interval.cut_off:
         return Cause(CUT_OFF, f"at {seconds:.1f} s, before the program ends")
     if interval.broken is None:
@@ -242,17 +254,17 @@ def _cause(tracks: RecordingTracks, interval: Interval) -> Cause:
     return Cause(what, f"does not hold on what ends at {seconds:.1f} s", interval.broken)
 
 
-def _undecided(tracks: RecordingTracks, sample: int, verdict: Unknown) -> Result:
-    time_us = int(tracks.times_us[sample])
-    frame = tracks.frames[sample]
-    return Result(frame, tracks.name, time_us, verdict, interval=IntervalSpan(frame, time_us, 1, open_ended=True))
+def _undecided(block: TrackBlock, at: int, verdict: Unknown) -> Result:
+    time_us, frame = int(block.times_us[at]), block.frame(at)
+    name = block.name(int(block.recording_of[at]))
+    return Result(frame, name, time_us, verdict, interval=IntervalSpan(frame, time_us, 1, open_ended=True))
 
 
-def lost_recording(dataset: Dataset, block: Block) -> DecidedRecordings:
+def lost_recording(dataset: Dataset, rows: Block) -> DecidedRecordings:
     """The one result of a recording that kills every process that takes it."""
-    with TrackReader(dataset, block.part) as reader:
-        tracks = reader.read(block.first, block.end)
-    lost = Unknown("crash", Cause("process", "every process that matched this recording died"))
-    span = IntervalSpan(tracks.frames[-1], int(tracks.times_us[-1]), len(tracks), open_ended=True)
-    result = Result(tracks.frames[0], tracks.name, int(tracks.times_us[0]), lost, interval=span)
+    with TrackBlock(dataset, rows.part, rows.runs) as block:
+        lost = Unknown("crash", Cause("process", "every process that matched this recording died"))
+        last = len(block) - 1
+        span = IntervalSpan(block.frame(last), int(block.times_us[last]), len(block), open_ended=True)
+        result = Result(block.frame(0), block.name(0), int(block.times_us[0]), lost, interval=span)
     return DecidedRecordings([result], Counter(recordings=1))

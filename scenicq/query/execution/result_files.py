@@ -17,12 +17,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.query.execution.result_origin import METADATA, ORIGIN
 from scenicq.query.execution.result_tables import read_row
 
 __all__ = ["Record", "read_records", "read_results"]
 
 Record = Mapping[str, Any]
-"""One result: frame, recording, verdict, and what else `scenicq.query.execution.results.record` gives."""
+"""One result: frame, recording, verdict, what else `scenicq.query.execution.results.record` gives, and the dataset."""
 
 _TEXTS = ("frame", "recording", "verdict")
 _NEEDED = (*_TEXTS, "timestamp_us", "correspondence", "cause")
@@ -122,8 +123,10 @@ def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Ite
         table = pq.read_table(pa.BufferReader(data), columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError) as error:
         raise _invalid(path, f"it is not Parquet with results: {str(error).partition(chr(10))[0]}") from None
+    origin = (table.schema.metadata or {}).get(METADATA, b"").decode(errors="replace")
+    named = {ORIGIN: origin} if origin else {}
     for number, row in enumerate(table.to_pylist(), 1):
-        yield f"row {number}", _row(path, f"row {number}", read_row(row))
+        yield f"row {number}", _row(path, f"row {number}", read_row(row) | named)
 
 
 def _row(path: Path, where: str, row: Record) -> Record:

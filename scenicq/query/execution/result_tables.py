@@ -19,6 +19,8 @@ from typing import Any, cast
 
 import pyarrow as pa
 
+from scenicq.query.execution.result_origin import METADATA, ORIGIN
+
 __all__ = ["DENSITY_COLUMNS", "read_row", "result_schema", "result_table", "roles_of"]
 
 _CAUSE = ("what", "detail", "place", "reason")
@@ -33,11 +35,14 @@ DENSITY_COLUMNS = ("log_density", "log_density_error", "log_weight", "no_density
 """Columns of results that are ranked: numbers, and why there is none."""
 
 
-def result_schema(roles: Sequence[str], *, ranked: bool = False, over_time: bool = False) -> pa.Schema:
+def result_schema(
+    roles: Sequence[str], *, origin: str = "", ranked: bool = False, over_time: bool = False
+) -> pa.Schema:
     """The columns of results.
 
     Args:
         roles: Names of the scenario's objects, in its order.
+        origin: The dataset that they come from, as `name_origin` says it; "" where it is not known.
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
     """
@@ -59,7 +64,8 @@ def result_schema(roles: Sequence[str], *, ranked: bool = False, over_time: bool
             ("cause", pa.struct([(name, text) for name in _CAUSE])),
             ("open_ended", pa.bool_()) if over_time else ("sensors", pa.map_(text, text)),
             *more,
-        ]
+        ],
+        metadata={METADATA: origin.encode()} if origin else None,
     )
 
 
@@ -75,8 +81,9 @@ def result_table(records: Iterable[Mapping[str, Any]], schema: pa.Schema) -> pa.
 
 def _row(record: Mapping[str, Any]) -> dict[str, Any]:
     witness = cast("Mapping[str, float | Sequence[float]]", record["witness"])
+    cells = {name: value for name, value in record.items() if name != ORIGIN}
     return {
-        **record,
+        **cells,
         "witness": [(place, [value] if isinstance(value, int | float) else value) for place, value in witness.items()],
         "sensors": list(record.get("sensors", {}).items()),
     }

@@ -43,7 +43,7 @@ _MOST_DECIDED, _FEW_DECIDED = 300, 16
 """Frames that the matcher decides for one change."""
 _MOST_RUNS, _FEW_RUNS = 8, 3
 """Runs of frames of each map that a large dataset is sampled by."""
-_MOST_MAPS = 4
+_MOST_MAPS, _FEW_MAPS = 16, 4
 """Maps whose frames are looked at."""
 _ANYWHERE = {"position": 1e5, "heading": math.pi}
 """Sizes of a tolerance by which a feature is as good as not compared."""
@@ -167,7 +167,8 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
     found: list[Outlook] = []
     complete = len(changes) <= most
     with ExitStack() as stack:
-        sample = _sample(query, worlds, stack, _FEW_RUNS if brief else _MOST_RUNS)
+        runs, maps = (_FEW_RUNS, _FEW_MAPS) if brief else (_MOST_RUNS, _MOST_MAPS)
+        sample = _sample(query, worlds, stack, runs, maps)
         solver = stack.enter_context(LazySolver(query.options.solver))
         for number, change in enumerate(changes[:most]):
             if number and clock.is_over:
@@ -180,10 +181,10 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
     return Advice(tuple(excluded[:3]), tuple(found), complete)
 
 
-def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int) -> _Sample:
+def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int, maps: int) -> _Sample:
     """Read the frames that changes are tried on."""
     total = query.dataset.manifest.total.frames
-    step = max(1, -(-len(worlds) // _MOST_MAPS))
+    step = max(1, -(-len(worlds) // maps))
     chosen = dict(list(worlds.items())[::step])
     held: dict[str, duckdb.DuckDBPyConnection] = {}
     frames = 0

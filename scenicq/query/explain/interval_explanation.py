@@ -16,13 +16,14 @@ from scenicq.forest.temporal import Atom, Formula, Termination, Test, operands
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match
 from scenicq.query.execution.interval_frames import locate
-from scenicq.query.execution.recording_matcher import starts_of
+from scenicq.query.execution.recording_starts import DecidedStart, start_table, starts_of
 from scenicq.query.execution.run import Query
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
+from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackReader
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
-from scenicq.temporal.intervals import Interval, IntervalMatcher, Start
+from scenicq.temporal.intervals import Interval, IntervalMatcher
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import FALSE, TRUE, Truth
@@ -159,19 +160,27 @@ def explain_recording(query: Query, solver: Solver, name: str, time_us: int | No
         times = ", ".join(map(str, tracks.times_us.tolist()[:3]))
         hint = f"its frames are at {times} ..."
         raise DataError(Diagnostic("option-invalid", f"{name} has no frame at {time_us}", hints=(hint,)))
-    starts: list[Start] = []
     failed: Counter[str] = Counter()
-    for sample, label in enumerate(labels):
-        if time_us is not None and label.timestamp_us != time_us:
-            continue
-        findings = list(matcher.findings(label))
-        found = [each for each in starts_of(scenario, label, sample, findings) if isinstance(each, Start)]
-        starts += found
-        if not found:
-            causes = [each.verdict.cause for each in findings if not isinstance(each.verdict, Match)]
-            failed[causes[0].what if causes else "tracks"] += 1
-    intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
-    results = intervals.intervals(tracks, starts)
+    with TrackBlock(query.dataset, part, [(first, end)]) as block:
+        starts: list[DecidedStart] = []
+        for sample, label in enumerate(labels):
+            if time_us is not None and label.timestamp_us != time_us:
+                continue
+            findings = list(matcher.findings(label))
+            members = [
+                int(block.ego(np.array([sample]))[0]),
+                *range(*block.object_starts[sample : sample + 2].tolist()),
+            ]
+            found = [
+                each for each in starts_of(scenario, block, label, members, findings) if isinstance(each, DecidedStart)
+            ]
+            starts += found
+            if not found:
+                causes = [each.verdict.cause for each in findings if not isinstance(each.verdict, Match)]
+                failed[causes[0].what if causes else "tracks"] += 1
+        intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
+        table = start_table(scenario, block, {}, starts)
+        results = intervals.intervals(table, lambda number: (starts[number].label, starts[number].correspondence))
     if not results:
         return IntervalExplanation(tracks, None, failed=failed)
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
@@ -185,7 +194,7 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: Interval) ->
     if dynamics is None:
         return ()
     samples = Samples(tracks, dict(interval.binding), interval.start, interval.end + 1)
-    columns = AtomColumns(scenario, samples, start=0)
+    columns = AtomColumns(scenario, samples, start=np.zeros(len(samples), np.int64))
     known: dict[int, Truth] = {}
     for number, condition in enumerate(dynamics.conditions):
         try:

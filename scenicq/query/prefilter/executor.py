@@ -16,6 +16,7 @@ from typing import Any
 
 import duckdb
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, Plan
@@ -28,8 +29,10 @@ from scenicq.store.sql import sql_text
 __all__ = [
     "Block",
     "Candidate",
+    "CandidateRows",
     "Extent",
     "blocks",
+    "candidate_rows",
     "candidates",
     "extents",
     "hold",
@@ -301,15 +304,52 @@ def names(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block)
     return connection.execute(f"SELECT frame, recording, timestamp_us FROM {LABELS} ORDER BY number").fetchall()
 
 
-def candidates(connection: duckdb.DuckDBPyConnection, plan: Plan, *, motion: bool = False) -> Iterator[Candidate]:
+@dataclass(frozen=True, slots=True)
+class CandidateRows:
+    """Who may play which role in the frames that are left of a block.
+
+    Attributes:
+        rows: Rows of `objects` in order, shape (m,).
+        may: Whether each may play each role of the plan, shape (m, roles).
+    """
+
+    rows: NDArray[np.int64]
+    may: NDArray[np.bool_]
+
+
+def candidate_rows(connection: duckdb.DuckDBPyConnection, plan: Plan) -> CandidateRows:
+    """Who may play the roles of a plan in the block that was sifted last.
+
+    Args:
+        connection: The one that sifted.
+        plan: The plan; with roles.
+    """
+    left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
+    roles = ", ".join(f"r{place}" for place in range(len(plan.roles)))
+    found: Any = connection.execute(f"SELECT row, {roles} FROM roles WHERE f IN {left} ORDER BY row").fetchnumpy()
+    may = [np.asarray(found[f"r{place}"], dtype=np.bool_) for place in range(len(plan.roles))]
+    return CandidateRows(np.asarray(found["row"], dtype=np.int64), np.column_stack(may))
+
+
+def candidates(
+    connection: duckdb.DuckDBPyConnection,
+    plan: Plan,
+    *,
+    motion: bool = False,
+    among: NDArray[np.int64] | None = None,
+) -> Iterator[Candidate]:
     """The labels that are left of the block that was sifted last, in order.
 
     Args:
         connection: The one that sifted.
         plan: The plan.
         motion: Whether what is computed of motion is read, too.
+        among: Rows of `labels`: only these; None for all.
     """
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
+    if among is not None:
+        connection.register("wanted", pa.table({"f": among}))
+        left = f"{left[:-1]} AND f IN (SELECT f FROM wanted))"
     more = MOTION_COLUMNS if motion else []
     of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *EGO_COLUMNS, *(f"ego_{name}" for name in more)))
     of_objects = ", ".join(f"a.{name}" for name in (*OBJECT_COLUMNS, *more))

@@ -10,13 +10,14 @@
   // --- one run: its slider, its picture, its facts
 
   const steps = new WeakMap();
+  const shows = new WeakMap();
   for (const run of runs) {
     const slider = run.querySelector("input[type=range]");
     if (!slider) continue;
     const output = run.querySelector("output");
     const picture = run.querySelector(".picture");
     const shots = [...run.querySelectorAll(".shot")];
-    const now = run.querySelector(".timeline .now");
+    const now = [...run.querySelectorAll(".timeline .now")];
     const facts = [...run.querySelectorAll(".frame")];
     const show = (number) => {
       const at = Math.min(shots.length, Math.max(1, number)) - 1;
@@ -24,10 +25,9 @@
       slider.value = at + 1;
       slider.setAttribute("aria-valuetext", `frame ${at + 1} of ${shots.length}`);
       output.textContent = `${at + 1} / ${shots.length}`;
-      if (now) {
-        const x = Number(now.dataset.left) + Number(now.dataset.step) * (at + 0.5);
-        now.setAttribute("x1", x);
-        now.setAttribute("x2", x);
+      for (const line of now) {
+        line.setAttribute("x1", at + 0.5);
+        line.setAttribute("x2", at + 0.5);
       }
       facts.forEach((each, index) => { each.hidden = index !== at; });
       if (shot.dataset.picture) {
@@ -40,6 +40,7 @@
         picture.setAttribute("aria-label", shot.dataset.told);
       }
     };
+    shows.set(run, show);
     const step = (by) => show(Number(slider.value) + by);
     slider.addEventListener("input", () => show(Number(slider.value)));
     run.querySelector(".back").addEventListener("click", () => step(-1));
@@ -47,6 +48,13 @@
     // browsers keep the position of a slider over a reload
     show(1);
     steps.set(run, step);
+  }
+
+  // --- small pictures lead to the frame that they show
+
+  for (const tile of document.querySelectorAll(".tile")) {
+    const run = document.getElementById(tile.dataset.run);
+    tile.addEventListener("click", () => shows.get(run)?.(Number(tile.dataset.frame)));
   }
 
   // --- all runs: filter and sort
@@ -60,7 +68,7 @@
     }
     const left = visible();
     const frames = left.reduce((sum, run) => sum + Number(run.dataset.length), 0);
-    shown.textContent = `${frames} ${frames === 1 ? "frame" : "frames"} in ${left.length} ${left.length === 1 ? "run" : "runs"}`;
+    shown.textContent = `${frames} ${frames === 1 ? "frame" : "frames"} in ${left.length} ${list.dataset.what}${left.length === 1 ? "" : "s"}`;
   };
   const arrange = () => {
     const down = sort.value.startsWith("-");

@@ -26,7 +26,7 @@ from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.explain.prefilter_counts import prefilter_counts
-from scenicq.query.prefilter.executor import Extent, blocks, extents, run_prefilter
+from scenicq.query.prefilter.executor import Extent, blocks, candidates, extents, hold, run_plan, run_prefilter
 from scenicq.query.prefilter.plan import Plan, make_plan
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
@@ -235,6 +235,28 @@ def test_the_steps_add_up_to_what_is_left(dataset):
     assert left[-1] == missed.count(-1)
     for number in range(len(surveyed.plan.steps)):
         assert left[number] - left[number + 1] == missed.count(number)
+
+
+def test_blocks_that_are_held_together_are_sifted_as_each_alone(dataset):
+    text = "ego = new Car on road\nother = new Car ahead of ego by Range(4, 10)\nrequire (distance to other) < 9"
+    query = Query(dataset, Source("test.scenic", HEADER + text))
+    (plan,) = query.plans()
+    (whole,) = query.blocks(plan.map)
+    cut = [replace(whole, first=first, end=min(first + 7, whole.end)) for first in range(0, whole.end, 14)]
+    with closing(dataset.connect()) as connection:
+        missed = [number for block in cut for number in run_prefilter(dataset, connection, plan, block).tolist()]
+        frames = [
+            each.label.frame
+            for block in cut
+            if (run_prefilter(dataset, connection, plan, block) < 0).any()
+            for each in candidates(connection, plan)
+        ]
+    with closing(dataset.connect(threads=1, views=False)) as connection:
+        assert hold(dataset, connection, cut) == len(missed)
+        for _ in range(2):  # as often as one likes
+            assert run_plan(connection, plan).tolist() == missed
+            assert [each.label.frame for each in candidates(connection, plan)] == frames
+    assert frames
 
 
 def test_blocks_cover_every_frame_once(dataset):

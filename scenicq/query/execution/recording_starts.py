@@ -1,0 +1,136 @@
+"""Between labels and the members of a block: starts that the matcher finds, and labels of starts that arrays have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.forest.scenario import Scenario
+from scenicq.match.explanation import Finding
+from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.store.labels import Label, LabelObject, Motion
+from scenicq.store.track_block import TrackBlock
+from scenicq.temporal.starts import classes_of_twins
+from scenicq.temporal.stretches import StartTable
+
+__all__ = ["DecidedStart", "label_of", "start_table", "starts_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class DecidedStart:
+    """A start that the matcher has decided.
+
+    Attributes:
+        members: Who plays each object of the scenario, by index, as a member of the block.
+        verdict: A match, or unknown.
+        label: The label.
+        correspondence: The label object of each object, by name.
+    """
+
+    members: Mapping[int, int]
+    verdict: Match | Unknown
+    label: Label
+    correspondence: Mapping[str, str]
+
+
+def starts_of(
+    scenario: Scenario, block: TrackBlock, label: Label, members: Sequence[int], findings: Iterable[Finding]
+) -> Iterator[DecidedStart | Unknown]:
+    """The starts that a label makes; what is undecided without a whole correspondence stays as it is.
+
+    Interchangeable objects take their tracks in one order in all labels.
+
+    Args:
+        scenario: The scenario.
+        block: Has the label.
+        label: The label.
+        members: Its ego and its objects as members of the block.
+        findings: What the matcher says of it.
+    """
+    for finding in findings:
+        verdict = finding.verdict
+        if isinstance(verdict, NoMatch):
+            continue
+        chosen: dict[int, int] = {}
+        if isinstance(verdict, Match) and finding.search is not None and finding.plan is not None:
+            numbers = {**finding.assignment, scenario.ego: finding.search.problem.ego}
+            chosen = {index: members[number] for index, number in numbers.items()}
+            for twins in classes_of_twins(finding.plan.twins):
+                ordered = sorted([chosen[index] for index in twins], key=block.key)
+                chosen.update(zip(sorted(twins), ordered, strict=True))
+        else:
+            numbers_by_id = {each.id: number for number, each in enumerate(label.objects, 1)} | {"ego": 0}
+            names = {thing.name: thing.index for thing in scenario.objects}
+            whole = verdict.correspondence
+            if len(whole) < len(scenario.objects):
+                if isinstance(verdict, Unknown):
+                    yield verdict
+                continue
+            chosen = {names[name]: members[numbers_by_id[id_]] for name, id_ in whole.items()}
+        yield DecidedStart(chosen, verdict, label, verdict.correspondence)
+
+
+def start_table(
+    scenario: Scenario, block: TrackBlock, arrays: Mapping[int, NDArray[np.int64]], decided: Sequence[DecidedStart]
+) -> StartTable:
+    """All starts of a block: first those that arrays have, then those that the matcher has decided."""
+    indices = sorted(thing.index for thing in scenario.objects)
+    members = {
+        index: np.concatenate(
+            (arrays.get(index, np.empty(0, np.int64)), np.array([each.members[index] for each in decided], np.int64))
+        )
+        for index in indices
+    }
+    before = len(members[indices[0]]) - len(decided)
+    sure = np.concatenate((np.ones(before, np.bool_), [isinstance(each.verdict, Match) for each in decided]))
+    return StartTable(block, members, sure.astype(np.bool_))
+
+
+def label_of(
+    scenario: Scenario, block: TrackBlock, members: Mapping[int, int], map_name: str, relevant: Sequence[frozenset[str]]
+) -> tuple[Label, dict[str, str]]:
+    """The label of a start with those objects alone that play a role, and what is relevant of them; who plays whom.
+
+    Args:
+        scenario: The scenario; its ego is the label's.
+        block: The block.
+        members: Who plays each object.
+        map_name: The map of the label.
+        relevant: The properties that matter of each object.
+    """
+    at = int(block.label_of[members[scenario.ego]])
+    objects: list[LabelObject] = []
+    names: dict[str, str] = {}
+    for thing in scenario.objects:
+        if thing.index == scenario.ego:
+            names[thing.name] = "ego"
+        else:
+            names[thing.name] = f"{len(objects)}"
+            objects.append(_object(block, members[thing.index], names[thing.name], relevant[thing.index]))
+    ego = _object(block, members[scenario.ego], "ego", relevant[scenario.ego])
+    recording = int(block.recording_of[at])
+    return Label(f"{at}", f"{recording}", int(block.times_us[at]), map_name, ego, tuple(objects)), names
+
+
+def _object(block: TrackBlock, member: int, id_: str, relevant: frozenset[str]) -> LabelObject:
+    def number(name: str, column: str | None = None) -> float | None:
+        if name not in relevant:
+            return None
+        value = float(block.numbers(column or name)[member])
+        return None if math.isnan(value) else value
+
+    moves = "velocity" if "velocity" in relevant else "speed"
+    vx, vy = number(moves, "motion_vx"), number(moves, "motion_vy")
+    velocity = None if vx is None or vy is None else (vx, vy)
+    motion = Motion(velocity, number("acceleration"), number("angularSpeed", "yaw_rate"), derived=True)
+    codes, classes = block.categories()
+    said_codes, said = block.said()
+    return LabelObject(
+        id_, classes[int(codes[member])], "",
+        float(block.numbers("x")[member]), float(block.numbers("y")[member]), number("heading"),
+        number("width"), number("length"), number("height"), None, None, said[int(said_codes[member])], motion,
+    )  # fmt: skip

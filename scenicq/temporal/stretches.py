@@ -1,0 +1,176 @@
+"""Stretches of recordings under bindings, side by side: the starts of a block, and the samples that runs may come to.
+
+A binding gives each object of the scenario a track. All runs of one binding that start in one common life of its tracks
+make a stretch: from the first start to the last sample of that life.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.store.track_block import TrackBlock
+from scenicq.temporal.samples import Places
+
+__all__ = ["StartTable", "Stretches", "stretches_of"]
+
+Members = NDArray[np.int64]
+_AT_ONCE = 400_000
+"""Places in memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartTable:
+    """Labels of a block that match the initial scene, or may, each with one correspondence.
+
+    Attributes:
+        block: The recordings.
+        members: By object of the scenario, who plays it, shape (m,).
+        sure: Whether it is a match, shape (m,).
+    """
+
+    block: TrackBlock
+    members: Mapping[int, Members]
+    sure: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        """The number of starts."""
+        return len(self.sure)
+
+    @property
+    def labels(self) -> Members:
+        """Of each start, its label."""
+        return self.block.label_of[next(iter(self.members.values()))]
+
+    def chosen(self, which: NDArray[np.int64]) -> StartTable:
+        """Some of them."""
+        return StartTable(self.block, {index: mine[which] for index, mine in self.members.items()}, self.sure[which])
+
+
+@dataclass(frozen=True, slots=True)
+class Stretches:
+    """Some stretches.
+
+    Attributes:
+        places: Their samples, one stretch after the other, shape (n,).
+        bounds: Where each begins, and where the last ends, shape (s + 1,).
+        labels: The label of each place, shape (n,).
+        seconds: Time of each place since the first sample of its recording.
+        starts: Places of the starts in order, shape (m,).
+        numbers: The number of each start in its table.
+    """
+
+    places: Places
+    bounds: Members
+    labels: Members
+    seconds: NDArray[np.float64]
+    starts: Members
+    numbers: Members
+
+    def heads(self) -> Members:
+        """For each place the first one of its stretch."""
+        return np.repeat(self.bounds[:-1], np.diff(self.bounds))
+
+    def ends(self) -> Members:
+        """For each start the last place of its stretch."""
+        return self.bounds[np.searchsorted(self.bounds, self.starts, side="right")] - 1
+
+    def some(self, chosen: NDArray[np.int64]) -> Stretches:
+        """The stretches to which some places belong: all of theirs, in order."""
+        which = np.unique(np.searchsorted(self.bounds, chosen, side="right") - 1)
+        lengths = np.diff(self.bounds)
+        before = np.zeros(len(self.labels) + 1, np.int64)
+        before[1:] = np.cumsum(np.isin(np.repeat(np.arange(len(lengths)), lengths), which))
+        mine = before[self.starts + 1] > before[self.starts]
+        return Stretches(
+            self.places.at(chosen),
+            np.concatenate(([0], np.cumsum(lengths[which]))),
+            self.labels[chosen],
+            self.seconds[chosen],
+            before[self.starts[mine]],
+            self.numbers[mine],
+        )
+
+    def apart(self) -> Iterator[tuple[slice, slice]]:
+        """The places of each stretch, and which of the starts are its own."""
+        firsts = np.searchsorted(self.starts, self.bounds)
+        for number in range(len(self.bounds) - 1):
+            yield (
+                slice(int(self.bounds[number]), int(self.bounds[number + 1])),
+                slice(int(firsts[number]), int(firsts[number + 1])),
+            )
+
+
+def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[Stretches]:
+    """The stretches that starts make, so many at a time that they stay in memory.
+
+    Args:
+        table: Starts, sorted by binding, then by label; no two objects of one play the same track.
+        gap_s: Seconds without a label after which a track's life ends.
+        apart: Whether each start makes a stretch of its own.
+    """
+    if not len(table):
+        return
+    block, labels = table.block, table.labels
+    tracks = {index: block.tracks(mine) for index, mine in table.members.items()}
+    seen = _Seen(block, np.unique(np.concatenate([*tracks.values()])), gap_s)
+    ends = np.minimum.reduce([seen.life_ends(mine, labels) for mine in tracks.values()])
+    changes = np.full(len(table), apart)
+    changes[0] = True
+    for mine in (*tracks.values(), ends):
+        changes[1:] |= mine[1:] != mine[:-1]
+    heads = np.flatnonzero(changes)
+    lengths = ends[heads] - labels[heads] + 1
+    total = np.cumsum(lengths)
+    first = 0
+    while first < len(heads):
+        last = max(first + 1, int(np.searchsorted(total, total[first] - lengths[first] + _AT_ONCE, side="right")))
+        sizes = lengths[first:last]
+        bounds = np.concatenate(([0], np.cumsum(sizes)))
+        which = np.repeat(np.arange(len(sizes)), sizes)
+        at: Members = labels[heads[first:last]][which] + np.arange(int(bounds[-1])) - bounds[which]
+        members = {index: seen.members(mine[heads[first:last]][which], at) for index, mine in tracks.items()}
+        low, high = int(heads[first]), int(heads[last]) if last < len(heads) else len(table)
+        mine = np.searchsorted(heads, np.arange(low, high), side="right") - 1 - first
+        starts = bounds[mine] + labels[low:high] - labels[heads[first + mine]]
+        recordings = np.array([run[0] for run in block.runs], dtype=np.int64)[block.recording_of[at]]
+        seconds = (block.times_us[at] - block.times_us[recordings]) / 1e6
+        yield Stretches(Places(block, members, len(at)), bounds, at, seconds, starts, np.arange(low, high))
+        first = last
+
+
+class _Seen:
+    """Where some tracks are seen: a row of samples for each."""
+
+    def __init__(self, block: TrackBlock, wanted: Members, gap_s: float) -> None:
+        self._wanted, mates = wanted, block.mates(wanted)
+        label = block.label_of[mates]
+        row = np.searchsorted(wanted, block.tracks(mates))
+        runs = np.array(block.runs, dtype=np.int64).reshape(-1, 2)
+        recording = np.zeros(len(wanted), np.int64)
+        recording[row] = block.recording_of[label]
+        sizes = runs[recording, 1] - runs[recording, 0]
+        # so that the label of a recording leads to its place in the row
+        self._base = np.cumsum(sizes) - sizes - runs[recording, 0]
+        self._table = np.full(int(sizes.sum()), -1, dtype=np.int64)
+        self._table[self._base[row] + label] = mates
+        there = np.flatnonzero(self._table >= 0)
+        at = block.label_of[self._table[there]]
+        of = np.repeat(np.arange(len(wanted)), sizes)[there]
+        breaks = (of[1:] != of[:-1]) | (np.diff(block.times_us[at]) > round(gap_s * 1e6))
+        lasts = np.append(np.flatnonzero(breaks), len(there) - 1)
+        self._life = np.full(len(self._table), -1, dtype=np.int64)
+        if len(there):
+            lives = np.concatenate(([0], np.cumsum(breaks)))
+            self._life[there] = at[lasts[lives]]
+
+    def members(self, tracks: Members, labels: Members) -> Members:
+        """Who is of a track at a label; -1 where nobody is."""
+        return self._table[self._base[np.searchsorted(self._wanted, tracks)] + labels]
+
+    def life_ends(self, tracks: Members, labels: Members) -> Members:
+        """The last label of the life of a track that is seen at a label."""
+        return self._life[self._base[np.searchsorted(self._wanted, tracks)] + labels]
