@@ -24,6 +24,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.search.group_plan import MatchPlan, relevant_properties
+from scenicq.match.search.plan_cache import PlanCache
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.presence import by_presence, observes
@@ -72,25 +73,24 @@ class Starts:
 
 
 @dataclass(eq=False)
-class _Rest(Matcher):
-    """The matcher without requirements that are known to hold; they still tell objects apart.
+class _Rest(PlanCache):
+    """The plans without requirements that are known to hold; they still tell objects apart.
 
     Attributes:
-        whole: The matcher with them.
+        whole: The plans with them.
     """
 
-    whole: Matcher = field(kw_only=True)
+    whole: PlanCache = field(kw_only=True)
 
     def __post_init__(self) -> None:
         """What matters of a label is what mattered before."""
-        super().__post_init__()
-        self._relevant = relevant_properties(self.whole.scenario, self.whole.options)
+        self.relevant = self.whole.relevant
 
     def plan(self, signature: Signature) -> MatchPlan:
         """The groups that are left for a signature."""
-        if signature not in self._plans:
-            self._plans[signature] = replace(super().plan(signature), twins=self.whole.plan(signature).twins)
-        return self._plans[signature]
+        if signature not in self.plans:
+            self.plans[signature] = replace(super().plan(signature), twins=self.whole.plan(signature).twins)
+        return self.plans[signature]
 
 
 @dataclass(eq=False)
@@ -124,7 +124,9 @@ class StartSearch:
         if self.plain:
             mine = {id(requirement) for found in self.plain.values() for requirement in found}
             left = tuple(each for each in scenario.requirements if id(each) not in mine)
-            self.rest = _Rest(replace(scenario, requirements=left), options, self.matcher.solver, whole=self.matcher)
+            left_over = replace(scenario, requirements=left)
+            plans = _Rest(left_over, options, whole=self.matcher.plans)
+            self.rest = Matcher(left_over, options, self.matcher.solver, plans)
         compared = {name for name, given in scenario.params.items() if given.explicit}
         # parameters are the labels' own, and not in arrays
         self._arrays = self._arrays and not compared - options.ignore_params
@@ -266,7 +268,7 @@ class StartSearch:
         holds, fails = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
         places, ordered = Places(block, members, size), {index: mine.copy() for index, mine in members.items()}
         for signature, chosen in observes(places, self._relevant):
-            plan = self.rest.plan((*signature, frozenset()))
+            plan = self.rest.plans.plan((*signature, frozenset()))
             forms = [group.closed_form for group in plan.groups if group.closed_form is not None]
             if len(forms) < len(plan.groups) or not _in_order(block, plan, ordered, chosen):
                 continue
@@ -286,7 +288,7 @@ class StartSearch:
                 xy = list(zip(np.asarray(x).tolist(), np.asarray(y).tolist(), strict=True))
                 regions = () if form.region is None else (form.region,)
                 lookups.look_up(() if form.field is None else (form.field,), regions, xy)
-            found = form.decide_many(lambda number: _getter(places, number), columns, self.rest.options, lookups)
+            found = form.evaluate_many(lambda number: _getter(places, number), columns, self.rest.options, lookups)
             holds &= np.asarray(found.holds, np.bool_)
             fails |= np.asarray(found.fails, np.bool_)
         return holds, fails
