@@ -52,6 +52,7 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/bench/scalability.py --patience 5
 	$(BIN)/python tests/bench/ingest.py
 	$(BIN)/python tests/bench/pictures.py
+	$(BIN)/python tests/bench/evaluation.py
 	$(BIN)/python tests/bench/steps.py
 	$(BIN)/python tests/bench/by_hand.py
 ifdef SCENIC

@@ -94,7 +94,8 @@ def test_match_writes_a_report_beside_its_results(run, crossroads, crossing, tmp
     assert frames
     assert all(f"<b>{frame}</b>" in text for frame in frames)
     assert text.count("<article") == 2
-    assert text.count('badge near">near miss') == 1
+    # on the contact sheet, and at its run
+    assert text.count('badge near">near miss') == 2
 
 
 def test_match_refuses_a_folder_of_others_before_it_starts(run, crossroads, crossing, tmp_path):
