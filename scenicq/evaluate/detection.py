@@ -32,6 +32,8 @@ Missing = Literal["error", "empty", "skip"]
 ERRORS_AT_M = 2.0
 """Centre distance of the pairs whose errors are told."""
 
+_AT_ONCE = 200_000
+"""Boxes that are compared at once: what lies between takes ten times their memory."""
 _ABSURD_M = 300.0
 """No sensor sees so far: boxes whose median distance from the ego is larger are in another frame of reference."""
 
@@ -92,7 +94,8 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
         covered[:] = True
     frame = places[predictions.frame] if len(predictions.frame) else np.zeros(0, dtype=np.int32)
     known = frame >= 0
-    predictions, frame = _taken(predictions, known), frame[known]
+    if not known.all():
+        predictions, frame = _taken(predictions, known), frame[known]
     poses = EgoPoses(dataset, frames)
     of_ego = predictions.of_ego
     if of_ego:
@@ -354,28 +357,30 @@ def _errors(
 ) -> Reals:  # fmt: skip
     """The errors of predictions that are label objects; headings are compared in the ego's frame, where it is given."""
     errors = np.full((len(owner), len(ERRORS)), np.nan)
-    mine = np.flatnonzero(owner >= 0)
-    its = owner[mine]
+    numbers = {name: number for number, name in enumerate(objects.attributes)}
+    same = np.array([*(numbers.get(name, -2) for name in predictions.attributes), -2], dtype=np.int32)
 
     def sizes(of: Predictions | Annotations, which: NDArray[np.int64]) -> Reals:
         return np.column_stack((of.width[which], of.length[which], of.height[which]))
 
-    headings = predictions.heading[mine], objects.heading[its]
-    if seen_from is not None:
-        headings = tuple(seen_from.heading_seen(frame[mine], each) for each in headings)
-    numbers = {name: number for number, name in enumerate(objects.attributes)}
-    same = np.array([*(numbers.get(name, -2) for name in predictions.attributes), -2], dtype=np.int32)
-    wanted = objects.attribute[its]
-    compared = Errors(
-        dx=predictions.x[mine] - objects.x[its],
-        dy=predictions.y[mine] - objects.y[its],
-        dz=predictions.z[mine] - objects.z[its] if spatial else np.zeros(len(mine)),
-        sizes=sizes(predictions, mine),
-        other_sizes=sizes(objects, its),
-        turn=headings[0] - headings[1],
-        dvx=predictions.vx[mine] - objects.vx[its],
-        dvy=predictions.vy[mine] - objects.vy[its],
-        attribute=np.where(wanted < 0, np.nan, same[predictions.attribute[mine]] != wanted),
-    )
-    errors[mine] = box_errors(compared, half_turn[mine], hull=predictions.protocol.hull)
+    found = np.flatnonzero(owner >= 0)
+    for first in range(0, len(found), _AT_ONCE):
+        mine = found[first : first + _AT_ONCE]
+        its = owner[mine]
+        headings = predictions.heading[mine], objects.heading[its]
+        if seen_from is not None:
+            headings = tuple(seen_from.heading_seen(frame[mine], each) for each in headings)
+        wanted = objects.attribute[its]
+        compared = Errors(
+            dx=predictions.x[mine] - objects.x[its],
+            dy=predictions.y[mine] - objects.y[its],
+            dz=predictions.z[mine] - objects.z[its] if spatial else np.zeros(len(mine)),
+            sizes=sizes(predictions, mine),
+            other_sizes=sizes(objects, its),
+            turn=headings[0] - headings[1],
+            dvx=predictions.vx[mine] - objects.vx[its],
+            dvy=predictions.vy[mine] - objects.vy[its],
+            attribute=np.where(wanted < 0, np.nan, same[predictions.attribute[mine]] != wanted),
+        )
+        errors[mine] = box_errors(compared, half_turn[mine], hull=predictions.protocol.hull)
     return errors

@@ -154,8 +154,10 @@ def evaluate(
         cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}
     )
     if isinstance(predictions, Path | str):
-        predictions = read_predictions(Path(predictions))
-    detection = detect(dataset, predictions, missing)
+        # not kept here: what is evaluated of them is a copy
+        detection = detect(dataset, read_predictions(Path(predictions)), missing)
+    else:
+        detection = detect(dataset, predictions, missing)
     rng = np.random.default_rng(seed)
     judge = _Judge(detection, distance_m, least_score, rng)
     doubts: list[Diagnostic] = []
@@ -171,7 +173,7 @@ def evaluate(
         found = [replace(each, simulated=verdict(runs[each.name], _decisive(each))) for each in found]
     return Evaluation(
         name_origin(dataset),
-        predictions.name,
+        detection.predictions.name,
         distance_m,
         least_score,
         tuple(found),

@@ -35,6 +35,8 @@ RESAMPLES = 2000
 FLIPS = 4999
 FEW = 8.0
 """Below this effective number of recordings intervals and tests are told to be rough."""
+_AT_ONCE = 250
+"""Flips of all recordings that are drawn at once."""
 _LEVEL = 0.95
 
 
@@ -159,8 +161,11 @@ def sign_flip_test(counts: Counts, rng: np.random.Generator, flips: int = FLIPS)
             return np.abs(flipped) / np.sqrt(spread)
 
     found = studentised(np.ones((1, len(scores))))[0]
-    drawn = studentised(rng.choice((-1.0, 1.0), size=(flips, len(scores))))
-    return float((1 + np.count_nonzero(drawn >= found * (1 - 1e-12))) / (1 + flips))
+    above = 0
+    for first in range(0, flips, _AT_ONCE):
+        signs = rng.choice((-1.0, 1.0), size=(min(_AT_ONCE, flips - first), len(scores)))
+        above += np.count_nonzero(studentised(signs) >= found * (1 - 1e-12))
+    return float((1 + above) / (1 + flips))
 
 
 def holm(p_values: Reals) -> Reals:
