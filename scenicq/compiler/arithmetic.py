@@ -18,7 +18,7 @@ from scenicq.compiler.values import Choice, ModelValue, describe, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant
 
-__all__ = ["LARGEST", "check_weight", "hashed", "is_flat", "is_random", "plain_binary", "plain_unary"]
+__all__ = ["LARGEST", "check_weight", "hashed", "is_flat", "is_random", "no_number", "plain_binary", "plain_unary"]
 
 LARGEST = 100_000
 """Items of the longest list, characters of the longest string, that a program may make."""

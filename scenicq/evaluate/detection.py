@@ -95,7 +95,7 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
     frame = places[predictions.frame] if len(predictions.frame) else np.zeros(0, dtype=np.int32)
     known = frame >= 0
     if not known.all():
-        predictions, frame = _taken(predictions, known), frame[known]
+        predictions, frame = predictions.taken(known), frame[known]
     poses = EgoPoses(dataset, frames)
     of_ego = predictions.of_ego
     if of_ego:
@@ -119,8 +119,8 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
     if math.isfinite(protocol.roi_m):
         roi = RegionOfInterest(dataset, frames, protocol.roi_m)
         object_class[~roi.holds(objects, objects.frame)] = -1
-        order = order[roi.holds(_taken(predictions, order), frame[order])]
-    predictions, frame, prediction_class = _taken(predictions, order), frame[order], prediction_class[order]
+        order = order[roi.holds(predictions.taken(order), frame[order])]
+    predictions, frame, prediction_class = predictions.taken(order), frame[order], prediction_class[order]
     pairs = _pairs(predictions, frame, prediction_class, objects, object_class, spatial=spatial)
     rank = np.arange(len(frame))
     owner = {
@@ -155,25 +155,6 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
         distance=np.hypot(objects.x - frames.ego_x[objects.frame], objects.y - frames.ego_y[objects.frame]),
         score=score,
     )
-
-
-def _taken(predictions: Predictions, which: NDArray[np.bool_] | NDArray[np.int64]) -> Predictions:
-    columns = (
-        "frame",
-        "category",
-        "x",
-        "y",
-        "z",
-        "heading",
-        "width",
-        "length",
-        "height",
-        "vx",
-        "vy",
-        "score",
-        "attribute",
-    )
-    return replace(predictions, **{name: getattr(predictions, name)[which] for name in columns})
 
 
 def _places(dataset: Dataset, frames: Frames, predictions: Predictions, missing: Missing) -> Numbers:

@@ -153,11 +153,10 @@ def evaluate(
     named: Mapping[str, Results] = (
         cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}
     )
-    if isinstance(predictions, Path | str):
-        # not kept here: what is evaluated of them is a copy
-        detection = detect(dataset, read_predictions(Path(predictions)), missing)
-    else:
-        detection = detect(dataset, predictions, missing)
+    # a file's predictions are not kept here: what is evaluated of them is a copy
+    detection = detect(
+        dataset, predictions if isinstance(predictions, Predictions) else read_predictions(Path(predictions)), missing
+    )
     rng = np.random.default_rng(seed)
     judge = _Judge(detection, distance_m, least_score, rng)
     doubts: list[Diagnostic] = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,12 +9,11 @@ from typing import Any
 from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.motion import quaternion
+from scenicq.importers.motion import Quaternion, quaternion, unit_quaternion
 from scenicq.store.camera_rows import camera_problem
 
 __all__ = ["CAMERA_KEYS", "Mount", "Pose", "camera_of", "pose_of", "posed", "sound_camera"]
 
-Quaternion = tuple[float, float, float, float]
 Pose = tuple[Quaternion, tuple[float, float, float]]
 """A unit quaternion w, x, y, z and an origin in metres."""
 
@@ -42,12 +40,9 @@ def pose_of(rotation: tuple[float, ...], origin: tuple[float, ...]) -> Pose:
     Raises:
         InvalidError: It is far from a unit quaternion.
     """
-    norm = math.hypot(*rotation)
-    if not 0.5 < norm < 2:
-        raise InvalidError("the rotation is not a unit quaternion")
-    w, x, y, z = (value / norm for value in rotation)
+    w, x, y, z = rotation
     a, b, c = origin
-    return (w, x, y, z), (a, b, c)
+    return unit_quaternion(w, x, y, z), (a, b, c)
 
 
 def posed(mount: Mount, vehicle: Pose, width: int, height: int) -> Camera:

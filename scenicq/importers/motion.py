@@ -9,9 +9,20 @@ from dataclasses import dataclass
 from scenicq.geometry.angles import heading_of, normalize
 from scenicq.importers.fields import InvalidError
 
-__all__ = ["Rigid", "Vector", "euler", "heading_of_yaw", "matrix", "quaternion", "velocities"]
+__all__ = [
+    "Quaternion",
+    "Rigid",
+    "Vector",
+    "euler",
+    "heading_of_yaw",
+    "matrix",
+    "quaternion",
+    "unit_quaternion",
+    "velocities",
+]
 
 Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +79,8 @@ class Rigid:
         return heading_of(self.x[0], self.x[1])
 
 
-def quaternion(w: float, x: float, y: float, z: float, origin: Vector) -> Rigid:
-    """The pose of a unit quaternion, of either sign, and an origin.
+def unit_quaternion(w: float, x: float, y: float, z: float) -> Quaternion:
+    """A quaternion w, x, y, z, made one of length 1.
 
     Raises:
         InvalidError: It is far from a unit quaternion.
@@ -77,7 +88,16 @@ def quaternion(w: float, x: float, y: float, z: float, origin: Vector) -> Rigid:
     norm = math.hypot(w, x, y, z)
     if not 0.5 < norm < 2:
         raise InvalidError("the rotation is not a unit quaternion")
-    w, x, y, z = w / norm, x / norm, y / norm, z / norm
+    return w / norm, x / norm, y / norm, z / norm
+
+
+def quaternion(w: float, x: float, y: float, z: float, origin: Vector) -> Rigid:
+    """The pose of a unit quaternion, of either sign, and an origin.
+
+    Raises:
+        InvalidError: It is far from a unit quaternion.
+    """
+    w, x, y, z = unit_quaternion(w, x, y, z)
     return Rigid(
         (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
         (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),

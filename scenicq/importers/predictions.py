@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,3 +171,12 @@ class Predictions:
     attributes: list[str]
     attribute: NDArray[np.int8]
     of_ego: bool = False
+
+    def taken(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Predictions:
+        """Some of the boxes.
+
+        Args:
+            which: Whether to take each, or the numbers of those to take.
+        """
+        columns = {each.name: getattr(self, each.name) for each in fields(self)}
+        return replace(self, **{name: of[which] for name, of in columns.items() if isinstance(of, np.ndarray)})

@@ -108,9 +108,8 @@ def _timeline(name: str, runs: Sequence[tuple[int, Run]], *, over_time: bool) ->
     counts = Counter[str]()
     for _, run in runs:
         counts[run.kind] += len(run.results)
-    plural = {"match": "match", "unknown": "unknown", "near": "near miss"}
     said = ", ".join(
-        f"{count:,} {plural[kind] if count == 1 or kind == 'unknown' else plural[kind] + 'es'}"
+        f"{count:,} {_KINDS[kind] if count == 1 or kind == 'unknown' else _KINDS[kind] + 'es'}"
         for kind, count in counts.items()
     )
     if over_time:

@@ -25,7 +25,7 @@ from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
-from scenicq.store.sql import sql_text
+from scenicq.store.sql import sql_list
 
 __all__ = ["Dataset", "open_dataset"]
 
@@ -110,8 +110,8 @@ class Dataset:
             paths = [str(path) for path in self.files(table)]
             every += paths
             if views:
-                connection.execute(f"CREATE VIEW {table} AS SELECT * FROM read_parquet({_sql_list(paths)})")
-        connection.execute(f"SET allowed_paths = {_sql_list(every)}")
+                connection.execute(f"CREATE VIEW {table} AS SELECT * FROM read_parquet({sql_list(paths)})")
+        connection.execute(f"SET allowed_paths = {sql_list(every)}")
         connection.execute("SET enable_external_access = false")
         return connection
 
@@ -247,7 +247,3 @@ def open_dataset(address: str | Path, *, older: bool = False, check: bool = True
             dataset.verify()  # a file that was damaged since is another matter
             raise
     return dataset
-
-
-def _sql_list(texts: Iterable[str]) -> str:
-    return "[" + ", ".join(map(sql_text, texts)) + "]"

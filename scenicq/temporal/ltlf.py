@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next, Not, Or, Until, operands
+from scenicq.temporal.folding import folded
 from scenicq.temporal.truth import FALSE, TRUE, Truth, negated
 
 __all__ = ["evaluate"]
@@ -30,17 +31,7 @@ def evaluate(formula: Formula, atom: Callable[[Atom], Truth], ends: NDArray[np.i
     Returns:
         Shape (n, m): row k, column c for the trace of the samples k to ends[c]; where that is empty, of no meaning.
     """
-    values: dict[Formula, Truth] = {}
-    stack: list[Formula] = [formula]
-    while stack:
-        node = stack[-1]
-        waiting = [part for part in operands(node) if part not in values]
-        if node in values or not waiting:
-            stack.pop()
-            values.setdefault(node, _value(node, [values[part] for part in operands(node)], atom, ends))
-        else:
-            stack += waiting
-    return values[formula]
+    return folded(formula, operands, lambda node, parts: _value(node, parts, atom, ends))
 
 
 def _value(node: Formula, parts: list[Truth], atom: Callable[[Atom], Truth], ends: NDArray[np.intp]) -> Truth:

@@ -191,24 +191,7 @@ def test_what_does_not_fit_is_told(street: Dataset, results: list[Result], predi
         return lambda: evaluate({"a": results}, street, found, **more)
 
     without = np.flatnonzero(predictions.frame < len(predictions.frames) - 1)
-    names = (
-        "frame",
-        "category",
-        "x",
-        "y",
-        "heading",
-        "width",
-        "length",
-        "height",
-        "vx",
-        "vy",
-        "score",
-        "z",
-        "attribute",
-    )
-    fewer = replace(
-        predictions, frames=predictions.frames[:-1], **{name: getattr(predictions, name)[without] for name in names}
-    )
+    fewer = replace(predictions.taken(without), frames=predictions.frames[:-1])
     assert predictions.frames[-1] in refused("predictions-missing", run(fewer))
     assert run(fewer, missing="empty")().scenarios[0].matching == len(results)
     assert run(fewer, missing="skip")().scenarios[0].matching <= len(results)

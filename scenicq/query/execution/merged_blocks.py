@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.block_matcher import Decided
@@ -32,6 +33,13 @@ def _excluded(plan: Plan, block: Decided, start: int, end: int) -> Iterator[Resu
     for (frame, recording, time), number in zip(block.names[start:end], numbers, strict=True):
         step = plan.steps[number]
         yield Result(frame, recording, time, NoMatch(Cause(step.what, step.detail, step.span)))
+
+
+def _count_excluded(plan: Plan, missed: NDArray[np.int16], funnel: Funnel) -> None:
+    """Count frames by the step of the plan that excludes them, where one does."""
+    for step, count in enumerate(np.bincount(missed[missed >= 0], minlength=len(plan.steps)).tolist()):
+        if count:
+            funnel.exclude(plan.steps[step].what, count)
 
 
 def merge_frames(
@@ -71,10 +79,7 @@ def merge_frames(
             start = len(block.missed)
         finally:
             # as far as results were taken
-            past = block.missed[:start]
-            for step, count in enumerate(np.bincount(past[past >= 0], minlength=len(plan.steps)).tolist()):
-                if count:
-                    funnel.exclude(plan.steps[step].what, count)
+            _count_excluded(plan, block.missed[:start], funnel)
 
 
 def merge_intervals(
@@ -83,10 +88,7 @@ def merge_intervals(
     """The intervals of blocks of whole recordings; arguments as of `merge_frames`."""
     for block in until_deadline(decided, funnel):
         assert block.recordings is not None
-        past = block.missed[block.missed >= 0]
-        for step, count in enumerate(np.bincount(past, minlength=len(plan.steps)).tolist()):
-            if count:
-                funnel.exclude(plan.steps[step].what, count)
+        _count_excluded(plan, block.missed, funnel)
         funnel.frames += int((block.missed < 0).sum())
         funnel.candidates += int((block.missed < 0).sum())
         funnel.excluded.update(block.recordings.failed)

@@ -22,7 +22,7 @@ from scenicq.forest.walk import features
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.dataset import Dataset
-from scenicq.store.sql import sql_text
+from scenicq.store.sql import sql_list, sql_text
 
 __all__ = ["Coverage", "coverage"]
 
@@ -201,7 +201,7 @@ def _own(each: _Setting, options: MatchOptions) -> str:
 
 
 def _paths(dataset: Dataset, table: str) -> str:
-    return "[" + ", ".join(sql_text(str(path)) for path in dataset.files(table)) + "]"
+    return sql_list(map(str, dataset.files(table)))
 
 
 def _read(dataset: Dataset, table: str) -> str:
