@@ -136,7 +136,7 @@ def _found(
             )
         except ScenarioError as error:
             if asked.dataset is not None:
-                error = about_dataset(error, asked.dataset, network.name)  # noqa: PLW2901
+                error = about_dataset(error, asked.dataset, network.name)
             codes = {diagnostic.code for diagnostic in error.diagnostics}
             (lacking if codes == {"map-lacks"} else errors).extend(error.diagnostics)
             continue

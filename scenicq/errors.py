@@ -87,6 +87,7 @@ CODES: dict[str, str] = {
     "no-tracks": "a program over time, and objects of which nothing says that they are the same in several labels",
     # what compiles but cannot be meant
     "angle-without-deg": "an angle of more than a full turn, which may be meant in degrees",
+    "exact-number": "a measured number that is compared with `==`",
     "range-reversed": "a range whose first end is above its second",
     "requirement-always": "a requirement that holds in every scene",
     "requirement-never": "a requirement that holds in no scene",

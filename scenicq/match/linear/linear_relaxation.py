@@ -1,8 +1,8 @@
 """Groups that are affine: linear programs, one per combination of map cells and whole turns.
 
 A random point in a region becomes one alternative per convex cell near where the point can be; on a curb one per
-segment, in a list of points one per point. Discs, and those that sectors are cut from, are taken between two polygons: what the outer one excludes is out,
-what the inner one allows is in, and the rest is left to a solver.
+segment, in a list of points one per point. Discs, also those that sectors are cut from, are taken between two polygons:
+what the outer one excludes is out, what the inner one allows is in, and the rest is left to a solver.
 """
 
 from __future__ import annotations
