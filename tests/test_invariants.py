@@ -132,6 +132,26 @@ def test_the_matcher_is_a_page():
     assert len((LIBRARY / "match" / "matcher.py").read_text().splitlines()) <= MOST_LINES
 
 
+def public_types(file: Path) -> Iterator[str]:
+    """Names of the classes and type aliases of a file that others may import."""
+    for node in tree(file).body:
+        match node:
+            case ast.ClassDef(name=name) if not name.startswith("_"):
+                yield name
+            case ast.AnnAssign(target=ast.Name(id=name), annotation=ast.Name(id="TypeAlias")) if name[0] != "_":
+                yield name
+            case _:
+                pass
+
+
+def test_a_type_has_its_name_alone():
+    found: dict[str, list[str]] = {}
+    for file in (*FILES, *sorted((ROOT / "cli").rglob("*.py"))):
+        for name in public_types(file):
+            found.setdefault(name, []).append(file.relative_to(ROOT).as_posix())
+    assert {name: files for name, files in found.items() if len(files) > 1} == {}
+
+
 def test_every_path_that_the_map_names_exists():
     paths = re.findall(r"`((?:tests|scenicq|sample_data|cli)/[\w./]*[\w/])`", README)
     assert paths

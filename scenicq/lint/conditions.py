@@ -76,7 +76,7 @@ def _dropped(scenario: Scenario, body: tuple[ast.Statement, ...]) -> Iterator[Di
     """Requirements that are known to hold without a scene: the compiler has left them out."""
     kept = {each.span for each in (*scenario.requirements, *scenario.soft)}
     for statement in body:
-        timed = isinstance(statement, ast.Require) and isinstance(statement.condition, ast.Temporal | ast.Until)
+        timed = isinstance(statement, ast.Require) and isinstance(statement.condition, ast.Temporal | ast.UntilOperator)
         if isinstance(statement, ast.Require) and not timed and statement.span not in kept:
             yield _always(statement.span)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.frames import badge, frame_facts
 from scenicq.report.picture import Shot, View, draw_shot, ground, plane_of, view_of
-from scenicq.report.runs import Run
+from scenicq.report.runs import FrameRun
 from scenicq.report.sensors import Sensor
 from scenicq.report.sheet import tile
 from scenicq.report.svg import element, escape
@@ -35,7 +35,7 @@ class Card:
     """
 
     number: int
-    run: Run
+    run: FrameRun
     shots: tuple[Shot, ...]
     sensors: tuple[Sequence[Sensor], ...]
     backdrop: Backdrop
@@ -83,7 +83,7 @@ def _inline(card: Card) -> str:
     )
 
 
-def best_frame(run: Run, shots: Sequence[Shot]) -> int:
+def best_frame(run: FrameRun, shots: Sequence[Shot]) -> int:
     """Index of the frame in which the farthest of the roles is nearest to the ego, of equal ones the middle one.
 
     Args:

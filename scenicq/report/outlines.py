@@ -17,7 +17,7 @@ from typing import assert_never, cast
 
 import shapely
 
-from scenicq.forest.bounds import Interval, scalar_bounds, vector_bounds
+from scenicq.forest.bounds import FloatInterval, scalar_bounds, vector_bounds
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.condition import condition
 from scenicq.forest.evaluate import Observation, evaluate
@@ -59,7 +59,7 @@ from scenicq.geometry.shapes import Bounds, Shape
 from scenicq.geometry.terms import rectangle_shape
 from scenicq.query.explain.violations import choices
 
-__all__ = ["Place", "allowed_headings", "allowed_place", "outline", "views"]
+__all__ = ["PossibleArea", "allowed_headings", "allowed_place", "outline", "views"]
 
 _MOST_RANGES = 6
 _THIN = 0.2
@@ -69,7 +69,7 @@ _STEP = math.tau / 128
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PossibleArea:
     """Where an object may be.
 
     Attributes:
@@ -187,7 +187,7 @@ def _reach(root: Node, bounds: Bounds) -> tuple[list[Shape], bool] | None:
     return ([shapes.box(*box)] if box[0] <= box[2] and box[1] <= box[3] else []), False
 
 
-def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds: Bounds) -> Place | None:
+def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds: Bounds) -> PossibleArea | None:
     """Where an object may be, as far as the values of the other objects' features are known.
 
     Args:
@@ -218,10 +218,10 @@ def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds:
             exact = exact and found[1]
     except CannotEvaluate:
         return None
-    return Place(_visible(pieces), exact, not features(given.value)) if options else None
+    return PossibleArea(_visible(pieces), exact, not features(given.value)) if options else None
 
 
-def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> tuple[Interval, ...] | None:
+def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> tuple[FloatInterval, ...] | None:
     """The headings that an object may have, in radians; arguments and None as of `allowed_place`.
 
     Outer bounds where a heading is not affine. An interval may pass pi.

@@ -19,7 +19,7 @@ from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import features, leaves
 from scenicq.match.decide.closed_form import ClosedForm
-from scenicq.match.decide.compiled_expressions import Column, Columns, Get, UnclearError
+from scenicq.match.decide.compiled_expressions import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint
 from scenicq.match.problem.map_lookups import MapLookups
@@ -28,7 +28,7 @@ from scenicq.match.search.plan_cache import PlanCache
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.presence import by_presence, observes
-from scenicq.temporal.samples import WITH_COLUMNS, Places
+from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["Cast", "StartSearch", "Starts", "classes_of_twins"]
@@ -154,7 +154,7 @@ class StartSearch:
                 chosen = np.flatnonzero(may[role] & ~out[place])
                 where = place[chosen]
                 members = {scenario.ego: block.ego(label_of[chosen]), role: cast.members[chosen]}
-            holds, first_broken = self._plain(Places(block, members, len(where)), requirements)
+            holds, first_broken = self._plain(BoundSamples(block, members, len(where)), requirements)
             kept = np.zeros(n, np.bool_)
             kept[where[holds > FALSE]] = True
             sure[where[holds == UNKNOWN]] = False
@@ -178,7 +178,7 @@ class StartSearch:
         left[decided] = False
         return Starts(starts, _narrowed(cast, left, place), sure[left], failed)
 
-    def _plain(self, places: Places, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
+    def _plain(self, places: BoundSamples, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
         """Whether all requirements hold at each place, and the number of the first that does not, -1 if none."""
         holds = np.full(len(places), TRUE)
         broken = np.full(len(places), -1)
@@ -266,7 +266,7 @@ class StartSearch:
         Interchangeable objects are given back in the order of their tracks.
         """
         holds, fails = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
-        places, ordered = Places(block, members, size), {index: mine.copy() for index, mine in members.items()}
+        places, ordered = BoundSamples(block, members, size), {index: mine.copy() for index, mine in members.items()}
         for signature, chosen in observes(places, self._relevant):
             plan = self.rest.plans.plan((*signature, frozenset()))
             forms = [group.closed_form for group in plan.groups if group.closed_form is not None]
@@ -277,7 +277,9 @@ class StartSearch:
                 holds[some], fails[some] = self._decided(places.at(some), forms)
         return holds, fails, ordered
 
-    def _decided(self, places: Places, forms: Iterable[ClosedForm]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def _decided(
+        self, places: BoundSamples, forms: Iterable[ClosedForm]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         size = len(places)
         holds, fails = np.ones(size, np.bool_), np.zeros(size, np.bool_)
         columns = Columns(size, lambda index, name: _column(places, index, name))
@@ -312,7 +314,7 @@ def _narrowed(cast: Cast, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> 
     return Cast(cast.labels[kept], cast.members[mine], {index: may[mine] for index, may in cast.may.items()})
 
 
-def _column(places: Places, index: int, name: str) -> Column | tuple[Column, Column]:
+def _column(places: BoundSamples, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
     """The values of a property as closed forms read them."""
     if name != "position" and name not in _SCALARS:
         raise UnclearError
@@ -322,7 +324,7 @@ def _column(places: Places, index: int, name: str) -> Column | tuple[Column, Col
     return (found[0], found[1]) if len(found) == 2 else found[0]
 
 
-def _getter(places: Places, number: int) -> Get:
+def _getter(places: BoundSamples, number: int) -> Get:
     """The observed values of one choice of label objects."""
 
     def get(index: int, name: str) -> Value:

@@ -35,7 +35,7 @@ from scenicq.forest.walk import conjuncts, leaves
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
-from scenicq.match.linear.affine_forms import Affine, AffineVector, Variable, affine_scalar, affine_vector
+from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.linear.linear_program import LinearSystem, NotSolved, Row
 from scenicq.match.problem.conditioned import Item
@@ -288,7 +288,7 @@ class _Problem:
             raise NotLinear from None
         return found
 
-    def extent(self, variable: Variable) -> tuple[float, float] | None:
+    def extent(self, variable: VariableAxis) -> tuple[float, float] | None:
         """The ends of a variable over all solutions, discs taken too large."""
         around = [*_polygons(self.discs, outer=True)]
         if math.prod(map(len, self.alternatives)) > _MOST_EXTENTS:

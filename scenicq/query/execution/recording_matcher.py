@@ -21,7 +21,7 @@ from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.hidden_runs import Remembered
-from scenicq.temporal.intervals import Interval, IntervalMatcher
+from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.starts import Cast, StartSearch
 from scenicq.temporal.truth import TRUE, UNKNOWN
 
@@ -184,7 +184,7 @@ class RecordingMatcher:
     # --- results
 
     def _results(
-        self, block: TrackBlock, intervals: Sequence[Interval], decided: Mapping[int, DecidedStart],
+        self, block: TrackBlock, intervals: Sequence[IntervalVerdict], decided: Mapping[int, DecidedStart],
         remember: Callable[[int], Remembered],
     ) -> Iterator[tuple[int, Result]]:  # fmt: skip
         """Intervals as results, with the recordings that they are of."""
@@ -195,7 +195,7 @@ class RecordingMatcher:
             yield each.recording, self._result(block, each, witnesses.get(each.origin, {}), each.reason or reason)
 
     def _witnesses(
-        self, intervals: Sequence[Interval], decided: Mapping[int, DecidedStart],
+        self, intervals: Sequence[IntervalVerdict], decided: Mapping[int, DecidedStart],
         remember: Callable[[int], Remembered],
     ) -> Mapping[int, Mapping[str, WitnessValue]]:  # fmt: skip
         """The witnesses of the initial scenes of intervals that match, by the numbers of their starts."""
@@ -210,7 +210,7 @@ class RecordingMatcher:
         return {number: each.witness for number, each in verdicts.items() if isinstance(each, Match)}
 
     def _result(
-        self, block: TrackBlock, interval: Interval, witness: Mapping[str, WitnessValue], reason: str
+        self, block: TrackBlock, interval: IntervalVerdict, witness: Mapping[str, WitnessValue], reason: str
     ) -> Result:
         """An interval as a result."""
         scenario = self.matcher.scenario
@@ -244,7 +244,7 @@ def _named(track: TrackKey) -> str:
     return "ego" if kind == "ego" else name.rpartition("\n")[2]
 
 
-def _cause(seconds: float, interval: Interval) -> Cause:
+def _cause(seconds: float, interval: IntervalVerdict) -> Cause:
     """Why an interval that ends after some seconds of its recording does not match."""
     if interval.cut_off:
         return Cause(CUT_OFF, f"at {seconds:.1f} s, before the program ends")

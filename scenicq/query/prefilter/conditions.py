@@ -35,11 +35,11 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.regions import RegionNames, near_region
-from scenicq.query.prefilter.sql_bounds import ARITHMETIC, Bounds
+from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
-__all__ = ["EGO", "Condition", "conditions", "object_columns"]
+__all__ = ["EGO", "NecessaryCondition", "conditions", "object_columns"]
 
 EGO = "ego"
 """Alias of the frame's row; the objects of a condition are called `a` and, if there are two, `b`."""
@@ -48,7 +48,7 @@ _NUMBERS = ("heading", "width", "length", "height")
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class NecessaryCondition:
     """A necessary condition.
 
     Attributes:
@@ -91,9 +91,9 @@ class _Reader:
     tolerance: Tolerance
     names: RegionNames
     road: RoadDirection
-    bounds: dict[tuple[int, ...], Bounds] = field(default_factory=dict["tuple[int, ...]", "Bounds"])
+    bounds: dict[tuple[int, ...], SqlBounds] = field(default_factory=dict["tuple[int, ...]", "SqlBounds"])
 
-    def of(self, objects: tuple[int, ...]) -> Bounds:
+    def of(self, objects: tuple[int, ...]) -> SqlBounds:
         """Bounds over the columns of some objects and the ego's."""
         if objects not in self.bounds:
             aliases = {self.scenario.ego: (EGO, "ego_")} | dict(zip(objects, (("a", ""), ("b", "")), strict=False))
@@ -102,7 +102,7 @@ class _Reader:
                 for index, (alias, prefix) in aliases.items()
                 for name, column in object_columns(alias, prefix).items()
             }
-            self.bounds[objects] = Bounds(columns)
+            self.bounds[objects] = SqlBounds(columns)
         return self.bounds[objects]
 
     def involved(self, *roots: Node, about: int | None = None) -> tuple[int, ...]:
@@ -131,7 +131,7 @@ class _Reader:
             yield objects, _sql(any_of(allowed)), ""
 
     def _position(
-        self, index: int, node: Node, objects: tuple[int, ...], bounds: Bounds
+        self, index: int, node: Node, objects: tuple[int, ...], bounds: SqlBounds
     ) -> Iterator[tuple[tuple[int, ...], str, str]]:
         reach = self.tolerance.of(index, "position").reach
         own = bounds.columns[index, "position"]
@@ -149,7 +149,7 @@ class _Reader:
         allowed = [all_of([between(place[0], a, reach), between(place[1], b, reach)]) for a, b in bounds.boxes(rest)]
         yield objects, _sql(any_of(allowed)), ""
 
-    def _frame(self, place: tuple[Expr, Expr], node: Node, bounds: Bounds) -> tuple[tuple[Expr, Expr], Node, bool]:
+    def _frame(self, place: tuple[Expr, Expr], node: Node, bounds: SqlBounds) -> tuple[tuple[Expr, Expr], Node, bool]:
         """A place seen in the frames that an expression goes through, and what is left of the expression."""
         moved = False
         while True:
@@ -188,7 +188,7 @@ class _Reader:
         return isinstance(node, Feature) and (node.object, node.property) == (self.scenario.ego, name)
 
     def _inside(
-        self, region: Node, place: tuple[str, str], bounds: Bounds, names: RegionNames | None, reach: float
+        self, region: Node, place: tuple[str, str], bounds: SqlBounds, names: RegionNames | None, reach: float
     ) -> Iterator[tuple[str, str]]:
         """Conditions on memberships, or SQL, that a place in a region meets to within metres."""
         match region:
@@ -206,7 +206,9 @@ class _Reader:
             case _:
                 return
 
-    def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: Bounds, reach: float) -> str | bool:
+    def _in_view(
+        self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: SqlBounds, reach: float
+    ) -> str | bool:
         center = bounds.exact_vector(region.center)
         if center is None:
             return True
@@ -223,7 +225,7 @@ class _Reader:
         aside = f"abs(a.ego_right) * {number(math.cos(half))} - a.ego_ahead * {number(math.sin(half))}"
         return all_of([near, less(f"({aside})", reach)])
 
-    def _heading(self, index: int, node: Node, bounds: Bounds) -> str:
+    def _heading(self, index: int, node: Node, bounds: SqlBounds) -> str:
         own = bounds.columns[index, "heading"]
         assert isinstance(own, str)
         alias = own.removesuffix("heading")
@@ -314,7 +316,7 @@ def _summands(node: Node) -> list[Node]:
     return found
 
 
-def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> Iterator[Condition]:
+def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> Iterator[NecessaryCondition]:
     """The necessary conditions of a scenario whose ego is the label's own, in the order of the program.
 
     Args:
@@ -333,11 +335,11 @@ def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> I
             what, span = f"{thing.name}.{name}", thing.properties[name].span
             for objects, sql, region in reader.comparison(thing.index, name, named[name]):
                 if sql or region:
-                    yield Condition(what, objects, sql, span, region)
+                    yield NecessaryCondition(what, objects, sql, span, region)
     for requirement in scenario.requirements:
         if requirement.built_in is not None or requirement.span is None:
             continue
         what = " ".join(requirement.span.text.split())
         for objects, sql, region in reader.requirement(requirement.condition):
             if sql or region:
-                yield Condition(what, objects, sql, requirement.span, region)
+                yield NecessaryCondition(what, objects, sql, requirement.span, region)

@@ -19,7 +19,7 @@ from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.conditions import EGO, Condition, conditions
+from scenicq.query.prefilter.conditions import EGO, NecessaryCondition, conditions
 from scenicq.query.prefilter.params import param_conditions
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.classes import ROOT, class_matches, subclasses
@@ -94,8 +94,8 @@ class _Role:
 
     thing: ScenarioObject
     classes: str
-    plain: list[Condition]
-    placed: list[Condition]
+    plain: list[NecessaryCondition]
+    placed: list[NecessaryCondition]
     column: str
 
     @property
@@ -206,8 +206,8 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Pl
     )
 
 
-def _pairs(found: Sequence[Condition]) -> dict[tuple[int, ...], list[Condition]]:
-    pairs: dict[tuple[int, ...], list[Condition]] = {}
+def _pairs(found: Sequence[NecessaryCondition]) -> dict[tuple[int, ...], list[NecessaryCondition]]:
+    pairs: dict[tuple[int, ...], list[NecessaryCondition]] = {}
     for each in found:
         if len(each.objects) == 2:
             pairs.setdefault(each.objects, []).append(each)
@@ -216,10 +216,10 @@ def _pairs(found: Sequence[Condition]) -> dict[tuple[int, ...], list[Condition]]
 
 def _frames(
     draft: _Draft,
-    own: Sequence[Condition],
-    params: Sequence[Condition],
+    own: Sequence[NecessaryCondition],
+    params: Sequence[NecessaryCondition],
     roles: Sequence[_Role],
-    pairs: dict[tuple[int, ...], list[Condition]],
+    pairs: dict[tuple[int, ...], list[NecessaryCondition]],
 ) -> None:
     """What the columns of the frame decide."""
     used = [each.sql for role in roles for each in role.plain] + [each.sql for tied in pairs.values() for each in tied]
@@ -240,7 +240,7 @@ def _reached(role: _Role, classes: Sequence[str]) -> str:
 
 
 def _objects(
-    draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[Condition]], options: MatchOptions
+    draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[NecessaryCondition]], options: MatchOptions
 ) -> None:
     """One pass over the objects: how far each comes in each role."""
     own_ego = options.ego == "label"
@@ -278,7 +278,7 @@ def _objects(
     )
 
 
-def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) -> str:
+def _regions(draft: _Draft, own: Sequence[NecessaryCondition], roles: Sequence[_Role]) -> str:
     """What memberships of regions decide; returns the table of objects and how far they come."""
     mine = {each.region: f"e{place}" for place, each in enumerate(own)}
     distinct = {role.column: role for role in roles if role.placed}
@@ -333,7 +333,7 @@ def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) ->
 
 
 def _distinct(
-    draft: _Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[Condition]]
+    draft: _Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[NecessaryCondition]]
 ) -> None:
     """Who is left for each role, and whether there are enough of them for any two and for all."""
     tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
@@ -361,7 +361,7 @@ def _distinct(
     draft.stage([table], blamed, tally)
 
 
-def _pair(draft: _Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[Condition]) -> None:
+def _pair(draft: _Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[NecessaryCondition]) -> None:
     """Two roles whose objects conditions tie together: whoever has no partner is out of the role."""
     one, other = (next(place for place, role in enumerate(roles) if role.thing.index == index) for index in objects)
     ego = f" JOIN stage0 {EGO} ON {EGO}.f = a.f" if _columns(EGO, [each.sql for each in tied]) else ""
