@@ -105,7 +105,7 @@ class FrameResult:
 
     def __repr__(self) -> str:
         """Frame, verdict and roles."""
-        roles = " ".join(f"{role}={thing}" for role, thing in self.roles.items() if (role, thing) != ("ego", "ego"))
+        roles = " ".join(f"{role}={played}" for role, played in self.roles.items() if (role, played) != ("ego", "ego"))
         return f"<{self.verdict} {self.frame}{': ' if roles else ''}{roles}>"
 
 
@@ -284,5 +284,5 @@ class Matches(Sequence[FrameResult]):
 
 
 def _cells(each: FrameResult) -> str:
-    objects = ", ".join(f"{role}={thing}" for role, thing in each.roles.items() if (role, thing) != ("ego", "ego"))
+    objects = ", ".join(f"{role}={played}" for role, played in each.roles.items() if (role, played) != ("ego", "ego"))
     return "".join(f"<td>{escape(text)}</td>" for text in (each.frame, each.recording, each.verdict, objects))

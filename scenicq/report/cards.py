@@ -49,7 +49,7 @@ class Card:
 
 
 def _told(shot: Shot) -> str:
-    played = ", ".join(f"{role.name} is {role.thing.id}" for role in shot.roles)
+    played = ", ".join(f"{role.name} is {role.member.id}" for role in shot.roles)
     return f"Bird's-eye view of frame {shot.label.frame}: {played or 'no roles'}"
 
 
@@ -91,7 +91,7 @@ def best_frame(run: FrameRun, shots: Sequence[Shot]) -> int:
         shots: Its frames.
     """
     middle = (len(shots) - 1) / 2
-    far = [max((math.hypot(r.thing.x - s.label.ego.x, r.thing.y - s.label.ego.y) for r in s.roles), default=0.0)
+    far = [max((math.hypot(r.member.x - s.label.ego.x, r.member.y - s.label.ego.y) for r in s.roles), default=0.0)
            for s in shots]  # fmt: skip
     return min(range(len(run.results)), key=lambda place: (round(far[place], 1), abs(place - middle)))
 

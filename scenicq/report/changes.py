@@ -51,7 +51,7 @@ def _played(record: Record | None) -> dict[str, str] | None:
         return None
     given = record.get("correspondence")
     roles = cast("dict[object, object]", given) if isinstance(given, dict) else {}
-    return {str(role): str(thing) for role, thing in roles.items()}
+    return {str(role): str(played) for role, played in roles.items()}
 
 
 def _why(record: Record | None) -> str:
@@ -114,7 +114,7 @@ def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) ->
 
 
 def _cast(roles: Mapping[str, str]) -> str:
-    return " ".join(f"{role}={thing}" for role, thing in roles.items() if (role, thing) != ("ego", "ego"))
+    return " ".join(f"{role}={played}" for role, played in roles.items() if (role, played) != ("ego", "ego"))
 
 
 def _objects(change: FrameChange) -> str:

@@ -199,9 +199,9 @@ def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds:
     Returns:
         None where anything is allowed, or nothing can be said.
     """
-    thing = scenario.objects[index]
-    given = thing.properties.get("position")
-    if given is None or thing.mutated:
+    owner = scenario.objects[index]
+    given = owner.properties.get("position")
+    if given is None or owner.mutated:
         return None
     pieces: list[Shape] = []
     exact = True
@@ -226,9 +226,9 @@ def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> t
 
     Outer bounds where a heading is not affine. An interval may pass pi.
     """
-    thing = scenario.objects[index]
-    given = thing.properties.get("heading")
-    if given is None or thing.mutated:
+    owner = scenario.objects[index]
+    given = owner.properties.get("heading")
+    if given is None or owner.mutated:
         return None
     try:
         root = condition(given.value, observed)
@@ -245,7 +245,7 @@ def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> t
 def views(scenario: Scenario, observed: Observation) -> tuple[Disc | Sector, ...]:
     """The view regions that the scenario's positions and requirements speak of, as far as they are known."""
     roots = [requirement.condition for requirement in scenario.requirements]
-    roots += [thing.properties["position"].value for thing in scenario.objects if "position" in thing.properties]
+    roots += [owner.properties["position"].value for owner in scenario.objects if "position" in owner.properties]
     found: dict[tuple[float, ...], Disc | Sector] = {}
     for node in postorder(roots):
         if isinstance(node, SectorAt | DiscAt):

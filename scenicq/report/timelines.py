@@ -58,7 +58,7 @@ def _timeline(query: Query, result: Result) -> str:
         return ""
     with TrackReader(query.dataset, part) as reader:
         tracks = reader.read(first, end)
-    names = {thing.name: thing.index for thing in scenario.objects}
+    names = {owner.name: owner.index for owner in scenario.objects}
     binding = tuple((names[name], _key(tracks, track)) for name, track in verdict.correspondence.items())
     start, last = tracks.frames.index(result.frame), tracks.frames.index(result.interval.last)
     return _drawn(bands_of(scenario, tracks, IntervalVerdict(start, last, int(TRUE), binding)))

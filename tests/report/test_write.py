@@ -171,7 +171,7 @@ def test_the_best_frame_has_its_roles_nearest(query):
 
     def farthest(shot):
         ego = shot.label.ego
-        return max(math.dist((role.thing.x, role.thing.y), (ego.x, ego.y)) for role in shot.roles)
+        return max(math.dist((role.member.x, role.member.y), (ego.x, ego.y)) for role in shot.roles)
 
     best = best_frame(run, shots)
     assert farthest(shots[best]) < min(map(farthest, shots)) + 0.1

@@ -209,21 +209,21 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChang
         if given.explicit and name not in options.ignore_params:
             yield ProgramChange(f"--ignore-params {name}", f"param {name}", given.span, ignored=name)
     numbers: dict[str, None] = {}
-    for thing in scenario.objects:
-        for name, given in thing.properties.items():
-            what = f"{thing.name}.{name}"
-            if name in _ANYWHERE and name not in thing.mutated:
-                rules = (*options.tolerance.rules, (thing.name, name, _ANYWHERE[name]))
+    for owner in scenario.objects:
+        for name, given in owner.properties.items():
+            what = f"{owner.name}.{name}"
+            if name in _ANYWHERE and name not in owner.mutated:
+                rules = (*options.tolerance.rules, (owner.name, name, _ANYWHERE[name]))
                 wide = replace(options.tolerance, rules=rules)
                 yield ProgramChange(f"`{what}` not compared", what, given.span, tolerance=wide)
             elif given.explicit and name not in _ANYWHERE:
-                yield ProgramChange(f"`{what}` not compared", what, given.span, unset=(thing.index, name))
+                yield ProgramChange(f"`{what}` not compared", what, given.span, unset=(owner.index, name))
                 if kind_of(given.value) == "scalar":
                     numbers[name] = None
-        wider = ancestors(thing.category)[1:2] if is_class(thing.category) else ()
+        wider = ancestors(owner.category)[1:2] if is_class(owner.category) else ()
         for category in wider:
-            told = f"`{thing.name}` as `{category}`"
-            yield ProgramChange(told, f"{thing.name}.class", thing.span, category=(thing.index, category))
+            told = f"`{owner.name}` as `{category}`"
+            yield ProgramChange(told, f"{owner.name}.class", owner.span, category=(owner.index, category))
     for name in numbers:
         if options.tolerance.of(0, name).size < _WIDER_NUMBER:
             wide = replace(options.tolerance, rules=(*options.tolerance.rules, ("", name, _WIDER_NUMBER)))

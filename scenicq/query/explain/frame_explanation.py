@@ -211,7 +211,7 @@ def show_explanation(explanation: Explanation) -> str:
     if isinstance(verdict, Unknown):
         lines[0] += f": {verdict.reason}"
     kind = "correspondence" if isinstance(verdict, Match) else "closest correspondence"
-    lines += [f"{kind}: {', '.join(f'{name} = {thing}' for name, thing in explanation.correspondence.items())}"]
+    lines += [f"{kind}: {', '.join(f'{name} = {played}' for name, played in explanation.correspondence.items())}"]
     if explanation.proofs:
         lines += ["", "it matches with these values:", *_show_proofs(explanation.proofs)]
     if explanation.margins:

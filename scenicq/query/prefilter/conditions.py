@@ -324,16 +324,16 @@ def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> I
         network: The map it was compiled for.
         options: Tolerances.
     """
-    if any(thing.mutated for thing in scenario.objects):
+    if any(owner.mutated for owner in scenario.objects):
         return  # noise of any size hides where things are
     reader = _Reader(scenario, options.tolerance.for_scenario(scenario), RegionNames.of(network), network.roadDirection)
-    for thing in scenario.objects:
-        named: Mapping[str, Node] = {name: given.value for name, given in thing.properties.items()}
+    for owner in scenario.objects:
+        named: Mapping[str, Node] = {name: given.value for name, given in owner.properties.items()}
         compared = [name for name in ("position", "heading") if name in named]
-        compared += [name for name in named if thing.properties[name].explicit and name not in compared]
+        compared += [name for name in named if owner.properties[name].explicit and name not in compared]
         for name in compared:
-            what, span = f"{thing.name}.{name}", thing.properties[name].span
-            for objects, sql, region in reader.comparison(thing.index, name, named[name]):
+            what, span = f"{owner.name}.{name}", owner.properties[name].span
+            for objects, sql, region in reader.comparison(owner.index, name, named[name]):
                 if sql or region:
                     yield NecessaryCondition(what, objects, sql, span, region)
     for requirement in scenario.requirements:
