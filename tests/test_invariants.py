@@ -16,14 +16,8 @@ README = (LIBRARY / "README.md").read_text()
 PASSES = ("forest/", "match/", "query/prefilter/")
 """Where expressions are gone through. Syntax and compiler recurse over the program's text, which the parser limits."""
 RECURSIVE = {
-    "forest/angle_wrap.py": "a stated number of angles inside each other",
-    "forest/containment_pruning.py": "unions of regions, which the compiler flattens",
-    "match/decide/cascade.py": "the discrete variables of a group, at most a stated number of them",
-    "match/decide/decomposition.py": "each part has fewer variables, each case one choice less",
-    "match/fields/field_solver.py": "once: without a shared number",
-    "match/linear/linear_relaxation.py": "the alternatives of a linear program",
-    "query/prefilter/conditions.py": "intersections of regions",
-    "query/prefilter/regions.py": "unions of regions",
+    "match/decide/cascade.py": "the discrete variables and truth values of a group, at most a stated number of them",
+    "match/decide/decomposition.py": "each part has fewer constraints, or fewer distances of hidden points",
 }
 """Files with functions that call themselves, and what bounds the depth."""
 DATASETS = re.compile(r"nuscenes|argoverse|waymo|lyft|kitti|interaction dataset|boston", re.IGNORECASE)

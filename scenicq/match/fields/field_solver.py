@@ -74,7 +74,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     choices = [id(node) for network in networks for node in network.choices]
     if isinstance(found, Undecided) and len(set(choices)) < len(choices):
         # fields that several parts ask for at one point have one direction there
-        return decide_directions([[item for part in parts for item in part]], None, tolerance)
+        return _whole([item for part in parts for item in part], tolerance)
     return found
 
 

@@ -364,12 +364,14 @@ def _search(
     system: LinearSystem, alternatives: list[Alternative], rows: list[Row]
 ) -> Mapping[tuple[Identity, int], float] | None:
     """A solution under one choice of each alternative, depth first with early failure."""
-    if not alternatives:
-        return system.solve(rows)
-    if len(alternatives) > 1 and system.solve(rows) is None:
-        return None
-    for choice in alternatives[0]:
-        found = _search(system, alternatives[1:], [*rows, *choice])
-        if found is not None:
+    opened = [(0, rows)]
+    while opened:
+        chosen, rows = opened.pop()
+        left = len(alternatives) - chosen
+        # with one alternative left, each of its choices fails as soon as this would
+        found = None if left == 1 else system.solve(rows)
+        if left == 0 and found is not None:
             return found
+        if left == 1 or (left and found is not None):
+            opened += [(chosen + 1, [*rows, *choice]) for choice in reversed(alternatives[chosen])]
     return None

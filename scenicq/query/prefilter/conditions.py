@@ -191,20 +191,21 @@ class _Reader:
         self, region: Node, place: tuple[str, str], bounds: SqlBounds, names: RegionNames | None, reach: float
     ) -> Iterator[tuple[str, str]]:
         """Conditions on memberships, or SQL, that a place in a region meets to within metres."""
-        match region:
-            case Constant() if isinstance(region.value, Region):
-                parts = region.value.parts if isinstance(region.value, IntersectionOf) else (region.value,)
-                for part in parts:
-                    near = None if names is None else near_region(part, names, reach)
-                    if near is not None:
-                        yield near, ""
-            case RegionIntersection():
-                for part in region.parts:
-                    yield from self._inside(part, place, bounds, names, reach)
-            case DiscAt() | SectorAt():
-                yield "", _sql(self._in_view(region, place, bounds, reach))
-            case _:
-                return
+        todo = [region]
+        while todo:
+            match todo.pop():
+                case Constant(value=known) if isinstance(known, Region):
+                    parts = known.parts if isinstance(known, IntersectionOf) else (known,)
+                    for part in parts:
+                        near = None if names is None else near_region(part, names, reach)
+                        if near is not None:
+                            yield near, ""
+                case RegionIntersection(parts=parts):
+                    todo += reversed(parts)
+                case DiscAt() | SectorAt() as seen:
+                    yield "", _sql(self._in_view(seen, place, bounds, reach))
+                case _:
+                    pass
 
     def _in_view(
         self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: SqlBounds, reach: float
