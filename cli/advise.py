@@ -12,7 +12,7 @@ from scenicq.query.execution.run import Query
 from .report import columns, count, plain
 
 if TYPE_CHECKING:  # takes long to load
-    from scenicq.query.explain.advice import Change, Outlook
+    from scenicq.query.explain.advice import Outlook, ProgramChange
 
 __all__ = ["advise", "is_nearly_empty"]
 
@@ -65,7 +65,7 @@ def advise(query: Query, *, asked: bool) -> None:
     click.echo("\n".join(lines), err=True)
 
 
-def _place(change: Change) -> str:
+def _place(change: ProgramChange) -> str:
     """The lines that a change concerns, and what to write there."""
     told: list[str] = []
     for each in change.both or (change,):

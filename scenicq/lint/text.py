@@ -55,12 +55,12 @@ def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[
 # --- angles
 
 
-def _number(node: ast.Node) -> float | None:
+def _number(node: ast.SyntaxNode) -> float | None:
     """The value of a number that the text says outright."""
     match node:
-        case ast.Constant(value=bool()):
+        case ast.LiteralValue(value=bool()):
             return None
-        case ast.Constant(value=int() | float() as value):
+        case ast.LiteralValue(value=int() | float() as value):
             return float(value)
         case ast.UnaryOp(operator="-" | "+" as sign):
             inner = _number(node.operand)
@@ -72,7 +72,7 @@ def _number(node: ast.Node) -> float | None:
             return None
 
 
-def _terms(node: ast.Node) -> Iterator[ast.Node]:
+def _terms(node: ast.SyntaxNode) -> Iterator[ast.SyntaxNode]:
     """The numbers that an expression of an angle is made of, down to those with `deg`."""
     stack = [node]
     while stack:
@@ -91,7 +91,7 @@ def _terms(node: ast.Node) -> Iterator[ast.Node]:
                 pass
 
 
-def _is_angle(node: ast.Node) -> bool:
+def _is_angle(node: ast.SyntaxNode) -> bool:
     match node:
         case ast.Attribute(name=name):
             return name in _ANGLE_PROPERTIES
@@ -105,9 +105,9 @@ def _is_angle(node: ast.Node) -> bool:
             return isinstance(node, _ANGLES)
 
 
-def _angles(node: ast.Node) -> Iterator[Diagnostic]:
+def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Numbers of more than a full turn where an angle stands."""
-    places: list[ast.Node] = []
+    places: list[ast.SyntaxNode] = []
     match node:
         case ast.FacingSpecifier() | ast.ApparentlyFacingSpecifier():
             places = [node.heading]
@@ -115,7 +115,7 @@ def _angles(node: ast.Node) -> Iterator[Diagnostic]:
             places = [node.value]
         case ast.PropertyDefault(name=name) if name in _ANGLE_PROPERTIES:
             places = [node.value]
-        case ast.Compare():
+        case ast.ComparisonChain():
             sides = [node.left, *(each.right for each in node.comparisons if each.operator in _ORDERS)]
             if any(map(_is_angle, sides)):
                 places = [side for side in sides if not _is_angle(side)]
@@ -135,19 +135,19 @@ def _angles(node: ast.Node) -> Iterator[Diagnostic]:
 # --- numbers that labels measure
 
 
-def _is_measured(node: ast.Node) -> bool:
+def _is_measured(node: ast.SyntaxNode) -> bool:
     match node:
         case ast.Attribute(name=name):
             return name in _ANGLE_PROPERTIES | _MEASURED
         case ast.Call(function=ast.Name(id="abs")) if node.arguments:
             return _is_measured(node.arguments[0].value)
         case _:
-            return isinstance(node, (*_ANGLES, ast.Distance))
+            return isinstance(node, (*_ANGLES, ast.DistanceOperator))
 
 
-def _exact(node: ast.Node) -> Iterator[Diagnostic]:
+def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Measured numbers that are asked to be a number exactly."""
-    if not isinstance(node, ast.Compare):
+    if not isinstance(node, ast.ComparisonChain):
         return
     sides = [node.left, *(each.right for each in node.comparisons)]
     for (left, right), link in zip(itertools.pairwise(sides), node.comparisons, strict=True):
@@ -167,7 +167,7 @@ def _exact(node: ast.Node) -> Iterator[Diagnostic]:
 # --- ranges
 
 
-def _range(node: ast.Node) -> Iterator[Diagnostic]:
+def _range(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     match node:
         case ast.Call(function=ast.Name(id=name)) if name in _RANGES and len(node.arguments) >= 2:
             low, high = (_number(argument.value) for argument in node.arguments[-2:])
@@ -184,7 +184,7 @@ def _range(node: ast.Node) -> Iterator[Diagnostic]:
 # --- names
 
 
-def _unused(nodes: list[ast.Node]) -> Iterator[Diagnostic]:
+def _unused(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     """Variables that are set and never read; an object is there whether it is named again or not."""
     assigned = [(target, node) for node in nodes if isinstance(node, ast.Assign) for target in node.targets]
     written = {id(target) for target, _ in assigned}
@@ -216,7 +216,7 @@ def _library_properties() -> frozenset[str]:
     return frozenset(names | roots) | _OF_SCENIC
 
 
-def _unknown_properties(nodes: Iterable[ast.Node]) -> Iterator[Diagnostic]:
+def _unknown_properties(nodes: Iterable[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     """Properties that no class has and that the program does not read itself."""
     nodes = list(nodes)
     known = set(_library_properties())

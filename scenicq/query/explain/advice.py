@@ -35,7 +35,7 @@ from scenicq.query.explain.prefilter_counts import spots
 from scenicq.query.prefilter.executor import candidates, hold, run_plan
 from scenicq.store.classes import ancestors, is_class
 
-__all__ = ["Advice", "Change", "Outlook", "advice"]
+__all__ = ["Advice", "Outlook", "ProgramChange", "advice"]
 
 _MOST_FRAMES = 5_000
 """Frames of a dataset beyond which a sample is looked at."""
@@ -68,7 +68,7 @@ _PATIENCE = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ProgramChange:
     """A change of the program or the options.
 
     Attributes:
@@ -95,7 +95,7 @@ class Change:
     tolerance: Tolerance | None = None
     ignored: str = ""
     written: str = ""
-    both: tuple[Change, ...] = ()
+    both: tuple[ProgramChange, ...] = ()
     widened: int = 0
 
 
@@ -110,7 +110,7 @@ class Outlook:
         sampled: Whether the numbers were projected from a sample.
     """
 
-    change: Change
+    change: ProgramChange
     least: int
     most: int
     sampled: bool
@@ -216,22 +216,22 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
 
 def _lines_meant(scenario: Scenario, excluded: Sequence[tuple[str, int]]) -> Iterator[str]:
     """Hints for objects at a side of another, which leaves them a line, where their position excludes most."""
-    for thing in scenario.objects:
-        given = thing.properties.get("position")
+    for owner in scenario.objects:
+        given = owner.properties.get("position")
         if given is None or not given.explicit or given.span is None or not excluded:
             continue
         placed = _AT_A_SIDE.match(" ".join(given.span.text.split()))
-        if placed and excluded[0][0] == f"{thing.name}.position":
+        if placed and excluded[0][0] == f"{owner.name}.position":
             side, other = placed.groups()
             yield (f"`{side} {other} by` a number leaves a line; "
                    f"`at {other} offset by {_AREAS[side]}` is an area")  # fmt: skip
 
 
-def _pairs(changes: Sequence[Change], most: int) -> Iterator[Change]:
+def _pairs(changes: Sequence[ProgramChange], most: int) -> Iterator[ProgramChange]:
     """Two changes at once, of the first that drop something."""
     dropping = [each for each in changes if not each.widened]
     for one, other in itertools.combinations(dropping[:most], 2):
-        yield Change(f"{one.told}, and {other.told}", one.about, both=(one, other))
+        yield ProgramChange(f"{one.told}, and {other.told}", one.about, both=(one, other))
 
 
 def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int, maps: int) -> _Sample:
@@ -249,7 +249,7 @@ def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, r
     return _Sample(chosen, held, frames, total)
 
 
-def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
+def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChange]:
     """The changes that a program and its options can make, those of its features and requirements in its order."""
     for number, requirement in enumerate(scenario.requirements):
         if requirement.built_in is None or requirement.built_in in options.enforce:
@@ -257,31 +257,31 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
             if requirement.built_in is not None:
                 names = " and ".join(scenario.objects[index].name for index in requirement.objects)
                 text = f"{requirement.built_in.value} of {names}"
-            yield Change(f"without `{text}`", text, requirement.span, requirement=number)
+            yield ProgramChange(f"without `{text}`", text, requirement.span, requirement=number)
     for name, given in scenario.params.items():
         if given.explicit and name not in options.ignore_params:
-            yield Change(f"--ignore-params {name}", f"param {name}", given.span, ignored=name)
+            yield ProgramChange(f"--ignore-params {name}", f"param {name}", given.span, ignored=name)
     numbers: dict[str, None] = {}
-    for thing in scenario.objects:
-        for name, given in thing.properties.items():
-            what = f"{thing.name}.{name}"
-            if name in _ANYWHERE and name not in thing.mutated:
-                rules = (*options.tolerance.rules, (thing.name, name, _ANYWHERE[name]))
+    for owner in scenario.objects:
+        for name, given in owner.properties.items():
+            what = f"{owner.name}.{name}"
+            if name in _ANYWHERE and name not in owner.mutated:
+                rules = (*options.tolerance.rules, (owner.name, name, _ANYWHERE[name]))
                 wide = replace(options.tolerance, rules=rules)
-                span, written = (given.span, "") if given.explicit else (thing.span, _WRITTEN[name])
-                yield Change(f"`{what}` not compared", what, span, tolerance=wide, written=written)
+                span, written = (given.span, "") if given.explicit else (owner.span, _WRITTEN[name])
+                yield ProgramChange(f"`{what}` not compared", what, span, tolerance=wide, written=written)
             elif given.explicit and name not in _ANYWHERE:
-                yield Change(f"`{what}` not compared", what, given.span, unset=(thing.index, name))
+                yield ProgramChange(f"`{what}` not compared", what, given.span, unset=(owner.index, name))
                 if kind_of(given.value) == "scalar":
                     numbers[name] = None
-        wider = ancestors(thing.category)[1:2] if is_class(thing.category) else ()
+        wider = ancestors(owner.category)[1:2] if is_class(owner.category) else ()
         for category in wider:
-            told = f"`{thing.name}` as `{category}`"
-            yield Change(told, f"{thing.name}.class", thing.span, category=(thing.index, category))
+            told = f"`{owner.name}` as `{category}`"
+            yield ProgramChange(told, f"{owner.name}.class", owner.span, category=(owner.index, category))
     for name in numbers:
         if options.tolerance.of(0, name).size < _WIDER_NUMBER:
             wide = replace(options.tolerance, rules=(*options.tolerance.rules, ("", name, _WIDER_NUMBER)))
-            yield Change(f"--tolerance {show_tolerance(wide)}", name, tolerance=wide, widened=1)
+            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", name, tolerance=wide, widened=1)
     for number, (name, size) in enumerate(_WIDER, 1):
         disc = name != "position" or options.tolerance.x is None
         if disc and getattr(options.tolerance, name) < size:
@@ -290,10 +290,10 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
                 if name == "position"
                 else replace(options.tolerance, heading=size)
             )
-            yield Change(f"--tolerance {show_tolerance(wide)}", name, tolerance=wide, widened=number)
+            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", name, tolerance=wide, widened=number)
 
 
-def _changed(scenario: Scenario, changes: Sequence[Change]) -> Scenario:
+def _changed(scenario: Scenario, changes: Sequence[ProgramChange]) -> Scenario:
     objects = list(scenario.objects)
     dropped = {change.requirement for change in changes}
     requirements = [each for number, each in enumerate(scenario.requirements) if number not in dropped]
@@ -309,7 +309,7 @@ def _changed(scenario: Scenario, changes: Sequence[Change]) -> Scenario:
     return replace(scenario, requirements=tuple(requirements), objects=tuple(objects))
 
 
-def _changed_options(options: MatchOptions, changes: Sequence[Change]) -> MatchOptions:
+def _changed_options(options: MatchOptions, changes: Sequence[ProgramChange]) -> MatchOptions:
     before = len(options.tolerance.rules)
     for change in changes:
         if change.tolerance is not None:
@@ -321,7 +321,7 @@ def _changed_options(options: MatchOptions, changes: Sequence[Change]) -> MatchO
 
 
 def _outlook(
-    options: MatchOptions, sample: _Sample, change: Change, clock: _Clock, solver: LazySolver, most: int
+    options: MatchOptions, sample: _Sample, change: ProgramChange, clock: _Clock, solver: LazySolver, most: int
 ) -> Outlook:
     """Count the frames that a change leaves, and decide at most so many of them while there is time."""
     changes = change.both or (change,)
