@@ -319,11 +319,12 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
     objects = label.objects
     numbers = {number for index, numbers in among.items() if index != ego for number in numbers}
     wanted = _union(relevant)
-    seen = {number: observed_names(objects[number - 1]) & wanted for number in numbers}
+    seen = {number: observed_names(objects[number - 1]) for number in numbers}
+    known = {names & wanted for names in {*seen.values()}}
     params: frozenset[str] = frozenset(observe_params(label)) if label.params else frozenset()
     own = observed_names(label.ego) & wanted
-    if len(set(seen.values())) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
-        return _signature(relevant, ego, own, next(iter(seen.values())), params)
+    if len(known) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
+        return _signature(relevant, ego, own, next(iter(known)), params)
     kinds: list[frozenset[str]] = []
     for index, names in enumerate(relevant):
         if index == ego:
