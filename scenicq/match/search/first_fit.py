@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.match.decide.compiled_expressions import Column, Columns, Get, UnclearError
+from scenicq.match.decide.compiled_expressions import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
@@ -38,9 +38,9 @@ _MORE_DECISIONS = 16
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 T = TypeVar("T")
-Values: TypeAlias = "Value | Column | list[Value]"
+Values: TypeAlias = "Value | FloatColumn | list[Value]"
 """Of many labels: one each, or the one that all have."""
-Truth: TypeAlias = "bool | list[bool]"
+RowTruth: TypeAlias = "bool | list[bool]"
 """Of many labels likewise."""
 
 
@@ -166,7 +166,7 @@ class _Batch:
     decisions: int = 0
     columns: Columns | None = None
 
-    def decide(self, group: GroupPlan, options: MatchOptions, lookups: MapLookups) -> tuple[Truth, Truth]:
+    def decide(self, group: GroupPlan, options: MatchOptions, lookups: MapLookups) -> tuple[RowTruth, RowTruth]:
         """For which labels a group surely holds, and for which it surely fails; keeps the witness."""
         form, size = group.closed_form, len(self.rows)
         assert form is not None
@@ -181,7 +181,7 @@ class _Batch:
         holds, fails, self.values[group] = form.evaluate_many(self._get, self.columns, options, lookups)
         return _alike(_listed(holds, size)), _alike(_listed(fails, size))
 
-    def where(self, kept: Truth) -> _Batch:
+    def where(self, kept: RowTruth) -> _Batch:
         """The labels of which something is true: at least one."""
         if isinstance(kept, bool):
             return self
@@ -248,7 +248,7 @@ class _Batch:
 
         return get
 
-    def _column(self, index: int, name: str) -> Column | tuple[Column, Column]:
+    def _column(self, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
         """The values of a property of the label objects that play an object."""
         rank = self.fit.ranks[index]
         playing = zip(self.rows, self.numbers, strict=True)
@@ -283,7 +283,7 @@ def _with_first_free(taken: tuple[int, ...], options: Sequence[int]) -> tuple[in
     return ()
 
 
-def _kept(values: Values, mask: NDArray[np.bool_], kept: Sequence[bool]) -> Column | list[Value]:
+def _kept(values: Values, mask: NDArray[np.bool_], kept: Sequence[bool]) -> FloatColumn | list[Value]:
     """The values of some of the labels."""
     return (
         values[mask] if isinstance(values, np.ndarray) else list(itertools.compress(_listed(values, len(kept)), kept))
@@ -295,7 +295,7 @@ def _alike(values: list[T]) -> T | list[T]:
     return values[0] if values.count(values[0]) == len(values) else values
 
 
-def _listed(values: Column | Sequence[T] | T, size: int) -> list[T]:
+def _listed(values: FloatColumn | Sequence[T] | T, size: int) -> list[T]:
     if isinstance(values, np.ndarray):
         return cast("list[T]", values.tolist())
     return cast("list[T]", values) if isinstance(values, list) else [cast(T, values)] * size
