@@ -77,9 +77,7 @@ def _seen_from(vector: Node, ego: int) -> int | None:
 def _as_coordinate(length: Node, wave: Node) -> Node | None:
     """A length times the sine or cosine of an angle that has the same vector's bearing in it, if they are just that."""
     if not (
-        isinstance(length, Norm)
-        and isinstance(wave, Arithmetic)
-        and wave.op in (ArithmeticOp.SIN, ArithmeticOp.COS)
+        isinstance(length, Norm) and isinstance(wave, Arithmetic) and wave.op in (ArithmeticOp.SIN, ArithmeticOp.COS)
     ):
         return None
     angle = wave.args[0]

@@ -97,4 +97,3 @@ def test_what_is_something_else_keeps_its_value(name):
         known |= {(2, "position"): (3.0, 4.0), (2, DISTANCE): math.dist((3.0, 4.0), known[0, "position"])}
         before, after = (evaluate(root, {}, known) for root in (UNLIKE[name], found))
         assert after == pytest.approx(before, abs=1e-9)
-
