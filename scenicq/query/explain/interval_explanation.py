@@ -25,7 +25,7 @@ from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
-from scenicq.temporal.intervals import Interval, IntervalMatcher
+from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import FALSE, TRUE, Truth
@@ -72,7 +72,7 @@ class IntervalExplanation:
     """
 
     tracks: RecordingTracks
-    interval: Interval | None
+    interval: IntervalVerdict | None
     roles: tuple[tuple[str, str], ...] = ()
     bands: tuple[Band, ...] = ()
     changes: tuple[str, ...] = ()
@@ -108,7 +108,7 @@ class IntervalExplanation:
         lines += ["", *self._broken(interval)]
         return "\n".join([*lines, *show_bands(self.bands)]).rstrip()
 
-    def _broken(self, interval: Interval) -> list[str]:
+    def _broken(self, interval: IntervalVerdict) -> list[str]:
         """The requirement that is broken, where, when, and by how much."""
         if interval.broken is None:
             return []
@@ -122,14 +122,14 @@ class IntervalExplanation:
         hints = [f"  = {each}" for each in (*self._margins(interval), *self.changes)]
         return [render(told), *hints, ""]
 
-    def _when(self, interval: Interval) -> str:
+    def _when(self, interval: IntervalVerdict) -> str:
         last = float(self.tracks.seconds[interval.end])
         mine = next((band for band in self.bands if band.is_requirement and band.span == interval.broken), None)
         wrong = [place for place, value in enumerate(mine.values) if value == FALSE] if mine is not None else []
         seconds = float(self.tracks.seconds[interval.start + wrong[-1]]) if wrong else last
         return f"at {seconds:.1f} s" if wrong else f"by {last:.1f} s"
 
-    def _margins(self, interval: Interval) -> list[str]:
+    def _margins(self, interval: IntervalVerdict) -> list[str]:
         """For each comparison inside the broken requirement how close it comes to the other outcome."""
         broken = interval.broken
         assert broken is not None
@@ -267,7 +267,7 @@ def _already_broken(scenario: Scenario, tracks: RecordingTracks, interval: Inter
     return None
 
 
-def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: Interval) -> tuple[Band, ...]:
+def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[Band, ...]:
     """The conditions and requirements of a program over an interval; those on hidden random variables are left out."""
     dynamics = scenario.dynamics
     if dynamics is None:
