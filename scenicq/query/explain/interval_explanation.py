@@ -212,13 +212,13 @@ def explain_recording(query: Query, solver: Solver, name: str, time_us: int | No
     return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best), _changes(scenario, tracks, best))
 
 
-def _columns(scenario: Scenario, tracks: RecordingTracks, interval: Interval) -> AtomColumns:
+def _columns(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> AtomColumns:
     """The samples of an interval."""
     samples = Samples(tracks, dict(interval.binding), interval.start, interval.end + 1)
     return AtomColumns(scenario, samples, start=np.zeros(len(samples), np.int64))
 
 
-def _changes(scenario: Scenario, tracks: RecordingTracks, interval: Interval) -> tuple[str, ...]:
+def _changes(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[str, ...]:
     """What would let an interval through: the requirement that is broken hold, or the program end."""
     dynamics = scenario.dynamics
     if dynamics is None or interval.truth == TRUE:
@@ -239,7 +239,7 @@ def _changes(scenario: Scenario, tracks: RecordingTracks, interval: Interval) ->
 
 def _intervals(
     matcher: IntervalMatcher, scenario: Scenario, block: TrackBlock, starts: Sequence[DecidedStart]
-) -> list[Interval]:
+) -> list[IntervalVerdict]:
     table = start_table(scenario, block, {}, starts)
     return matcher.intervals(table, lambda number: (starts[number].label, starts[number].correspondence))
 
@@ -250,7 +250,7 @@ def _is_after(block: TrackBlock, start: DecidedStart, samples: Mapping[tuple[tup
     return binding in samples and int(block.label_of[next(iter(start.members.values()))]) >= samples[binding]
 
 
-def _already_broken(scenario: Scenario, tracks: RecordingTracks, interval: Interval) -> Span | None:
+def _already_broken(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> Span | None:
     """The first requirement that does not hold on an interval, however its recording would go on."""
     dynamics = scenario.dynamics
     if dynamics is None:
