@@ -13,7 +13,8 @@ region, or sums of ranges and choices, each used once. Whatever the columns lack
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeAlias, TypeVar
 
@@ -36,7 +37,7 @@ from scenicq.forest.nodes import (
     VectorOf,
 )
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import features
+from scenicq.forest.walk import features, postorder
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import IntersectionOf, Region
 from scenicq.match.options import MatchOptions
@@ -237,28 +238,44 @@ class _Prover:
         return f"{near} AND {aside} <= {number(-SLACK)}"
 
 
-def _parts(region: Node) -> tuple[list[DiscAt | SectorAt], list[Region]]:
+def _parts(root: Node) -> tuple[list[DiscAt | SectorAt], list[Region]]:
     """The views and the regions of the map of which a region is the intersection."""
-    match region:
-        case DiscAt() | SectorAt():
-            return [region], []
-        case RegionIntersection():
-            found = [_parts(part) for part in region.parts]
-            return [each for views, _ in found for each in views], [each for _, regions in found for each in regions]
-        case Constant(value=IntersectionOf() as value):
-            return [], list(value.parts)
-        case Constant() if isinstance(region.value, Region):
-            return [], [region.value]
-        case _:
-            raise _OpenError
+    views: list[DiscAt | SectorAt] = []
+    regions: list[Region] = []
+    todo = [root]
+    while todo:
+        region = todo.pop()
+        match region:
+            case DiscAt() | SectorAt():
+                views.append(region)
+            case RegionIntersection():
+                todo += region.parts
+            case Constant(value=IntersectionOf() as value):
+                regions += value.parts
+            case Constant() if isinstance(region.value, Region):
+                regions.append(region.value)
+            case _:
+                raise _OpenError
+    return views, regions
 
 
-def _filled(node: Node, bounds: Bounds) -> Filled:
+def _filled(root: Node, bounds: Bounds) -> Filled:
     """The numbers that an expression takes: all of those in some intervals, and no others.
 
     Raises:
         _OpenError: It is not known, or a random variable is used twice.
     """
+    found: dict[int, Filled] = {}
+    for node in postorder((root,)):
+        with suppress(_OpenError, KeyError):
+            found[id(node)] = _filled_by(node, bounds, found)
+    if id(root) not in found:
+        raise _OpenError
+    return found[id(root)]
+
+
+def _filled_by(node: Node, bounds: Bounds, found: Mapping[int, Filled]) -> Filled:
+    """The same from what is found of the nodes below."""
     known = bounds.exact(node)
     if known is not None:
         return [SQL.known(known)], frozenset()
@@ -271,13 +288,13 @@ def _filled(node: Node, bounds: Bounds) -> Filled:
             numbers = range(math.ceil(low), math.floor(high) + 1)
             return [SQL.known(float(each)) for each in numbers], frozenset((node.identity,))
         case Arithmetic(op=ArithmeticOp.ADD):
-            return _sum([_filled(arg, bounds) for arg in node.args])
+            return _sum([found[id(arg)] for arg in node.args])
         case Arithmetic(op=ArithmeticOp.NEG | ArithmeticOp.SUB | ArithmeticOp.MUL):
-            return _combined(node.op, [_filled(arg, bounds) for arg in node.args])
+            return _combined(node.op, [found[id(arg)] for arg in node.args])
         case Arithmetic(op=ArithmeticOp.DIV, args=(_, Constant(value=float(divisor)))) if divisor:
-            return _combined(node.op, [_filled(arg, bounds) for arg in node.args])
+            return _combined(node.op, [found[id(arg)] for arg in node.args])
         case Select(index=Index() as index):
-            options = [_filled(option, bounds) for option in node.options]
+            options = [found[id(option)] for option in node.options]
             used = frozenset((index.identity,)).union(*(variables for _, variables in options))
             return _few([each for alternatives, _ in options for each in alternatives]), used
         case _:
@@ -305,7 +322,7 @@ def _combined(op: ArithmeticOp, args: Sequence[Filled]) -> Filled:
     found: list[Interval[Expr]] = []
     for each in chosen:
         made = ARITHMETIC.arithmetic(op, each)
-        if not isinstance(made, Interval) or any(isinstance(end, float) and not math.isfinite(end) for end in made[:2]):
+        if any(isinstance(end, float) and not math.isfinite(end) for end in made[:2]):
             raise _OpenError
         found.append(made)
     return found, used
