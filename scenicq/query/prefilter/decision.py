@@ -16,7 +16,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO
 from scenicq.query.prefilter.sql_ends import number
-from scenicq.query.prefilter.sufficient import Sufficient
+from scenicq.query.prefilter.sufficient import SufficientCondition
 
 __all__ = ["columns_of", "decided_frames", "decision", "new_table"]
 
@@ -27,7 +27,7 @@ _MOST_COUNTED, _MOST_JOINED = 6, 3
 
 
 def decision(
-    found: Sequence[Sufficient],
+    found: Sequence[SufficientCondition],
     roles: Sequence[int],
     flags: Mapping[str, str],
     options: MatchOptions,
@@ -123,7 +123,7 @@ def _counted(roles: int) -> str:
     return f"SELECT f FROM sure GROUP BY f HAVING {' AND '.join(enough)}"
 
 
-def _joined(roles: Sequence[int], ties: Sequence[Sufficient]) -> str:
+def _joined(roles: Sequence[int], ties: Sequence[SufficientCondition]) -> str:
     """The frames in which distinct objects have all roles, two by two tied together."""
     tables = ["sure p0"]
     for place in range(1, len(roles)):

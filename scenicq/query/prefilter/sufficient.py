@@ -44,14 +44,14 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups
 from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.conditions import EGO, Reader, difference, object_columns, turned_within
+from scenicq.query.prefilter.conditions import EGO, ConditionReader, difference, object_columns, turned_within
 from scenicq.query.prefilter.regions import RegionNames, near_region
-from scenicq.query.prefilter.sql_bounds import ARITHMETIC, Bounds
+from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, number
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 from scenicq.store.sql import sql_text
 
-__all__ = ["Sufficient", "sufficient_conditions"]
+__all__ = ["SufficientCondition", "sufficient_conditions"]
 
 _T = TypeVar("_T")
 _MOST_ALTERNATIVES = 16
@@ -63,7 +63,7 @@ Filled: TypeAlias = tuple[list[Interval[Expr]], frozenset[Identity]]
 
 
 @dataclass(frozen=True, slots=True)
-class Sufficient:
+class SufficientCondition:
     """A condition that proves a part of a match.
 
     Attributes:
@@ -81,7 +81,9 @@ class _OpenError(Exception):
     """The columns do not prove it."""
 
 
-def sufficient_conditions(scenario: Scenario, network: Network, options: MatchOptions) -> tuple[Sufficient, ...] | None:
+def sufficient_conditions(
+    scenario: Scenario, network: Network, options: MatchOptions
+) -> tuple[SufficientCondition, ...] | None:
     """Conditions that together prove that a label matches, for distinct label objects within the radius.
 
     Args:
@@ -92,7 +94,7 @@ def sufficient_conditions(scenario: Scenario, network: Network, options: MatchOp
     Returns:
         None if the columns cannot prove it.
     """
-    noisy = any(thing.mutated for thing in scenario.objects)
+    noisy = any(owner.mutated for owner in scenario.objects)
     if noisy or options.method != "auto" or options.ego != "label" or options.exact or scenario.dynamics is not None:
         return None
     try:
@@ -106,26 +108,26 @@ class _Prover:
         tolerance = options.tolerance.for_scenario(scenario)
         self.scenario, self.options, self.tolerance = scenario, options, tolerance
         self.names = RegionNames.of(network)
-        self.reader = Reader(scenario, tolerance, self.names, network.roadDirection)
+        self.reader = ConditionReader(scenario, tolerance, self.names, network.roadDirection)
 
-    def all(self) -> list[Sufficient]:
+    def all(self) -> list[SufficientCondition]:
         """Conditions of all groups, where a label has columns for all that is compared and nothing else."""
         relevant = relevant_properties(self.scenario, self.options)
-        found = [Sufficient((), f"{EGO}.ego_class <> ''")]
+        found = [SufficientCondition((), f"{EGO}.ego_class <> ''")]
         for index, names in enumerate(relevant):
             others = sorted(names - _COLUMNED)
             own = index == self.scenario.ego
             column = f"{EGO}.ego_attributes" if own else "a.attributes"
             if others:
-                found.append(Sufficient(() if own else (index,), _lacks(column, others)))
+                found.append(SufficientCondition(() if own else (index,), _lacks(column, others)))
         params = [name for name, given in self.scenario.params.items() if given.explicit]
         compared = [name for name in params if name not in self.options.ignore_params]
         if compared:
-            found.append(Sufficient((), _lacks(f"{EGO}.params", compared)))
+            found.append(SufficientCondition((), _lacks(f"{EGO}.params", compared)))
         signature = (*(names & _COLUMNED for names in relevant), frozenset[str]())
         return found + [self.group(group) for group in build_groups(self.scenario, signature, self.options)]
 
-    def group(self, group: Group) -> Sufficient:
+    def group(self, group: Group) -> SufficientCondition:
         """What proves a group."""
         objects = tuple(index for index in group.objects if index != self.scenario.ego)
         if len(objects) > 2:
@@ -142,9 +144,11 @@ class _Prover:
             sql, near = self._comparison(constraint, bounds)
             texts.append(sql)
             places += near
-        return Sufficient(objects, " AND ".join(dict.fromkeys(f"({text})" for text in texts if text)), tuple(places))
+        return SufficientCondition(
+            objects, " AND ".join(dict.fromkeys(f"({text})" for text in texts if text)), tuple(places)
+        )
 
-    def _observed(self, constraint: Constraint, bounds: Bounds) -> list[str]:
+    def _observed(self, constraint: Constraint, bounds: SqlBounds) -> list[str]:
         """That everything is observed which a constraint speaks of."""
         asked = set(features(constraint.expression))
         if isinstance(constraint, Comparison):
@@ -157,7 +161,7 @@ class _Prover:
             found += [f"{part} IS NOT NULL" for part in ((column,) if isinstance(column, str) else column)]
         return found
 
-    def _comparison(self, item: Comparison, bounds: Bounds) -> tuple[str, list[tuple[int, str]]]:
+    def _comparison(self, item: Comparison, bounds: SqlBounds) -> tuple[str, list[tuple[int, str]]]:
         own, node = bounds.columns[item.object, item.property], item.expression
         sure = self.tolerance.of(item.object, item.property).sure
         if sure <= SLACK:
@@ -174,7 +178,7 @@ class _Prover:
         ]
         return _told(any_of(allowed)), []
 
-    def _heading(self, index: int, node: Node, bounds: Bounds, sure: float) -> str:
+    def _heading(self, index: int, node: Node, bounds: SqlBounds, sure: float) -> str:
         own, terms, directions = self.reader.heading_terms(index, node, bounds)
         alternatives, _ = _sum([_filled(term, bounds) for term in terms])
         # `turned_within` allows for slack where what is asked for is certain
@@ -182,7 +186,7 @@ class _Prover:
         return " AND ".join([f"len({directions}) > 0"] * bool(directions) + [within] * bool(within)) or "true"
 
     def _position(
-        self, index: int, node: Node, bounds: Bounds, sure: float
+        self, index: int, node: Node, bounds: SqlBounds, sure: float
     ) -> tuple[str, list[tuple[int, str]]]:  # fmt: skip
         own = bounds.columns[index, "position"]
         place = (own[0], own[1])
@@ -204,7 +208,7 @@ class _Prover:
         return _told(any_of(close)), []
 
     def _inside(
-        self, index: int, region: Node, place: tuple[str, str], bounds: Bounds, sure: float
+        self, index: int, region: Node, place: tuple[str, str], bounds: SqlBounds, sure: float
     ) -> tuple[str, list[tuple[int, str]]]:
         """That the place, or one within tolerance of it, lies in a region."""
         views, regions = _parts(region)
@@ -223,7 +227,7 @@ class _Prover:
             raise _OpenError
         return " AND ".join(texts), places
 
-    def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: Bounds) -> str:
+    def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: SqlBounds) -> str:
         radius = bounds.exact(region.radius)
         if radius is None or place != ("a.x", "a.y") or not self.reader.is_ego(region.center, "position"):
             raise _OpenError
@@ -259,7 +263,7 @@ def _parts(root: Node) -> tuple[list[DiscAt | SectorAt], list[Region]]:
     return views, regions
 
 
-def _filled(root: Node, bounds: Bounds) -> Filled:
+def _filled(root: Node, bounds: SqlBounds) -> Filled:
     """The numbers that an expression takes: all of those in some intervals, and no others.
 
     Raises:
@@ -274,7 +278,7 @@ def _filled(root: Node, bounds: Bounds) -> Filled:
     return found[id(root)]
 
 
-def _filled_by(node: Node, bounds: Bounds, found: Mapping[int, Filled]) -> Filled:
+def _filled_by(node: Node, bounds: SqlBounds, found: Mapping[int, Filled]) -> Filled:
     """The same from what is found of the nodes below."""
     known = bounds.exact(node)
     if known is not None:
