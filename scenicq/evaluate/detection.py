@@ -114,7 +114,7 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
     keep &= poses.away(predictions, frame, spatial=spatial) < limits[prediction_class]
     keep &= ~racks.hold(predictions.x, predictions.y, frame, prediction_class)
     order = np.flatnonzero(keep)
-    order = order[_by_score(predictions.score[order], last_first=protocol.last_first)]
+    order = order[_by_score(predictions.score[order], frame[order], last_first=protocol.last_first)]
     order = order[_first_of_each(frame[order], prediction_class[order], protocol)]
     if math.isfinite(protocol.roi_m):
         roi = RegionOfInterest(dataset, frames, protocol.roi_m)
@@ -290,11 +290,11 @@ class _Racks:
         return held
 
 
-def _by_score(score: Reals, *, last_first: bool) -> NDArray[np.int64]:
-    """The order of falling scores."""
+def _by_score(score: Reals, frame: Numbers, *, last_first: bool) -> NDArray[np.int64]:
+    """The order of falling scores; equal ones from the last to the first, or frame by frame."""
     if last_first:
         return np.argsort(score, kind="stable")[::-1]
-    return np.argsort(-score, kind="stable")
+    return np.lexsort((frame, -score))
 
 
 def _first_of_each(frame: Numbers, category: Numbers, protocol: Protocol) -> NDArray[np.int64]:
