@@ -149,8 +149,8 @@ class _Pages:
         frame = detection.frames.numbers[label.frame]
         numbers = np.flatnonzero(detection.objects.frame == frame).tolist()
         pairs = sorted(zip(numbers, label.objects, strict=True), key=lambda pair: bool(each.mine[pair[0]]))
-        for number, thing in pairs:
-            box = space_box(thing, self._kind(each, number), f"{thing.id}, {thing.category}")
+        for number, member in pairs:
+            box = space_box(member, self._kind(each, number), f"{member.id}, {member.category}")
             if box is not None and detection.distance[number] < _FAR_M:
                 yield box
         found = detection.predictions
@@ -172,8 +172,8 @@ class _Pages:
         view = View((label.ego.x, label.ego.y), min(_FARTHEST, max(_NEAREST, 1.25 * float(far))))
         left, top, width, _ = view.box(plane)
         boxes = [draw_object(label.ego, plane)] if label.has_ego else []
-        for number, thing in zip(numbers.tolist(), label.objects, strict=True):
-            boxes.append(element("g", draw_object(thing, plane), class_=self._kind(each, number)))
+        for number, member in zip(numbers.tolist(), label.objects, strict=True):
+            boxes.append(element("g", draw_object(member, plane), class_=self._kind(each, number)))
         return element(
             "svg",
             element("title", escape(label.frame)),

@@ -276,7 +276,7 @@ class Query:
     def roles(self) -> tuple[str, ...]:
         """Names of the scenario's objects, of all maps that it fits."""
         worlds = [each.scenario for each in self._worlds().values() if isinstance(each, CompiledMap)]
-        return tuple(dict.fromkeys(thing.name for scenario in worlds for thing in scenario.objects))
+        return tuple(dict.fromkeys(owner.name for scenario in worlds for owner in scenario.objects))
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""

@@ -23,7 +23,7 @@ from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackReader
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
-from scenicq.temporal.intervals import Interval, IntervalMatcher
+from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import FALSE, TRUE, Truth
@@ -66,7 +66,7 @@ class IntervalExplanation:
     """
 
     tracks: RecordingTracks
-    interval: Interval | None
+    interval: IntervalVerdict | None
     roles: tuple[tuple[str, str], ...] = ()
     bands: tuple[Band, ...] = ()
     failed: Counter[str] | None = None
@@ -97,7 +97,7 @@ class IntervalExplanation:
         lines += ["", *self._broken(interval)]
         return "\n".join([*lines, *show_bands(self.bands)]).rstrip()
 
-    def _broken(self, interval: Interval) -> list[str]:
+    def _broken(self, interval: IntervalVerdict) -> list[str]:
         """The requirement that is broken, where, when, and by how much."""
         if interval.broken is None:
             return []
@@ -111,14 +111,14 @@ class IntervalExplanation:
         hints = [f"  = {each}" for each in self._margins(interval)]
         return [render(told), *hints, ""]
 
-    def _when(self, interval: Interval) -> str:
+    def _when(self, interval: IntervalVerdict) -> str:
         last = float(self.tracks.seconds[interval.end])
         mine = next((band for band in self.bands if band.is_requirement and band.span == interval.broken), None)
         wrong = [place for place, value in enumerate(mine.values) if value == FALSE] if mine is not None else []
         seconds = float(self.tracks.seconds[interval.start + wrong[-1]]) if wrong else last
         return f"at {seconds:.1f} s" if wrong else f"by {last:.1f} s"
 
-    def _margins(self, interval: Interval) -> list[str]:
+    def _margins(self, interval: IntervalVerdict) -> list[str]:
         """For each comparison inside the broken requirement how close it comes to the other outcome."""
         broken = interval.broken
         assert broken is not None
@@ -188,7 +188,7 @@ def explain_recording(query: Query, solver: Solver, name: str, time_us: int | No
     return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best))
 
 
-def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: Interval) -> tuple[Band, ...]:
+def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[Band, ...]:
     """The conditions and requirements of a program over an interval; those on hidden random variables are left out."""
     dynamics = scenario.dynamics
     if dynamics is None:

@@ -35,11 +35,11 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.regions import RegionNames, near_region
-from scenicq.query.prefilter.sql_bounds import ARITHMETIC, Bounds
+from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
-__all__ = ["EGO", "Condition", "conditions", "object_columns"]
+__all__ = ["EGO", "NecessaryCondition", "conditions", "object_columns"]
 
 EGO = "ego"
 """Alias of the frame's row; the objects of a condition are called `a` and, if there are two, `b`."""
@@ -48,7 +48,7 @@ _NUMBERS = ("heading", "width", "length", "height")
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class NecessaryCondition:
     """A necessary condition.
 
     Attributes:
@@ -91,9 +91,9 @@ class _Reader:
     tolerance: Tolerance
     names: RegionNames
     road: RoadDirection
-    bounds: dict[tuple[int, ...], Bounds] = field(default_factory=dict["tuple[int, ...]", "Bounds"])
+    bounds: dict[tuple[int, ...], SqlBounds] = field(default_factory=dict["tuple[int, ...]", "SqlBounds"])
 
-    def of(self, objects: tuple[int, ...]) -> Bounds:
+    def of(self, objects: tuple[int, ...]) -> SqlBounds:
         """Bounds over the columns of some objects and the ego's."""
         if objects not in self.bounds:
             aliases = {self.scenario.ego: (EGO, "ego_")} | dict(zip(objects, (("a", ""), ("b", "")), strict=False))
@@ -102,7 +102,7 @@ class _Reader:
                 for index, (alias, prefix) in aliases.items()
                 for name, column in object_columns(alias, prefix).items()
             }
-            self.bounds[objects] = Bounds(columns)
+            self.bounds[objects] = SqlBounds(columns)
         return self.bounds[objects]
 
     def involved(self, *roots: Node, about: int | None = None) -> tuple[int, ...]:
@@ -131,7 +131,7 @@ class _Reader:
             yield objects, _sql(any_of(allowed)), ""
 
     def _position(
-        self, index: int, node: Node, objects: tuple[int, ...], bounds: Bounds
+        self, index: int, node: Node, objects: tuple[int, ...], bounds: SqlBounds
     ) -> Iterator[tuple[tuple[int, ...], str, str]]:
         reach = self.tolerance.of(index, "position").reach
         own = bounds.columns[index, "position"]
@@ -149,7 +149,7 @@ class _Reader:
         allowed = [all_of([between(place[0], a, reach), between(place[1], b, reach)]) for a, b in bounds.boxes(rest)]
         yield objects, _sql(any_of(allowed)), ""
 
-    def _frame(self, place: tuple[Expr, Expr], node: Node, bounds: Bounds) -> tuple[tuple[Expr, Expr], Node, bool]:
+    def _frame(self, place: tuple[Expr, Expr], node: Node, bounds: SqlBounds) -> tuple[tuple[Expr, Expr], Node, bool]:
         """A place seen in the frames that an expression goes through, and what is left of the expression."""
         moved = False
         while True:
@@ -188,25 +188,28 @@ class _Reader:
         return isinstance(node, Feature) and (node.object, node.property) == (self.scenario.ego, name)
 
     def _inside(
-        self, region: Node, place: tuple[str, str], bounds: Bounds, names: RegionNames | None, reach: float
+        self, region: Node, place: tuple[str, str], bounds: SqlBounds, names: RegionNames | None, reach: float
     ) -> Iterator[tuple[str, str]]:
         """Conditions on memberships, or SQL, that a place in a region meets to within metres."""
-        match region:
-            case Constant() if isinstance(region.value, Region):
-                parts = region.value.parts if isinstance(region.value, IntersectionOf) else (region.value,)
-                for part in parts:
-                    near = None if names is None else near_region(part, names, reach)
-                    if near is not None:
-                        yield near, ""
-            case RegionIntersection():
-                for part in region.parts:
-                    yield from self._inside(part, place, bounds, names, reach)
-            case DiscAt() | SectorAt():
-                yield "", _sql(self._in_view(region, place, bounds, reach))
-            case _:
-                return
+        todo = [region]
+        while todo:
+            match todo.pop():
+                case Constant(value=known) if isinstance(known, Region):
+                    parts = known.parts if isinstance(known, IntersectionOf) else (known,)
+                    for part in parts:
+                        near = None if names is None else near_region(part, names, reach)
+                        if near is not None:
+                            yield near, ""
+                case RegionIntersection(parts=parts):
+                    todo += reversed(parts)
+                case DiscAt() | SectorAt() as seen:
+                    yield "", _sql(self._in_view(seen, place, bounds, reach))
+                case _:
+                    pass
 
-    def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: Bounds, reach: float) -> str | bool:
+    def _in_view(
+        self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: SqlBounds, reach: float
+    ) -> str | bool:
         center = bounds.exact_vector(region.center)
         if center is None:
             return True
@@ -223,7 +226,7 @@ class _Reader:
         aside = f"abs(a.ego_right) * {number(math.cos(half))} - a.ego_ahead * {number(math.sin(half))}"
         return all_of([near, less(f"({aside})", reach)])
 
-    def _heading(self, index: int, node: Node, bounds: Bounds) -> str:
+    def _heading(self, index: int, node: Node, bounds: SqlBounds) -> str:
         own = bounds.columns[index, "heading"]
         assert isinstance(own, str)
         alias = own.removesuffix("heading")
@@ -314,7 +317,7 @@ def _summands(node: Node) -> list[Node]:
     return found
 
 
-def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> Iterator[Condition]:
+def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> Iterator[NecessaryCondition]:
     """The necessary conditions of a scenario whose ego is the label's own, in the order of the program.
 
     Args:
@@ -322,22 +325,22 @@ def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> I
         network: The map it was compiled for.
         options: Tolerances.
     """
-    if any(thing.mutated for thing in scenario.objects):
+    if any(owner.mutated for owner in scenario.objects):
         return  # noise of any size hides where things are
     reader = _Reader(scenario, options.tolerance.for_scenario(scenario), RegionNames.of(network), network.roadDirection)
-    for thing in scenario.objects:
-        named: Mapping[str, Node] = {name: given.value for name, given in thing.properties.items()}
+    for owner in scenario.objects:
+        named: Mapping[str, Node] = {name: given.value for name, given in owner.properties.items()}
         compared = [name for name in ("position", "heading") if name in named]
-        compared += [name for name in named if thing.properties[name].explicit and name not in compared]
+        compared += [name for name in named if owner.properties[name].explicit and name not in compared]
         for name in compared:
-            what, span = f"{thing.name}.{name}", thing.properties[name].span
-            for objects, sql, region in reader.comparison(thing.index, name, named[name]):
+            what, span = f"{owner.name}.{name}", owner.properties[name].span
+            for objects, sql, region in reader.comparison(owner.index, name, named[name]):
                 if sql or region:
-                    yield Condition(what, objects, sql, span, region)
+                    yield NecessaryCondition(what, objects, sql, span, region)
     for requirement in scenario.requirements:
         if requirement.built_in is not None or requirement.span is None:
             continue
         what = " ".join(requirement.span.text.split())
         for objects, sql, region in reader.requirement(requirement.condition):
             if sql or region:
-                yield Condition(what, objects, sql, requirement.span, region)
+                yield NecessaryCondition(what, objects, sql, requirement.span, region)

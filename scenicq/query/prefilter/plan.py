@@ -19,7 +19,7 @@ from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.conditions import EGO, Condition, conditions
+from scenicq.query.prefilter.conditions import EGO, NecessaryCondition, conditions
 from scenicq.query.prefilter.params import param_conditions
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.classes import ROOT, class_matches, subclasses
@@ -92,10 +92,10 @@ class Plan:
 class _Role:
     """One object's conditions: those on columns of its row, then those on memberships."""
 
-    thing: ScenarioObject
+    owner: ScenarioObject
     classes: str
-    plain: list[Condition]
-    placed: list[Condition]
+    plain: list[NecessaryCondition]
+    placed: list[NecessaryCondition]
     column: str
 
     @property
@@ -180,13 +180,13 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Pl
     found = list(conditions(scenario, network, options)) if own_ego else []
     columns: dict[tuple[str, ...], str] = {}
     roles: list[_Role] = []
-    for thing in scenario.objects:
-        if thing.index != scenario.ego:
-            mine = [each for each in found if each.objects == (thing.index,)]
+    for owner in scenario.objects:
+        if owner.index != scenario.ego:
+            mine = [each for each in found if each.objects == (owner.index,)]
             plain, placed = [each for each in mine if not each.region], [each for each in mine if each.region]
-            classes = _any_of(_classes(thing.category, options))
+            classes = _any_of(_classes(owner.category, options))
             key = (classes, *(each.sql or each.region for each in (*plain, *placed)))
-            roles.append(_Role(thing, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
+            roles.append(_Role(owner, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
     pairs = _pairs(found)
     draft = _Draft()
     _frames(draft, [each for each in found if not each.objects], param_conditions(scenario, options), roles, pairs)
@@ -202,12 +202,12 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Pl
         network.name,
         tuple(draft.steps),
         tuple(draft.stages),
-        tuple(role.thing.index for role in roles) if narrowed else (),
+        tuple(role.owner.index for role in roles) if narrowed else (),
     )
 
 
-def _pairs(found: Sequence[Condition]) -> dict[tuple[int, ...], list[Condition]]:
-    pairs: dict[tuple[int, ...], list[Condition]] = {}
+def _pairs(found: Sequence[NecessaryCondition]) -> dict[tuple[int, ...], list[NecessaryCondition]]:
+    pairs: dict[tuple[int, ...], list[NecessaryCondition]] = {}
     for each in found:
         if len(each.objects) == 2:
             pairs.setdefault(each.objects, []).append(each)
@@ -216,10 +216,10 @@ def _pairs(found: Sequence[Condition]) -> dict[tuple[int, ...], list[Condition]]
 
 def _frames(
     draft: _Draft,
-    own: Sequence[Condition],
-    params: Sequence[Condition],
+    own: Sequence[NecessaryCondition],
+    params: Sequence[NecessaryCondition],
     roles: Sequence[_Role],
-    pairs: dict[tuple[int, ...], list[Condition]],
+    pairs: dict[tuple[int, ...], list[NecessaryCondition]],
 ) -> None:
     """What the columns of the frame decide."""
     used = [each.sql for role in roles for each in role.plain] + [each.sql for tied in pairs.values() for each in tied]
@@ -240,7 +240,7 @@ def _reached(role: _Role, classes: Sequence[str]) -> str:
 
 
 def _objects(
-    draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[Condition]], options: MatchOptions
+    draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[NecessaryCondition]], options: MatchOptions
 ) -> None:
     """One pass over the objects: how far each comes in each role."""
     own_ego = options.ego == "label"
@@ -264,7 +264,7 @@ def _objects(
         # With any object as the ego, the label's own ego may play another role.
         least = pools[role.classes] - (not own_ego)
         count = counts.setdefault(f"count(*) FILTER ({role.column} >= 1)", f"n{len(counts)}")
-        step = draft.step(f"{role.thing.name}.class", role.thing.span, f"no {role.thing.category}")
+        step = draft.step(f"{role.owner.name}.class", role.owner.span, f"no {role.owner.category}")
         blamed.append((f"coalesce({count}, 0) < {least}", step))
     for role in roles:
         furthest = counts.setdefault(f"max({role.column})", f"n{len(counts)}")
@@ -278,7 +278,7 @@ def _objects(
     )
 
 
-def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) -> str:
+def _regions(draft: _Draft, own: Sequence[NecessaryCondition], roles: Sequence[_Role]) -> str:
     """What memberships of regions decide; returns the table of objects and how far they come."""
     mine = {each.region: f"e{place}" for place, each in enumerate(own)}
     distinct = {role.column: role for role in roles if role.placed}
@@ -333,7 +333,7 @@ def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) ->
 
 
 def _distinct(
-    draft: _Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[Condition]]
+    draft: _Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[NecessaryCondition]]
 ) -> None:
     """Who is left for each role, and whether there are enough of them for any two and for all."""
     tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
@@ -355,15 +355,15 @@ def _distinct(
     blamed: list[tuple[str, int]] = []
     tally = ""
     if len(roles) > 1:
-        step = draft.step("correspondence", roles[-1].thing.span, "no distinct label objects for all objects")
+        step = draft.step("correspondence", roles[-1].owner.span, "no distinct label objects for all objects")
         blamed = [(f"coalesce(n{place}, 0) < {len(places)}", step) for place, places in enumerate(together)]
         tally = f"LEFT JOIN (SELECT f, {', '.join(counts)} FROM roles GROUP BY f) t ON t.f = s.f"
     draft.stage([table], blamed, tally)
 
 
-def _pair(draft: _Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[Condition]) -> None:
+def _pair(draft: _Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[NecessaryCondition]) -> None:
     """Two roles whose objects conditions tie together: whoever has no partner is out of the role."""
-    one, other = (next(place for place, role in enumerate(roles) if role.thing.index == index) for index in objects)
+    one, other = (next(place for place, role in enumerate(roles) if role.owner.index == index) for index in objects)
     ego = f" JOIN stage0 {EGO} ON {EGO}.f = a.f" if _columns(EGO, [each.sql for each in tied]) else ""
     level = _level([each.sql for each in tied])
     statements = [
