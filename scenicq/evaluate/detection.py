@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -315,14 +316,14 @@ def _owners(
     nearest_only = predictions.protocol.nearest_only
     by_frame = np.argsort(frame, kind="stable")
     frames = int(frame.max(initial=-1)) + 1
-    ends = np.searchsorted(frame, np.arange(frames + 1), sorter=by_frame)
+    ends: list[int] = np.searchsorted(frame, np.arange(frames + 1), sorter=by_frame).tolist()
     begin = 0
     while begin < frames:
-        end = max(int(np.searchsorted(ends, ends[begin] + _AT_ONCE, side="right")) - 1, begin + 1)
+        end = max(bisect_right(ends, ends[begin] + _AT_ONCE) - 1, begin + 1)
         # in the order of falling scores again
         mine = np.sort(by_frame[ends[begin] : ends[end]])
-        first, last = np.searchsorted(objects.frame, (begin, end))
-        counted = first + np.flatnonzero(object_class[first:last] >= 0)
+        of_frames: NDArray[np.int64] = np.searchsorted(objects.frame, (begin, end))
+        counted = of_frames[0] + np.flatnonzero(object_class[of_frames[0] : of_frames[1]] >= 0)
         pairs = find_pairs(
             _centres(predictions, mine, frame, category[mine], spatial=spatial),
             _centres(objects, counted, objects.frame, object_class[counted], spatial=spatial),
@@ -352,7 +353,7 @@ def _errors(
     numbers = {name: number for number, name in enumerate(objects.attributes)}
     same = np.array([*(numbers.get(name, -2) for name in predictions.attributes), -2], dtype=np.int32)
 
-    def sizes(of: Predictions | Annotations, which: NDArray[np.int64]) -> Reals:
+    def sizes(of: Predictions | Annotations, which: NDArray[np.int64] | Numbers) -> Reals:
         return np.column_stack((of.width[which], of.length[which], of.height[which]))
 
     found = np.flatnonzero(owner >= 0)
