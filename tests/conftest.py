@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "sample_data"
 _HANGS_S = 1800
 
-# Of one state of the code, the tests say the same each time and on a machine however busy; `make test-all` draws examples anew.
+# The tests say the same each time, on a machine however busy; `make test-all` draws examples anew.
 settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("anew", deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("same")

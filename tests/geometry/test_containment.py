@@ -13,7 +13,6 @@ from shapely.geometry import LineString, Polygon
 
 from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.containment import covers, overlaps
-from scenicq.geometry.membership import contains
 from scenicq.geometry.proximity import witness_point
 from scenicq.geometry.regions import (
     DifferenceOf,
