@@ -35,6 +35,7 @@ from scenicq.geometry.regions import IntersectionOf, Region
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
+from scenicq.query.prefilter.ego_frame import DISTANCE, PLACE, in_ego_frame
 from scenicq.query.prefilter.regions import RegionNames, near_region
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
@@ -90,6 +91,8 @@ def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, s
     found["velocity"] = (vx, vy)
     found["speed"] = f"sqrt({vx} * {vx} + {vy} * {vy})"
     found["acceleration"], found["angularSpeed"] = f"{start}acceleration", f"{start}yaw_rate"
+    if not prefix:
+        found[PLACE], found[DISTANCE] = (f"{start}ego_right", f"{start}ego_ahead"), f"{start}ego_distance"
     return found
 
 
@@ -277,7 +280,7 @@ class ConditionReader:
 
     def requirement(self, root: Node) -> Iterator[tuple[tuple[int, ...], str, str]]:
         """The same for a requirement."""
-        for part in conjuncts(root):
+        for part in conjuncts(in_ego_frame(root, self.scenario.ego)):
             objects = self.involved(part)
             if len(objects) > 2:
                 continue
