@@ -183,15 +183,18 @@ class StartSearch:
         holds = np.full(len(places), TRUE)
         broken = np.full(len(places), -1)
         for number, requirement in enumerate(requirements):
-            truth = np.full(len(places), UNKNOWN)
-            for chosen in by_presence(places, requirement.condition):
-                columns = AtomColumns(self.matcher.scenario, places.at(chosen))
+            # what one requirement excludes is not asked about the next
+            left = np.flatnonzero(holds > FALSE)
+            asked = places if len(left) == len(places) else places.at(left)
+            truth = np.full(len(left), UNKNOWN)
+            for chosen in by_presence(asked, requirement.condition):
+                columns = AtomColumns(self.matcher.scenario, asked.at(chosen))
                 expanded = columns.expanded(requirement.condition)
                 # what is random where the label does not tell is the matcher's
                 if not leaves(expanded):
                     truth[chosen] = columns.truth_of(expanded)
-            broken[(truth == FALSE) & (broken < 0)] = number
-            holds = np.minimum(holds, truth)
+            broken[left[truth == FALSE]] = number
+            holds[left] = np.minimum(holds[left], truth)
         return holds, broken
 
     # --- what is left, in closed form

@@ -76,6 +76,10 @@ class SqlBounds:
         """SQL that is true wherever a condition can hold; True if it always can."""
         return any_of([each.can_hold if isinstance(each, Truth) else True for each in self._value(root)])
 
+    def can_fail(self, root: Node) -> str | bool:
+        """SQL that is true wherever a condition can fail; True if it always can."""
+        return any_of([each.can_fail if isinstance(each, Truth) else True for each in self._value(root)])
+
     def _value(self, root: Node) -> Alternatives:
         if id(root) not in self._known:
             domain = IntervalDomain(SQL, self._column, slack=SLACK, boxed=False)
