@@ -54,7 +54,8 @@ class FollowedDirection(RoadDirection):
     def values_many(self, xy: Coordinates) -> list[tuple[float, ...]]:
         """`values` for points of shape (n, 2)."""
         found = self.base.values_many(xy)
-        for index in self._partly_off(np.concatenate([xy, xy], axis=1)).tolist():
+        off: list[int] = self._partly_off(np.concatenate([xy, xy], axis=1)).tolist()
+        for index in off:
             found[index] = tuple(sorted({*found[index], OFF_ROAD}))
         return found
 
@@ -118,7 +119,7 @@ class FollowedDirection(RoadDirection):
             look()
             column, row = tile
             square = shapes.box(column * _TILE, row * _TILE, (column + 1) * _TILE, (row + 1) * _TILE)
-            near = np.sort(shapes.tree_within(self._paved_tree, square, _BESIDE)).tolist()
+            near: list[int] = np.sort(shapes.tree_within(self._paved_tree, square, _BESIDE)).tolist()
             road = shapes.band(shapes.union_all([self.paved[index] for index in near]), _BESIDE)
             rest = shapes.difference(square, road)
             found = self._free[tile] = shapes.polygonal_part(rest)
