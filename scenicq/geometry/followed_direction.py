@@ -94,11 +94,30 @@ class FollowedDirection(RoadDirection):
         held, within = shapes.tree_pairs_within(self._paved_tree, middle[small], radius[small])
         inside = shapes.covers_many(self._paved[within], shapes.boxes(boxes[small[held]]))
         todo = np.setdiff1d(small, small[held[inside]])
-        for index in todo.tolist():
-            box: Bounds = tuple(boxes[index].tolist())
-            area = shapes.box(*box)
-            off[index] = any(shapes.distance(area, part) <= 0 for tile in _tiles(box) for part in self._free_in(tile))
+        if len(todo):
+            rest = boxes[todo]
+            free, _ = shapes.tree_pairs_within(self._free_tree(rest), shapes.boxes(rest), 0.0)
+            off[todo[free]] = True
         return np.nonzero(off)[0]
+
+    def _free_tree(self, boxes: NDArray[np.float64]) -> STRtree:
+        """What was found off the road so far, at least in all tiles that some boxes meet."""
+        ends = np.unique(np.floor(boxes / _TILE).astype(np.intp), axis=0)
+        tiles = {
+            (column, row)
+            for west, south, east, north in ends.tolist()
+            for column in range(west, east + 1)
+            for row in range(south, north + 1)
+        }
+        if not tiles <= self._free.keys() or "tree" not in self._found:
+            for tile in sorted(tiles):
+                self._free_in(tile)
+            self._found["tree"] = STRtree(shapes.array([part for parts in self._free.values() for part in parts]))
+        return self._found["tree"]
+
+    @cached_property
+    def _found(self) -> dict[str, STRtree]:
+        return {}
 
     @cached_property
     def _paved(self) -> NDArray[np.object_]:
