@@ -34,10 +34,10 @@ from scenicq.forest.walk import postorder
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.decide.compiled_expressions import (
-    Column,
     Columns,
     CompiledExpressions,
     Exact,
+    FloatColumn,
     Form,
     Get,
     UnclearError,
@@ -70,7 +70,7 @@ class Evaluated(NamedTuple):
 
     holds: bool | Sequence[bool]
     fails: bool | Sequence[bool]
-    values: Mapping[Identity, Value | Column | list[Value]]
+    values: Mapping[Identity, Value | FloatColumn | list[Value]]
 
 
 _UNCLEAR = Evaluated(False, False, {})
@@ -232,7 +232,7 @@ def _apart(middle: XY, half: XY, turn: XY, margin: Margin) -> bool:
 def _length(x: float, y: float) -> float:
     """The length of a vector; of columns, a column of the same numbers to the last bit."""
     if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
-        pairs = zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True)
+        pairs = zip(cast(FloatColumn, x).tolist(), cast(FloatColumn, y).tolist(), strict=True)
         return cast(float, np.array([math.hypot(*pair) for pair in pairs]))
     return math.hypot(x, y)
 
@@ -260,7 +260,7 @@ def _each(position: Value) -> list[XY]:
     """The positions that a pair of columns has; of one position, it alone."""
     x, y = cast(XY, position)
     if isinstance(x, np.ndarray):
-        return list(zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True))
+        return list(zip(cast(FloatColumn, x).tolist(), cast(FloatColumn, y).tolist(), strict=True))
     return [(x, y)]
 
 
@@ -346,7 +346,7 @@ def _heading(item: Comparison) -> ClosedForm | None:
         for chosen, form, middle, half in choices:
             rest = seen - form.known(get) - middle
             if isinstance(rest, np.ndarray):
-                rests: list[float] = cast(Column, rest).tolist()
+                rests: list[float] = cast(FloatColumn, rest).tolist()
                 each = [_STRAIGHT] * len(rests) if allowed is None else allowed
                 offs = [_turn(*pair, half, margin.sure) for pair in zip(rests, each, strict=True)]
                 off = cast(float, np.array(offs))

@@ -14,7 +14,7 @@ from typing import cast
 import numpy as np
 
 from scenicq.compiler.occupancy import Ranked
-from scenicq.forest.bounds import Interval
+from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn, Value
@@ -61,7 +61,7 @@ class HeadingAssignment:
     cells: list[Alternative]
     given: Mapping[Identity, Value]
     headings: Mapping[int, float]
-    limits: Interval
+    limits: FloatInterval
     middles: Mapping[Identity, Value]
     exact: bool
     sharp: bool
@@ -98,7 +98,9 @@ def solved(
     return open_ended
 
 
-def extent(way: HeadingAssignment, tolerance: Tolerance, number: Identity, limits: Interval) -> Interval | None:
+def extent(
+    way: HeadingAssignment, tolerance: Tolerance, number: Identity, limits: FloatInterval
+) -> FloatInterval | None:
     """Between which values a random number lies in the solutions of a part, if it lies in an interval.
 
     A little too much, never too little, but for what `Way.exact` excepts; None if there are none.

@@ -21,7 +21,7 @@ import shapely
 from scenicq.forest.nodes import Constant, Identity, Leaf, Normal, PointIn, Range, TruncatedNormal, Value
 from scenicq.geometry.proximity import meets, witness_point
 from scenicq.geometry.regions import Region
-from scenicq.match.linear.affine_forms import Affine, AffineVector, Variable
+from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis
 from scenicq.match.tolerance import ROUNDING, Margin
 
 __all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position"]
@@ -161,7 +161,7 @@ def reach_position(
 
 def _cut(
     form: AffineVector,
-    scalars: list[Variable],
+    scalars: list[VariableAxis],
     limits: list[tuple[float, float] | None],
     observed: tuple[float, float],
     margin: Margin,
@@ -180,7 +180,7 @@ def _cut(
     return [*limits[: free[0]], (max(low, -size), min(high, size)), *limits[free[0] + 1 :]]
 
 
-def _offset(form: AffineVector, variables: list[Variable], values: tuple[float, ...]) -> tuple[float, float]:
+def _offset(form: AffineVector, variables: list[VariableAxis], values: tuple[float, ...]) -> tuple[float, float]:
     given = dict(zip(variables, values, strict=True))
     x, y = (part.constant + sum(part.terms.get(v, 0.0) * value for v, value in given.items()) for part in form)
     return x, y
@@ -189,7 +189,7 @@ def _offset(form: AffineVector, variables: list[Variable], values: tuple[float, 
 def _from_region(
     form: AffineVector,
     leaf: PointIn,
-    scalars: list[Variable],
+    scalars: list[VariableAxis],
     corners: list[tuple[float, ...]],
     observed: tuple[float, float],
     margin: Margin,
@@ -229,7 +229,7 @@ def _from_region(
 
 def _solve(
     form: AffineVector,
-    scalars: list[Variable],
+    scalars: list[VariableAxis],
     limits: list[tuple[float, float]],
     target: tuple[float, ...],
     point: tuple[Identity, tuple[float, float]] | None = None,

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.match.decide.compiled_expressions import Column, Columns, Get, UnclearError
+from scenicq.match.decide.compiled_expressions import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
@@ -38,7 +38,7 @@ _MORE_DECISIONS = 16
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 T = TypeVar("T")
-Values: TypeAlias = "Value | Column | list[Value]"
+Values: TypeAlias = "Value | FloatColumn | list[Value]"
 """Of many labels: one each, or the one that all have."""
 
 
@@ -244,7 +244,7 @@ class _Batch:
 
         return get
 
-    def _column(self, index: int, name: str) -> Column | tuple[Column, Column]:
+    def _column(self, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
         """The values of a property of the label objects that play an object."""
         rank = self.fit.ranks[index]
         objects = [row.label_object(numbers[rank]) for row, numbers in zip(self.rows, self.numbers, strict=True)]
@@ -264,14 +264,14 @@ def _with_first_free(taken: tuple[int, ...], options: Sequence[int]) -> tuple[in
     return ()
 
 
-def _kept(values: Values, mask: NDArray[np.bool_], kept: Sequence[bool]) -> Column | list[Value]:
+def _kept(values: Values, mask: NDArray[np.bool_], kept: Sequence[bool]) -> FloatColumn | list[Value]:
     """The values of some of the labels."""
     return (
         values[mask] if isinstance(values, np.ndarray) else list(itertools.compress(_listed(values, len(kept)), kept))
     )
 
 
-def _listed(values: Column | Sequence[T] | T, size: int) -> list[T]:
+def _listed(values: FloatColumn | Sequence[T] | T, size: int) -> list[T]:
     if isinstance(values, np.ndarray):
         return cast("list[T]", values.tolist())
     return cast("list[T]", values) if isinstance(values, list) else [cast(T, values)] * size
