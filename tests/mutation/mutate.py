@@ -2,9 +2,9 @@
 
 A survey comes first: all fast tests that may notice are run once without a change, and which of them runs which line
 is kept. Each change is then made in a copy of the package, and the tests that run its line are run against it, the
-cheapest first, as many as cost half a minute without a change. A run that takes much longer than without a change counts as
-noticed, for a change may make a loop endless. Survivors are printed to be read. In the end the tests that have noticed
-something are run without a change once more: they must pass.
+cheapest first, as many as cost half a minute without a change. A run that takes much longer than without a change
+counts as noticed, for a change may make a loop endless. Survivors are printed to be read. In the end the tests that
+have noticed something are run without a change once more: they must pass.
 """
 
 import argparse
