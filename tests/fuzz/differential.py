@@ -38,6 +38,8 @@ from random_programs import compose
 STREET = street()
 PATIENCE_S = 3.0
 """For one label."""
+DRAWING_S = 1.0
+"""For one scene."""
 PROCESSES_EVERY = 20
 """How often two processes are tried: they take as long to start as all else."""
 
@@ -78,7 +80,7 @@ def labels_of(text: str, chance: random.Random) -> list[Label]:
     """
     scenario = compile_scenario(Source("random.scenic", text), STREET)
     found: list[Label] = []
-    for label in drawn_labels(scenario, 2, chance.randrange(2**32))[0]:
+    for label in drawn_labels(scenario, 2, chance.randrange(2**32), DRAWING_S)[0]:
         for far in (0.0, 0.4, 3.0):
             one = shuffled(label, chance, 2)
             things = [_pushed(each, far, chance) for each in (one.ego, *one.objects)]
