@@ -30,10 +30,14 @@ class Round:
     def _end(self, *_: object) -> None:
         self._asked = True
 
-    def goes_on(self) -> bool:
-        """Whether there is another run; prints the figures every ten minutes and after the last run."""
+    def goes_on(self, more: bool = True) -> bool:
+        """Whether there is another run; prints the figures every ten minutes and after the last run.
+
+        Args:
+            more: Whether there is anything left to do.
+        """
         now = time.monotonic()
-        over = self._asked or now >= self._until
+        over = not more or self._asked or now >= self._until
         if over or now >= self._told + TOLD_EVERY_S:
             self._told = now
             most = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
