@@ -41,7 +41,7 @@ test: $(READY) ## All tests but the slow ones
 
 test-all: $(READY) ## All tests
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev,notebook]'
-	$(PYTEST) -n $(WORKERS)
+	$(PYTEST) -n $(WORKERS) --hypothesis-profile=anew
 
 golden: $(READY) ## Rewrite the golden files that tests compare with
 	$(PYTEST) --update-golden -m 'not slow'

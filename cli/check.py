@@ -76,7 +76,7 @@ def networks_of(
 
 
 def _told(scenario: Scenario) -> str:
-    roles = ", ".join(f"{thing.name}: {thing.category}" for thing in scenario.objects)
+    roles = ", ".join(f"{owner.name}: {owner.category}" for owner in scenario.objects)
     written = sum(requirement.built_in is None for requirement in scenario.requirements)
     soft = f" and {len(scenario.soft)} soft" if scenario.soft else ""
     return (

@@ -16,7 +16,7 @@ from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema
 
 from .report import CONTROL as _CONTROL
 from .report import plain
-from .table import Table, Text
+from .table import Table, TextStream
 
 __all__ = ["FORMATS", "Writer", "make_writer", "safe_cell"]
 
@@ -67,7 +67,7 @@ class Writer(Protocol):
 class _Lines:
     """One line a result: JSON, or the name of a frame, or the recording and start of an interval, that matches."""
 
-    def __init__(self, text: Text, line: Callable[[Mapping[str, Any]], str | None]) -> None:
+    def __init__(self, text: TextStream, line: Callable[[Mapping[str, Any]], str | None]) -> None:
         self._text, self._line = text, line
 
     def write(self, record: Mapping[str, Any]) -> None:
@@ -107,7 +107,7 @@ def safe_cell(value: Any) -> Any:
 
 
 class _Csv:
-    def __init__(self, text: Text, names: tuple[str, ...]) -> None:
+    def __init__(self, text: TextStream, names: tuple[str, ...]) -> None:
         self._text, self._names = text, names
         self._rows = csv.DictWriter(text, names, lineterminator="\n")
         self._rows.writeheader()
@@ -169,7 +169,7 @@ def make_writer(
     names = _INTERVAL_COLUMNS if over_time else _COLUMNS
     if name == "parquet":
         return _Parquet(sink, roles(), origin, ranked=ranked, over_time=over_time)
-    text = Text(sink)
+    text = TextStream(sink)
     match name:
         case "table":
             return Table(text, shorten, over_time=over_time)

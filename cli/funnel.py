@@ -22,7 +22,7 @@ def _steps(query: Query) -> list[tuple[str, str]]:
     return [
         (f"{funnel.frames:,}", f"frames{stopped}"),
         (f"{funnel.candidates:,}", filtered),
-        *(_over_time(funnel) or [(f"{funnel.cast:,}", "with a label object for every role")]),
+        *(_over_time(funnel) or [(f"{funnel.with_roles:,}", "with a label object for every role")]),
         (f"{funnel.matches:,}", "matches"),
         (f"{funnel.unknowns:,}", f"unknown{f': {reasons}' if reasons else ''}"),
     ]

@@ -167,6 +167,8 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
     check_combination(ctx, together)
     source, target, model = given_program(ctx, program, scenario, dataset)
     options = query_options({**given, "model": model})
+    if chosen == "ids" and not (report or export or rank or sample or shard or engine or resume or options.all_matches):
+        options = replace(options, proofs=False)
     if deadline is not None:
         options = replace(options, until=time.time() + deadline)
     query = Query(open_checked(target), source, options)

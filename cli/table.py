@@ -11,7 +11,7 @@ import click
 
 from .report import columns, moment, plain
 
-__all__ = ["Table", "Text", "fitted"]
+__all__ = ["Table", "TextStream", "fitted"]
 
 _INTERVAL_HEAD = ("RECORDING", "START", "SECONDS", "VERDICT", "OBJECTS", "FRAMES")
 _HEAD = ("FRAME", "RECORDING", "TIME", "VERDICT", "OBJECTS", "SENSOR")
@@ -26,7 +26,7 @@ _NARROWEST = 12
 Row = tuple[str, ...]
 
 
-class Text:
+class TextStream:
     """Text as UTF-8 on a stream that somebody else closes."""
 
     def __init__(self, sink: BinaryIO) -> None:
@@ -50,7 +50,7 @@ class Table:
     """Aligned columns for a terminal; a block of rows at a time."""
 
     def __init__(
-        self, text: Text, shorten: Callable[[], Callable[[str], str]] | None = None, *, over_time: bool = False
+        self, text: TextStream, shorten: Callable[[], Callable[[str], str]] | None = None, *, over_time: bool = False
     ) -> None:
         """Take where to write.
 

@@ -16,14 +16,8 @@ README = (LIBRARY / "README.md").read_text()
 PASSES = ("forest/", "match/", "query/prefilter/")
 """Where expressions are gone through. Syntax and compiler recurse over the program's text, which the parser limits."""
 RECURSIVE = {
-    "forest/angle_wrap.py": "a stated number of angles inside each other",
-    "forest/containment_pruning.py": "unions of regions, which the compiler flattens",
-    "match/decide/cascade.py": "the discrete variables of a group, at most a stated number of them",
-    "match/decide/decomposition.py": "each part has fewer variables, each case one choice less",
-    "match/fields/field_solver.py": "once: without a shared number",
-    "match/linear/linear_relaxation.py": "the alternatives of a linear program",
-    "query/prefilter/conditions.py": "intersections of regions",
-    "query/prefilter/regions.py": "unions of regions",
+    "match/decide/cascade.py": "the discrete variables and truth values of a group, at most a stated number of them",
+    "match/decide/decomposition.py": "each part has fewer constraints, or fewer distances of hidden points",
 }
 """Files with functions that call themselves, and what bounds the depth."""
 DATASETS = re.compile(r"nuscenes|argoverse|waymo|lyft|kitti|interaction dataset|boston", re.IGNORECASE)
@@ -130,6 +124,26 @@ def test_the_core_knows_no_dataset():
 
 def test_the_matcher_is_a_page():
     assert len((LIBRARY / "match" / "matcher.py").read_text().splitlines()) <= MOST_LINES
+
+
+def public_types(file: Path) -> Iterator[str]:
+    """Names of the classes and type aliases of a file that others may import."""
+    for node in tree(file).body:
+        match node:
+            case ast.ClassDef(name=name) if not name.startswith("_"):
+                yield name
+            case ast.AnnAssign(target=ast.Name(id=name), annotation=ast.Name(id="TypeAlias")) if name[0] != "_":
+                yield name
+            case _:
+                pass
+
+
+def test_a_type_has_its_name_alone():
+    found: dict[str, list[str]] = {}
+    for file in (*FILES, *sorted((ROOT / "cli").rglob("*.py"))):
+        for name in public_types(file):
+            found.setdefault(name, []).append(file.relative_to(ROOT).as_posix())
+    assert {name: files for name, files in found.items() if len(files) > 1} == {}
 
 
 def test_every_path_that_the_map_names_exists():

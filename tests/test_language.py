@@ -149,12 +149,12 @@ def test_every_code_that_a_program_can_cause_is_shown() -> None:
 
 def test_every_construct_of_the_grammar_is_shown() -> None:
     """Each kind of statement, expression and specifier occurs in some block that is read."""
-    shown: set[type[scenic.Node]] = set()
+    shown: set[type[scenic.SyntaxNode]] = set()
     for block in BLOCKS:
         with suppress(ScenarioError):
             shown |= {type(node) for node in walk(*parse(Source(block.page, block.text), block.version).body)}
-    kinds = {kind for kind in vars(scenic).values() if isinstance(kind, type) and issubclass(kind, scenic.Node)}
-    assert kinds - {scenic.Node} == shown
+    kinds = {kind for kind in vars(scenic).values() if isinstance(kind, type) and issubclass(kind, scenic.SyntaxNode)}
+    assert kinds - {scenic.SyntaxNode} == shown
 
 
 def test_the_table_lists_every_page_and_real_codes_only() -> None:

@@ -28,7 +28,7 @@ def assign(run: Runner, target: ast.Expression, value: ModelValue, scope: Enviro
             run.name_value(target.id, value, scope, target.span)
         case ast.Tuple() | ast.List():
             _assign_each(run, target.items, items_of(run, value, target.span), scope, target.span)
-        case ast.Subscript(index=index) if not isinstance(index, ast.Slice):
+        case ast.Subscript(index=index) if not isinstance(index, ast.SubscriptSlice):
             holder = run.evaluate(target.value, scope)
             if not isinstance(holder, list | dict):
                 raise fail("wrong-type", f"an item of {describe(holder)} cannot be set", target.span)
@@ -37,7 +37,7 @@ def assign(run: Runner, target: ast.Expression, value: ModelValue, scope: Enviro
                 cast(Any, holder)[hashed(place, target.span) if isinstance(holder, dict) else place] = value
             except (IndexError, TypeError):
                 raise fail("runtime-error", "there is no item with this index", target.span) from None
-        case ast.Subscript() | ast.Slice() | ast.Starred():
+        case ast.Subscript() | ast.SubscriptSlice() | ast.Starred():
             raise fail("unsupported-construct", "this cannot be assigned to", target.span, "not a name",
                        ("make a new list",))  # fmt: skip
         case _:

@@ -62,7 +62,7 @@ def define_class(run: _Definer, node: ast.ClassDef, scope: Environment) -> Sceni
                 definitions[name] = PropertyDefinition(
                     name, line.value, lambda _: None, needs, line.modifiers, scope, scope.library, line.span
                 )
-            case ast.ExpressionStatement(value=ast.Constant()) | ast.Pass():
+            case ast.ExpressionStatement(value=ast.LiteralValue()) | ast.Pass():
                 continue
             case ast.FunctionDef(name="__init__"):
                 raise fail("unsupported-construct", "a constructor is not supported", line.name_span, "runs Python",
@@ -115,7 +115,7 @@ def _needs(value: ast.Expression) -> frozenset[str]:
             found.add("position")
         if isinstance(node, tuple):
             stack.extend(cast("tuple[Any, ...]", node))
-        elif isinstance(node, ast.Node):
+        elif isinstance(node, ast.SyntaxNode):
             stack.extend(getattr(node, name) for name in node.__dataclass_fields__ if name != "span")
     return frozenset(found)
 

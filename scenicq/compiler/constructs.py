@@ -51,7 +51,7 @@ def construct(
             return run.make_instance(node, scope)
         case ast.Deg():
             return lift(lambda v: operators.degrees(v, span), value(node.value))
-        case ast.Vector():
+        case ast.VectorOperator():
             return lift(lambda x, y: to_vector((x, y), span), value(node.x), value(node.y))
         case ast.FieldAt():
             run.budget.step(span, run.budget.LOOK_UP_STEPS)
@@ -96,7 +96,7 @@ def _measure(
             return _apply(
                 span, lambda t, o: operators.apparent_heading(t, o, span), value(node.target), origin(node.origin)
             )
-        case ast.Distance():
+        case ast.DistanceOperator():
             run.budget.step(span, run.budget.LOOK_UP_STEPS)
             return _apply(span, lambda t, o: operators.distance_to(t, o, span), value(node.target), origin(node.origin))
         case ast.DistancePast():
@@ -107,7 +107,7 @@ def _measure(
             return _apply(span, lambda t, o: operators.angle_to(t, o, span), value(node.target), origin(node.origin))
         case ast.CanSee():
             return _apply(span, lambda v, t: operators.can_see(v, t, span), value(node.viewer), value(node.target))
-        case ast.Intersects():
+        case ast.IntersectsOperator():
             return _apply(span, lambda a, b: operators.intersects(a, b, span), value(node.left), value(node.right))
         case ast.Visible() | ast.VisibleFrom():
             viewer = run.ego(span) if isinstance(node, ast.Visible) else value(node.viewer)
@@ -124,7 +124,7 @@ def _measure(
             # the scene that is matched is the initial one
             run.dynamic("initial scenario", span)
             return True
-        case ast.Temporal() | ast.Until():
+        case ast.Temporal() | ast.UntilOperator():
             raise fail("unsupported-construct", f"`{span.text}` is not supported", span,
                        "does not describe one instant",
                        ("a scene is matched at one instant: state what holds then",))  # fmt: skip

@@ -18,31 +18,31 @@ from scenicq.geometry import shapes
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.network import Network
 
-__all__ = ["LOOKUPS", "Entry", "Lookups", "Table", "own"]
+__all__ = ["LOOKUPS", "LookupEntry", "LookupTable", "Lookups", "own"]
 
-Entry: TypeAlias = tuple[NetworkElement, "NetworkElement | None", NetworkElement]
+LookupEntry: TypeAlias = tuple[NetworkElement, "NetworkElement | None", NetworkElement]
 """An element whose area counts, the one found there, and the one it is found for: at a point once for each of these."""
 
 
-def own(elements: Iterable[NetworkElement]) -> list[Entry]:
+def own(elements: Iterable[NetworkElement]) -> list[LookupEntry]:
     """Elements that are found in their own area."""
     return [(element, element, element) for element in elements]
 
 
-def _lane_groups(network: Network) -> list[list[Entry]]:
+def _lane_groups(network: Network) -> list[list[LookupEntry]]:
     return [[(lane, lane.group, lane) for lane in network.lanes], own(network.laneGroups)]
 
 
-def _roads(network: Network) -> list[list[Entry]]:
+def _roads(network: Network) -> list[list[LookupEntry]]:
     return [[(lane, lane.road, lane) for lane in network.lanes], own(network.allRoads)]
 
 
-def _lane_sections(network: Network) -> list[list[Entry]]:
+def _lane_sections(network: Network) -> list[list[LookupEntry]]:
     """The sections of lanes, each with what of its lane lies within the tolerance of it and in none of them.
 
     Scenic looks for the lane first, which holds more points than its sections where cracks are between these.
     """
-    found: list[Entry] = []
+    found: list[LookupEntry] = []
     for lane in network.lanes:
         found += [(section, section, lane) for section in lane.sections]
         cracks = shapes.difference(lane.polygon, shapes.union_all([section.polygon for section in lane.sections]))
@@ -53,7 +53,7 @@ def _lane_sections(network: Network) -> list[list[Entry]]:
     return [found]
 
 
-def _elements(network: Network) -> list[list[Entry]]:
+def _elements(network: Network) -> list[list[LookupEntry]]:
     kinds: tuple[Sequence[NetworkElement], ...] = (
         network.intersections, network.allRoads, network.lanes, network.shoulders, network.sidewalks,
         network.crossings,
@@ -61,7 +61,7 @@ def _elements(network: Network) -> list[list[Entry]]:
     return [own(kind) for kind in kinds]
 
 
-LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[Entry]]]]] = {
+LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[LookupEntry]]]]] = {
     "laneAt": ("lane", lambda network: [own(network.lanes)]),
     "laneSectionAt": ("lane", _lane_sections),
     "laneGroupAt": ("lane", _lane_groups),
@@ -75,17 +75,17 @@ LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[Entry]]]]] = {
 """The look-ups of the network: which ranks they share, and the elements in the order in which they count."""
 
 
-class Table:
+class LookupTable:
     """The elements that one look-up may give, and where each lies."""
 
-    def __init__(self, name: str, family: str, layers: list[list[Entry]]) -> None:
+    def __init__(self, name: str, family: str, layers: list[list[LookupEntry]]) -> None:
         found = (element for layer in layers for _, element, _ in layer if element is not None)
         self.family = family
         self.options: tuple[NetworkElement, ...] = tuple(dict.fromkeys(found))
         numbers = {element: number for number, element in enumerate(self.options)}
         nothing = len(self.options)
 
-        def places(layer: list[Entry]) -> Layer:
+        def places(layer: list[LookupEntry]) -> Layer:
             owners = {owner: number for number, owner in enumerate(dict.fromkeys(owner for _, _, owner in layer))}
             return tuple(
                 (part, nothing if element is None else numbers[element], owners[owner])
@@ -108,19 +108,19 @@ class Lookups:
 
     def __init__(self) -> None:
         """Start with none."""
-        self.tables: dict[object, Table] = {}
+        self.tables: dict[object, LookupTable] = {}
         self.indices: dict[tuple[object, object], Node] = {}
         self.ranks: dict[tuple[str, object], Index] = {}
         self.known: dict[tuple[int, str], Constant | None] = {}
         self._kept: list[Node] = []
 
-    def table(self, key: object, name: str, family: str, layers: Callable[[], list[list[Entry]]]) -> Table:
+    def table(self, key: object, name: str, family: str, layers: Callable[[], list[list[LookupEntry]]]) -> LookupTable:
         """The table of a look-up, made once."""
         if key not in self.tables:
-            self.tables[key] = Table(name, family, layers())
+            self.tables[key] = LookupTable(name, family, layers())
         return self.tables[key]
 
-    def index(self, key: object, table: Table, place: Node, span: Span) -> Node:
+    def index(self, key: object, table: LookupTable, place: Node, span: Span) -> Node:
         """Which option lies at a random place."""
         where = (place.object, place.property) if isinstance(place, Feature) else id(place)
         if (key, where) not in self.indices:
@@ -128,7 +128,7 @@ class Lookups:
             self.indices[key, where] = self._make_index(table, place, where, span)
         return self.indices[key, where]
 
-    def _make_index(self, table: Table, place: Node, where: object, span: Span) -> Node:
+    def _make_index(self, table: LookupTable, place: Node, where: object, span: Span) -> Node:
         options = table.occupancy
         scale = build.constant(float(options.scale), span)
 

@@ -149,7 +149,7 @@ def _items(run: Runner, nodes: Iterable[ast.Expression], scope: Environment) -> 
     return items
 
 
-def _compare_chain(run: Runner, node: ast.Compare, scope: Environment) -> ModelValue:
+def _compare_chain(run: Runner, node: ast.ComparisonChain, scope: Environment) -> ModelValue:
     left = evaluate(run, node.left, scope)
     results: list[ModelValue] = []
     for comparison in node.comparisons:
@@ -196,7 +196,7 @@ def evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelValu
     return value
 
 
-_MAKERS = (ast.Call, ast.BinaryOp, ast.Subscript, ast.List, ast.Tuple, ast.Comprehension, ast.Compare)
+_MAKERS = (ast.Call, ast.BinaryOp, ast.Subscript, ast.List, ast.Tuple, ast.Comprehension, ast.ComparisonChain)
 """Expressions that make a new value of some length, or go through one."""
 
 
@@ -209,7 +209,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             if node.id == "globalParameters" and scope.find(node.id) is None:
                 return Module("globalParameters", {name: given[0] for name, given in run.params.items()})
             return scope.get(node.id, span)
-        case ast.Constant():
+        case ast.LiteralValue():
             if isinstance(node.value, complex | bytes | type(...)):
                 raise fail("unsupported-construct", "a literal of this kind is not supported", span)
             return node.value if not isinstance(node.value, str) else checked_text(node.value, span)
@@ -222,7 +222,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             return lift(lambda a, b: binary(node.operator, a, b, span), left, right)
         case ast.UnaryOp():
             return lift(lambda value: _unary(node.operator, value, span), evaluate(run, node.operand, scope))
-        case ast.Compare():
+        case ast.ComparisonChain():
             return _compare_chain(run, node, scope)
         case ast.BoolOp():
             return connected(run, node, scope)
@@ -239,7 +239,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             return _dictionary(run, node, scope)
         case ast.Subscript():
             value = evaluate(run, node.value, scope)
-            if isinstance(node.index, ast.Slice):
+            if isinstance(node.index, ast.SubscriptSlice):
                 parts = (node.index.lower, node.index.upper, node.index.step)
                 ends = [None if part is None else evaluate(run, part, scope) for part in parts]
                 return subscript(run, value, slice(*ends), span)
@@ -264,7 +264,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             value = evaluate(run, node.value, scope)
             assign_around(run, node.target, value, scope)
             return value
-        case ast.Slice() | ast.Starred() | ast.UnsupportedExpression():
+        case ast.SubscriptSlice() | ast.Starred() | ast.UnsupportedExpression():
             raise fail("unsupported-construct", f"`{span.text.split()[0]}` is not supported here", span)
         case _:
             return construct(run, node, scope, lambda part: evaluate(run, part, scope))

@@ -29,7 +29,7 @@ from scenicq.compiler.known_properties import decided
 from scenicq.compiler.logic import condition
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition
 from scenicq.compiler.placing import Surroundings, bind
-from scenicq.compiler.requirements import Requirement, requirement
+from scenicq.compiler.requirements import RequireStatement, requirement
 from scenicq.compiler.scoping import own_names
 from scenicq.compiler.specifiers import construct
 from scenicq.compiler.temporal import TimedStatements
@@ -93,7 +93,7 @@ class Interpreter:
     network: Network
     budget: Budget = field(default_factory=Budget)
     objects: list[Instance] = field(default_factory=list[Instance])
-    requirements: list[Requirement] = field(default_factory=list[Requirement])
+    requirements: list[RequireStatement] = field(default_factory=list[RequireStatement])
     params: dict[str, tuple[ModelValue, Span, bool]] = field(default_factory=dict[str, Any])
     excluded: Exclusions = field(default_factory=Exclusions)
     lookups: Lookups = field(default_factory=Lookups)
@@ -140,7 +140,7 @@ class Interpreter:
 
     def demand(self, condition: Callable[[], Node], span: Span) -> None:
         """Require a condition; see `specifiers.Evaluator`."""
-        self.requirements.append(Requirement(condition, span))
+        self.requirements.append(RequireStatement(condition, span))
 
     def call_function(
         self, function: Function, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span

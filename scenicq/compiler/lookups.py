@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import cast
 
 from scenicq.compiler.coerce import to_vector
-from scenicq.compiler.element_lookups import LOOKUPS, Table, own
+from scenicq.compiler.element_lookups import LOOKUPS, LookupTable, own
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.known_properties import settled
 from scenicq.compiler.values import Choice, ModelValue, fail
@@ -60,7 +60,7 @@ def among(
 def _at(
     run: Runner,
     key: object,
-    table: Table,
+    table: LookupTable,
     point: ModelValue,
     reject: ModelValue,
     span: Span,

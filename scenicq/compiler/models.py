@@ -75,7 +75,7 @@ _ROAD_TYPES: dict[str, ModelValue] = {"ManeuverType": MANEUVER_TYPES, **{cls.__n
 
 
 @cache
-def library_text(name: str) -> ast.Module:
+def library_text(name: str) -> ast.Program:
     """The syntax of one of the library's files."""
     text = resources.files("scenicq.compiler").joinpath("library", f"{name}.scenic").read_text(encoding="utf-8")
     return parse(Source(f"<{name}.scenic>", text), 3)
@@ -161,6 +161,6 @@ def plain_module(name: str, span: Span) -> Module:
                         "a scenario never imports Python code: write what it needs in Scenic"))  # fmt: skip
 
 
-def library_texts() -> tuple[ast.Module, ...]:
+def library_texts() -> tuple[ast.Program, ...]:
     """The syntax of all of the library's files."""
     return tuple(library_text(name) for name in dict.fromkeys(file for files in _LIBRARIES.values() for file in files))

@@ -58,7 +58,7 @@ class _Graph:
 
     def test(self, condition: ast.Expression, then: int, otherwise: int) -> int:
         """Add a test, or nothing where the condition is `True` or `False` in the text."""
-        if isinstance(condition, ast.Constant) and isinstance(condition.value, bool):
+        if isinstance(condition, ast.LiteralValue) and isinstance(condition.value, bool):
             return then if condition.value else otherwise
         return self.add(Test(self.timed.atom(self.deferred(condition)), then, otherwise))
 
@@ -71,7 +71,7 @@ class _Graph:
     def statement(self, node: ast.Statement, then: int, loop: _Loop | None) -> int:
         """Add a statement after which a step follows; the number of its first step."""
         match node:
-            case ast.Pass() | ast.ExpressionStatement(value=ast.Constant()):
+            case ast.Pass() | ast.ExpressionStatement(value=ast.LiteralValue()):
                 return then
             case ast.DynamicStatement(kind="wait"):
                 return self.add(Wait(then))

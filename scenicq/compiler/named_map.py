@@ -48,7 +48,7 @@ def named_map(source: Source, version: int | None = None) -> NamedMap | None:
 
 def _file(value: ast.Expression) -> str | None:
     match value:
-        case ast.Constant(value=str(file)):
+        case ast.LiteralValue(value=str(file)):
             return file
         case ast.Call(function=ast.Name(id="localPath"), arguments=(ast.Argument(name=None, star="", value=inner),)):
             return _file(inner)

@@ -28,7 +28,7 @@ from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.regions import SLACK
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["TOLERANCE", "Layer", "Occupancy", "Place", "Ranked"]
+__all__ = ["TOLERANCE", "Layer", "Occupancy", "OptionArea", "Ranked"]
 
 TOLERANCE = 0.05
 """Metres beside an element that still count as in it where no element holds a point (Scenic's `tolerance`)."""
@@ -37,9 +37,9 @@ _OVERLAP = 1e-6
 _KEPT = 4096
 _KEPT_CELLS = 16
 
-Place: TypeAlias = tuple[Shape, int, int]
+OptionArea: TypeAlias = tuple[Shape, int, int]
 """An area, the number of the option that is found in it, and whose area it is: an owner is found once at a point."""
-Layer: TypeAlias = tuple[Place, ...]
+Layer: TypeAlias = tuple[OptionArea, ...]
 Corners: TypeAlias = NDArray[np.float64]
 
 

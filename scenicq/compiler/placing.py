@@ -278,7 +278,7 @@ def bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Bound
     if isinstance(node, ast.WithSpecifier):
         return _with(node, evaluate(node.value), around)
     parts = [getattr(node, name) for name in node.__dataclass_fields__]
-    values = {id(part): evaluate(cast(ast.Expression, part)) for part in parts if isinstance(part, ast.Node)}
+    values = {id(part): evaluate(cast(ast.Expression, part)) for part in parts if isinstance(part, ast.SyntaxNode)}
     bound = _bind_each(node, values, around)
     return _as_parent(bound) if around.version == 3 and "heading" in bound.optionally else bound
 

@@ -124,12 +124,12 @@ def _start(source: Source) -> Span:
     return Span(source, 0, min(1, len(source.text)))
 
 
-def _imports(module: ast.Module) -> bool:
+def _imports(module: ast.Program) -> bool:
     """Whether a program brings in anything itself."""
     return any(isinstance(node, _IMPORTS) for node in walk(*module.body))
 
 
-def _left_out(module: ast.Module, version: int) -> str | None:
+def _left_out(module: ast.Program, version: int) -> str | None:
     """The library that an early program needs without importing any; None where it imports one."""
     if version == 3 or _imports(module):
         return None
@@ -137,7 +137,7 @@ def _left_out(module: ast.Module, version: int) -> str | None:
 
 
 def _borrowed(
-    module: ast.Module, scope: Environment, names: dict[str, ModelValue], library: str | None
+    module: ast.Program, scope: Environment, names: dict[str, ModelValue], library: str | None
 ) -> tuple[Diagnostic, ...]:
     """A warning where names come from a library that the program does not import."""
     for node in walk(*module.body):
@@ -224,7 +224,7 @@ def _module(_: Span, name: str, names: dict[str, ModelValue], call: ModelValue =
     return Module(name, names, call=call)
 
 
-def _no_ego(run: Interpreter, module: ast.Module, version: int) -> ScenarioError:
+def _no_ego(run: Interpreter, module: ast.Program, version: int) -> ScenarioError:
     for found in run.ignored:
         if found.span is not None and found.span.text.startswith(("scenario", "setup")):
             return fail("no-ego", "the program defines no ego outside of its dynamic parts", found.span,
@@ -236,7 +236,7 @@ def _no_ego(run: Interpreter, module: ast.Module, version: int) -> ScenarioError
 
 
 def _scenario(
-    run: Interpreter, module: ast.Module, version: int, network: Network, warnings: tuple[Diagnostic, ...]
+    run: Interpreter, module: ast.Program, version: int, network: Network, warnings: tuple[Diagnostic, ...]
 ) -> Scenario:
     if run.current_ego is None:
         raise _no_ego(run, module, version)

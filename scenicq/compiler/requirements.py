@@ -15,11 +15,11 @@ from scenicq.errors import Span
 from scenicq.forest.nodes import Node
 from scenicq.syntax import ast
 
-__all__ = ["Requirement", "Requirer", "deferred", "requirement"]
+__all__ = ["RequireStatement", "Requirer", "deferred", "requirement"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Requirement:
+class RequireStatement:
     """A `require` statement: its condition, or what computes it once the ego is known."""
 
     condition: Callable[[], Node]
@@ -34,7 +34,7 @@ class Requirer(Runner, Protocol):
     timed: TimedStatements | None
 
 
-def requirement(run: Requirer, node: ast.Require, scope: Environment) -> Requirement | None:
+def requirement(run: Requirer, node: ast.Require, scope: Environment) -> RequireStatement | None:
     """The requirement that a statement makes; None where it is about time and ignored.
 
     Raises:
@@ -47,12 +47,12 @@ def requirement(run: Requirer, node: ast.Require, scope: Environment) -> Require
             lambda expression: deferred(run, expression, scope, node.span), wanted, node.span, probability
         )
         return None
-    if isinstance(wanted, ast.Temporal | ast.Until):
+    if isinstance(wanted, ast.Temporal | ast.UntilOperator):
         run.dynamic(f"require {wanted.operator if isinstance(wanted, ast.Temporal) else 'until'}", wanted.span)
         if not (isinstance(wanted, ast.Temporal) and wanted.operator == "always"):
             return None
         wanted = wanted.operand
-    return Requirement(deferred(run, wanted, scope, node.span), node.span, probability)
+    return RequireStatement(deferred(run, wanted, scope, node.span), node.span, probability)
 
 
 def deferred(run: Requirer, wanted: ast.Expression, scope: Environment, span: Span) -> Callable[[], Node]:

@@ -12,7 +12,7 @@ def own_names(body: tuple[ast.Statement, ...]) -> frozenset[str]:
     """The names that statements bind in their own scope, not counting functions and classes inside."""
     found: set[str] = set()
     shared: set[str] = set()
-    stack: list[ast.Node] = list(body)
+    stack: list[ast.SyntaxNode] = list(body)
     while stack:
         node = stack.pop()
         match node:

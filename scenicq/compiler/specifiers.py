@@ -17,7 +17,7 @@ from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, Sc
 from scenicq.errors import Note, Span
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Constant, DirectionAt, Feature, Index, Node
 
-__all__ = ["BoundSpecifier", "Evaluator", "construct"]
+__all__ = ["BoundSpecifier", "SpecifierEvaluator", "construct"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +49,7 @@ class BoundSpecifier:
     perhaps: bool = False
 
 
-class Evaluator(Protocol):
+class SpecifierEvaluator(Protocol):
     """What construction asks of the interpreter."""
 
     def default(self, definition: PropertyDefinition, instance: Instance) -> ModelValue:
@@ -61,7 +61,7 @@ class Evaluator(Protocol):
         ...
 
 
-def _default_specifier(name: str, chain: list[PropertyDefinition], evaluator: Evaluator) -> BoundSpecifier:
+def _default_specifier(name: str, chain: list[PropertyDefinition], evaluator: SpecifierEvaluator) -> BoundSpecifier:
     first = chain[0]
     additive = "additive" in first.modifiers
     used = chain if additive else chain[:1]
@@ -118,7 +118,7 @@ def _choose(specifiers: Iterable[BoundSpecifier]) -> dict[str, BoundSpecifier]:
 def construct(
     instance: Instance,
     specifiers: tuple[BoundSpecifier, ...],
-    evaluator: Evaluator,
+    evaluator: SpecifierEvaluator,
 ) -> None:
     """Fill an instance's properties (language paper, algorithm 1).
 

@@ -38,7 +38,7 @@ Deferred = Callable[[ast.Expression], Callable[[], Node]]
 
 def is_temporal(node: ast.Expression) -> bool:
     """Whether an expression has an operator of time."""
-    return any(isinstance(each, ast.Temporal | ast.Until) for each in walk(node))
+    return any(isinstance(each, ast.Temporal | ast.UntilOperator) for each in walk(node))
 
 
 @dataclass(eq=False)
@@ -110,7 +110,7 @@ class TimedStatements:
             case ast.Temporal():
                 operator = {"always": Always, "eventually": Eventually, "next": Next}[node.operator]
                 return operator(self._formula(deferred, node.operand))
-            case ast.Until():
+            case ast.UntilOperator():
                 return Until(self._formula(deferred, node.left), self._formula(deferred, node.right))
             case ast.Implies():
                 return Or((Not(self._formula(deferred, node.left)), self._formula(deferred, node.right)))

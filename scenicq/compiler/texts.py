@@ -41,7 +41,7 @@ def formatted(run: Runner, node: ast.FormattedString, scope: Environment) -> str
     """
     text: list[str] = []
     for part in node.parts:
-        if isinstance(part, ast.Constant):
+        if isinstance(part, ast.LiteralValue):
             text.append(checked_text(str(part.value), part.span))
             continue
         value = settled(run, run.evaluate(part.value, scope))

@@ -19,7 +19,7 @@ _SCALAR_PROPERTIES = frozenset(
 )
 
 
-def decide_version(module: ast.Module) -> int:
+def decide_version(module: ast.Program) -> int:
     """The version that a program is read as.
 
     Where several fit: a library of the 2019 paper or an interval decides for Scenic 1, a class that stands alone for
@@ -35,14 +35,14 @@ def decide_version(module: ast.Module) -> int:
     return max(possible)
 
 
-def _imports_first_library(module: ast.Module) -> bool:
+def _imports_first_library(module: ast.Program) -> bool:
     return any(
         isinstance(statement, ast.Import) and any(alias.path in FIRST_LIBRARIES for alias in statement.aliases)
         for statement in module.body
     )
 
 
-def _stands_alone(statement: ast.Node, module: ast.Module) -> bool:
+def _stands_alone(statement: ast.SyntaxNode, module: ast.Program) -> bool:
     """Whether a statement is a bare name, as in `Car` or `ego = Car`: only the early versions have a use for it."""
     match statement:
         case ast.ExpressionStatement(value=ast.Name()):
@@ -53,11 +53,11 @@ def _stands_alone(statement: ast.Node, module: ast.Module) -> bool:
             return False
 
 
-def _is_pair(node: ast.Node | None) -> bool:
+def _is_pair(node: ast.SyntaxNode | None) -> bool:
     return isinstance(node, ast.Tuple) and len(node.items) == 2 and node.span.text.startswith("(")
 
 
-def _has_interval(module: ast.Module) -> bool:
+def _has_interval(module: ast.Program) -> bool:
     """Whether a pair of numbers, or a name for one, stands where only a number can."""
     named = {
         target.id
@@ -77,7 +77,7 @@ def _has_interval(module: ast.Module) -> bool:
         return True
     named |= _given_pairs(module)
 
-    def interval(node: ast.Node | None) -> bool:
+    def interval(node: ast.SyntaxNode | None) -> bool:
         return _is_pair(node) or (isinstance(node, ast.Name) and node.id in named)
 
     return any(interval(part) for node in walk(*module.body) for part in _number_places(node)) or any(
@@ -86,7 +86,7 @@ def _has_interval(module: ast.Module) -> bool:
     )
 
 
-def _calls_first_library(module: ast.Module) -> bool:
+def _calls_first_library(module: ast.Program) -> bool:
     """Whether a function of the 2019 paper's library is given a pair, as in `createPlatoonAt(car, 6, dist=(2, 8))`."""
     return any(
         isinstance(call, ast.Call)
@@ -97,7 +97,7 @@ def _calls_first_library(module: ast.Module) -> bool:
     )
 
 
-def _given_pairs(module: ast.Module) -> set[str]:
+def _given_pairs(module: ast.Program) -> set[str]:
     """Parameters of the program's functions that some call gives a pair."""
     functions = {node.name: node.parameters for node in walk(*module.body) if isinstance(node, ast.FunctionDef)}
     found: set[str] = set()
@@ -113,10 +113,10 @@ def _given_pairs(module: ast.Module) -> set[str]:
     return found
 
 
-def _number_places(node: ast.Node) -> tuple[ast.Node | None, ...]:
+def _number_places(node: ast.SyntaxNode) -> tuple[ast.SyntaxNode | None, ...]:
     """The operands of a node that must be numbers."""
     match node:
-        case ast.Vector():
+        case ast.VectorOperator():
             return (node.x, node.y)
         case ast.Deg():
             return (node.value,)

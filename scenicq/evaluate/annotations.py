@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.store.dataset import Dataset
@@ -140,7 +141,11 @@ def read_annotations(
             "o.height, o.vx, o.vy, o.z, o.attributes FROM objects o JOIN numbered n ON o.frame = n.frame "
             "ORDER BY n.number, o.ordinal"
         ).to_arrow_table()
-    return frames, _annotations(objects, points, groups)
+    annotations = _annotations(objects, points, groups)
+    del objects
+    # the pool keeps what the table took
+    pa.default_memory_pool().release_unused()
+    return frames, annotations
 
 
 def _annotations(objects: Any, points: tuple[str, ...], groups: tuple[str, ...]) -> Annotations:

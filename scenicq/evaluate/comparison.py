@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from scenicq.evaluate.resampling import (
     FEW,
-    Counts,
     Interval,
+    StratumCounts,
     effective_number,
     interval_of,
     rate_interval,
@@ -23,7 +23,7 @@ from scenicq.evaluate.resampling import (
 
 __all__ = [
     "DISTANCES_M",
-    "Comparison",
+    "ObjectComparison",
     "Share",
     "compare",
     "distance_names",
@@ -58,7 +58,7 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class ObjectComparison:
     """Objects in question against others.
 
     Attributes:
@@ -144,7 +144,7 @@ def compare(
     stratum: Numbers,
     weights: Reals,
     rng: np.random.Generator,
-) -> Comparison:
+) -> ObjectComparison:
     """Compare two groups of objects.
 
     Args:
@@ -163,9 +163,11 @@ def compare(
     def table(values: Bools) -> Reals:
         return _table(values.astype(np.float64), recording, stratum, shape)
 
-    counts = Counts(table(missed & mine), table(mine), table(missed & others), table(others))
+    counts = StratumCounts(table(missed & mine), table(mine), table(missed & others), table(others))
     used = (counts.of.sum(axis=0) > 0) | (counts.other_of.sum(axis=0) > 0)
-    counts = Counts(counts.missed[:, used], counts.of[:, used], counts.other_missed[:, used], counts.other_of[:, used])
+    counts = StratumCounts(
+        counts.missed[:, used], counts.of[:, used], counts.other_missed[:, used], counts.other_of[:, used]
+    )
     first, second = (float(values[0]) for values in rates(counts, np.ones((1, shape[0]))))
     many, many_others = rates(counts, weights)
     effective = effective_number(counts.of.sum(axis=1))
@@ -177,7 +179,7 @@ def compare(
     total = float(counts.of.sum())
     alike = float(counts.of[:, comparable].sum())
     both = min(effective, effective_others) if alike else 0.0
-    return Comparison(
+    return ObjectComparison(
         about=about,
         share=Share(float(counts.missed.sum()), total, first, rate_interval(many, first, effective)),
         other=Share(

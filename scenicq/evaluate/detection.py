@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.annotations import Annotations, Frames, read_annotations
-from scenicq.evaluate.assignment import Centres, Pairs, assign, find_pairs
+from scenicq.evaluate.assignment import Centres, assign, find_pairs
 from scenicq.evaluate.ego_poses import EgoPoses
 from scenicq.evaluate.precision import ERRORS, Errors, box_errors
 from scenicq.evaluate.region_of_interest import RegionOfInterest
@@ -66,7 +67,7 @@ class Detection:
     object_class: Numbers
     prediction_class: Numbers
     frame: Numbers
-    owner: Mapping[float, NDArray[np.int64]]
+    owner: Mapping[float, Numbers]
     errors: Reals
     flat: bool
     distance: Reals
@@ -114,19 +115,14 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
     keep &= poses.away(predictions, frame, spatial=spatial) < limits[prediction_class]
     keep &= ~racks.hold(predictions.x, predictions.y, frame, prediction_class)
     order = np.flatnonzero(keep)
-    order = order[_by_score(predictions.score[order], last_first=protocol.last_first)]
+    order = order[_by_score(predictions.score[order], frame[order], last_first=protocol.last_first)]
     order = order[_first_of_each(frame[order], prediction_class[order], protocol)]
     if math.isfinite(protocol.roi_m):
         roi = RegionOfInterest(dataset, frames, protocol.roi_m)
         object_class[~roi.holds(objects, objects.frame)] = -1
         order = order[roi.holds(predictions.taken(order), frame[order])]
     predictions, frame, prediction_class = predictions.taken(order), frame[order], prediction_class[order]
-    pairs = _pairs(predictions, frame, prediction_class, objects, object_class, spatial=spatial)
-    rank = np.arange(len(frame))
-    owner = {
-        threshold: assign(pairs, rank, len(objects.frame), threshold, nearest_only=protocol.nearest_only)
-        for threshold in THRESHOLDS_M
-    }
+    owner = _owners(predictions, frame, prediction_class, objects, object_class, spatial=spatial)
     score: dict[float, Reals] = {}
     for threshold, mine in owner.items():
         score[threshold] = np.full(len(objects.frame), -math.inf)
@@ -290,11 +286,11 @@ class _Racks:
         return held
 
 
-def _by_score(score: Reals, *, last_first: bool) -> NDArray[np.int64]:
-    """The order of falling scores."""
+def _by_score(score: Reals, frame: Numbers, *, last_first: bool) -> NDArray[np.int64]:
+    """The order of falling scores; equal ones from the last to the first, or frame by frame."""
     if last_first:
         return np.argsort(score, kind="stable")[::-1]
-    return np.argsort(-score, kind="stable")
+    return np.lexsort((frame, -score))
 
 
 def _first_of_each(frame: Numbers, category: Numbers, protocol: Protocol) -> NDArray[np.int64]:
@@ -311,29 +307,45 @@ def _first_of_each(frame: Numbers, category: Numbers, protocol: Protocol) -> NDA
     return np.sort(order[place < protocol.most])
 
 
-def _pairs(
+def _owners(
     predictions: Predictions, frame: Numbers, category: Numbers, objects: Annotations, object_class: Numbers,
     *, spatial: bool,
-) -> Pairs:  # fmt: skip
-    counted = np.flatnonzero(object_class >= 0)
+) -> dict[float, Numbers]:  # fmt: skip
+    """The label object of each prediction at each centre distance, -1 without: some frames at a time."""
+    owner = {threshold: np.full(len(frame), -1, dtype=np.int32) for threshold in THRESHOLDS_M}
+    nearest_only = predictions.protocol.nearest_only
+    by_frame = np.argsort(frame, kind="stable")
+    frames = int(frame.max(initial=-1)) + 1
+    ends: list[int] = np.searchsorted(frame, np.arange(frames + 1), sorter=by_frame).tolist()
+    begin = 0
+    while begin < frames:
+        end = max(bisect_right(ends, ends[begin] + _AT_ONCE) - 1, begin + 1)
+        # in the order of falling scores again
+        mine = np.sort(by_frame[ends[begin] : ends[end]])
+        of_frames: NDArray[np.int64] = np.searchsorted(objects.frame, (begin, end))
+        counted = of_frames[0] + np.flatnonzero(object_class[of_frames[0] : of_frames[1]] >= 0)
+        pairs = find_pairs(
+            _centres(predictions, mine, frame, category[mine], spatial=spatial),
+            _centres(objects, counted, objects.frame, object_class[counted], spatial=spatial),
+            max(THRESHOLDS_M),
+            nearest_only=nearest_only,
+        )
+        for threshold, found in owner.items():
+            its = assign(pairs, np.arange(len(mine)), len(counted), threshold, nearest_only=nearest_only)
+            found[mine[its >= 0]] = counted[its[its >= 0]]
+        begin = end
+    return owner
 
-    found = find_pairs(
-        Centres(frame, category, predictions.x, predictions.y, predictions.z if spatial else None),
-        Centres(
-            objects.frame[counted],
-            object_class[counted],
-            objects.x[counted],
-            objects.y[counted],
-            objects.z[counted] if spatial else None,
-        ),
-        max(THRESHOLDS_M),
-        nearest_only=predictions.protocol.nearest_only,
-    )
-    return replace(found, object=counted[found.object])
+
+def _centres(
+    boxes: Predictions | Annotations, which: NDArray[np.int64], frame: Numbers, category: Numbers, *, spatial: bool
+) -> Centres:
+    z = boxes.z[which] if spatial else None
+    return Centres(frame[which], category, boxes.x[which], boxes.y[which], z)
 
 
 def _errors(
-    predictions: Predictions, objects: Annotations, owner: NDArray[np.int64], half_turn: Bools, frame: Numbers,
+    predictions: Predictions, objects: Annotations, owner: Numbers, half_turn: Bools, frame: Numbers,
     seen_from: EgoPoses | None, *, spatial: bool,
 ) -> Reals:  # fmt: skip
     """The errors of predictions that are label objects; headings are compared in the ego's frame, where it is given."""
@@ -341,7 +353,7 @@ def _errors(
     numbers = {name: number for number, name in enumerate(objects.attributes)}
     same = np.array([*(numbers.get(name, -2) for name in predictions.attributes), -2], dtype=np.int32)
 
-    def sizes(of: Predictions | Annotations, which: NDArray[np.int64]) -> Reals:
+    def sizes(of: Predictions | Annotations, which: NDArray[np.int64] | Numbers) -> Reals:
         return np.column_stack((of.width[which], of.length[which], of.height[which]))
 
     found = np.flatnonzero(owner >= 0)

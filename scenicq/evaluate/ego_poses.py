@@ -48,13 +48,12 @@ class EgoPoses:
 
     def on_map(self, frame: Numbers, ahead: Reals, left: Reals, up: Reals) -> tuple[Reals, Reals, Reals]:
         """Points of the egos' frames in that of the map."""
-        x, y, z = (
-            self._origin[:, frame]
-            + ahead * self._ahead[:, frame]
-            + left * self._left[:, frame]
-            + up * self._up[:, frame]
-        )
+        x, y, z = self._origin[:, frame] + self.turned(frame, ahead, left, up)
         return x, y, z
+
+    def turned(self, frame: Numbers, ahead: Reals, left: Reals, up: Reals) -> Reals:
+        """Directions of the egos' frames in that of the map, shape (3, n)."""
+        return ahead * self._ahead[:, frame] + left * self._left[:, frame] + up * self._up[:, frame]
 
     def heading_on_map(self, frame: Numbers, yaw: Reals) -> Reals:
         """The headings of what is turned by an angle from ahead, counter-clockwise, about the egos' own z axis."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.classes import ClassFigures, class_figures
-from scenicq.evaluate.comparison import DISTANCES_M, Comparison, compare, strata_of
+from scenicq.evaluate.comparison import DISTANCES_M, ObjectComparison, compare, strata_of
 from scenicq.evaluate.detection import Detection, Missing, detect
 from scenicq.evaluate.matched import Matched, read_matched
 from scenicq.evaluate.resampling import holm, resamples
@@ -81,8 +81,8 @@ class ScenarioEvaluation:
     name: str
     matching: int
     other: int
-    roles: tuple[Comparison, ...]
-    all_objects: Comparison
+    roles: tuple[ObjectComparison, ...]
+    all_objects: ObjectComparison
     weighted: tuple[Weighted, ...]
     classes: tuple[ClassFigures, ...]
     slices: tuple[Slice, ...]
@@ -92,7 +92,7 @@ class ScenarioEvaluation:
     mine: Bools
 
     @property
-    def headline(self) -> tuple[Comparison, ...]:
+    def headline(self) -> tuple[ObjectComparison, ...]:
         """What answers the question: the roles, or all objects where the ego is the only role."""
         return self.roles or (self.all_objects,)
 
@@ -207,7 +207,7 @@ def _own(
         yield each
 
 
-def _decisive(scenario: ScenarioEvaluation) -> Comparison:
+def _decisive(scenario: ScenarioEvaluation) -> ObjectComparison:
     """The comparison that is set against simulation: the role that is missed most."""
     return max(scenario.headline, key=lambda each: -1.0 if math.isnan(each.difference) else each.difference)
 
@@ -266,7 +266,7 @@ class _Judge:
         frame = detection.objects.frame
         here, there = self._counted & matching[frame], self._counted & other[frame]
         in_roles = np.zeros(len(frame), dtype=np.bool_)
-        roles: list[Comparison] = []
+        roles: list[ObjectComparison] = []
         asked: list[tuple[str, Bools]] = []
         for role in matched.roles:
             mine = np.zeros(len(frame), dtype=np.bool_)
@@ -308,7 +308,7 @@ class _Judge:
     def _of_classes(self, mine: Bools) -> Bools:
         return np.isin(self._class, np.unique(self._class[mine]))
 
-    def _compare(self, about: str, mine: Bools, others: Bools, stratum: NDArray[np.int64]) -> Comparison:
+    def _compare(self, about: str, mine: Bools, others: Bools, stratum: NDArray[np.int64]) -> ObjectComparison:
         used = np.flatnonzero(mine | others)
         _, strata = np.unique(stratum[used], return_inverse=True)
         return compare(

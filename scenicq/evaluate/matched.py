@@ -93,14 +93,14 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
             ranked = True
             log_weight[where] = _log_weight(name, each["log_weight"])
         names = objects.ids if "frame" in each else objects.tracks
-        cast = {role: its for role, its in _known(each, "correspondence").items() if its != _EGO}
+        roles = {role: its for role, its in _known(each, "correspondence").items() if its != _EGO}
         for frame in where:
             witness.setdefault(frame, known)
             first, count = int(starts[frame]), int(starts[frame + 1] - starts[frame])
             own: list[str] = names.slice(first, count).to_pylist()
             # the first of those that share a name
             here = {own[place]: first + place for place in range(count - 1, -1, -1)}
-            for role, its in cast.items():
+            for role, its in roles.items():
                 if its in here:
                     played.setdefault(role, {})[here[its]] = None
                 elif "frame" in each:

@@ -65,6 +65,11 @@ def write_pages(evaluation: Evaluation, dataset: Dataset, folder: Path, sensors:
     return folder / "index.html"
 
 
+def _cell(text: str) -> str:
+    """A cell of a table: a figure breaks before its interval at most."""
+    return escape(text).replace(" %", "\u00a0%").replace(", ", ",\u00a0")
+
+
 class _Pages:
     """A page in the making."""
 
@@ -78,7 +83,7 @@ class _Pages:
         """All of it."""
         found = self._evaluation
         score = f", score {found.least_score:g} or more" if found.least_score else ""
-        told = f"{found.predictions}: found within {found.distance_m:g} m{score}"
+        told = f"{found.predictions} on {found.dataset}: found within {found.distance_m:g} m{score}"
         warnings = [element("li", escape(each.message)) for each in found.warnings]
         head = element(
             "header",
@@ -97,7 +102,7 @@ class _Pages:
             sentences.append(element("p", escape(each.simulated.sentence)))
         parts = [element("h2", escape(each.name)), element("p", escape(counts)), *sentences]
         for title, head, rows in tables(each, self._evaluation.distance_m):
-            parts.append(table(title, [name.lower() for name in head], [[*map(escape, row)] for row in rows]))
+            parts.append(table(title, [name.lower() for name in head], [[*map(_cell, row)] for row in rows]))
         worst = each.worst[:SHOWN]
         links = [
             (
@@ -149,8 +154,8 @@ class _Pages:
         frame = detection.frames.numbers[label.frame]
         numbers = np.flatnonzero(detection.objects.frame == frame).tolist()
         pairs = sorted(zip(numbers, label.objects, strict=True), key=lambda pair: bool(each.mine[pair[0]]))
-        for number, thing in pairs:
-            box = space_box(thing, self._kind(each, number), f"{thing.id}, {thing.category}")
+        for number, member in pairs:
+            box = space_box(member, self._kind(each, number), f"{member.id}, {member.category}")
             if box is not None and detection.distance[number] < _FAR_M:
                 yield box
         found = detection.predictions
@@ -172,8 +177,8 @@ class _Pages:
         view = View((label.ego.x, label.ego.y), min(_FARTHEST, max(_NEAREST, 1.25 * float(far))))
         left, top, width, _ = view.box(plane)
         boxes = [draw_object(label.ego, plane)] if label.has_ego else []
-        for number, thing in zip(numbers.tolist(), label.objects, strict=True):
-            boxes.append(element("g", draw_object(thing, plane), class_=self._kind(each, number)))
+        for number, member in zip(numbers.tolist(), label.objects, strict=True):
+            boxes.append(element("g", draw_object(member, plane), class_=self._kind(each, number)))
         return element(
             "svg",
             element("title", escape(label.frame)),

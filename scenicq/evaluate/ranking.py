@@ -65,12 +65,12 @@ def log_densities(
 
 
 def _observed(scenario: Scenario, label: Label, correspondence: Mapping[str, str]) -> tuple[Observed, Signature]:
-    things = {thing.id: thing for thing in label.objects} | {"ego": label.ego}
+    members = {member.id: member for member in label.objects} | {"ego": label.ego}
     observed: dict[tuple[int, str], Value] = {}
     names: list[frozenset[str]] = []
     for each in scenario.objects:
         played = correspondence.get(each.name)
-        its: Mapping[str, Value] = {} if played is None else observe(things[played])
+        its: Mapping[str, Value] = {} if played is None else observe(members[played])
         names.append(frozenset(its))
         observed |= {(each.index, name): value for name, value in its.items()}
     params = observe_params(label)
@@ -81,7 +81,7 @@ def _observed(scenario: Scenario, label: Label, correspondence: Mapping[str, str
 def _of_one_signature(
     scenario: Scenario, signature: Signature, labels: Sequence[Observed], options: MatchOptions, draws: int, seed: int
 ) -> list[LogDensity]:
-    names = [thing.name for thing in scenario.objects]
+    names = [owner.name for owner in scenario.objects]
     shared = Draws(draws, seed)
     logs, errors, of_variables = np.zeros(len(labels)), np.zeros(len(labels)), np.zeros(len(labels))
     solved: list[Reals] = []
@@ -141,8 +141,8 @@ def densities(query: Query, results: Sequence[Result]) -> list[LogDensity | None
     found: list[LogDensity | None] = [None] * len(results)
     for name, numbers in by_map.items():
         scenario = query.world(name).scenario
-        cast = [(labels[results[n].frame], _correspondence(results[n])) for n in numbers]
-        for number, density in zip(numbers, log_densities(scenario, cast, query.options.match), strict=True):
+        bound = [(labels[results[n].frame], _correspondence(results[n])) for n in numbers]
+        for number, density in zip(numbers, log_densities(scenario, bound, query.options.match), strict=True):
             found[number] = density
     return found
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "FEW",
-    "Counts",
     "Interval",
+    "StratumCounts",
     "effective_number",
     "holm",
     "interval_of",
@@ -41,7 +41,7 @@ _LEVEL = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Counts:
+class StratumCounts:
     """Objects in two groups, by recording and stratum (objects that are alike in distance and visibility).
 
     Attributes:
@@ -67,7 +67,7 @@ def resamples(recordings: int, rng: np.random.Generator, count: int = RESAMPLES)
     return rng.multinomial(recordings, np.full(recordings, 1.0 / recordings), size=count).astype(np.float64)
 
 
-def rates(counts: Counts, weights: Reals) -> tuple[Reals, Reals]:
+def rates(counts: StratumCounts, weights: Reals) -> tuple[Reals, Reals]:
     """The share missed in the group, and among the others if they were spread over the strata as the group is.
 
     Args:
@@ -133,7 +133,7 @@ def _student(share: float, freedom: float) -> float:
     )
 
 
-def sign_flip_test(counts: Counts, rng: np.random.Generator, flips: int = FLIPS) -> float:
+def sign_flip_test(counts: StratumCounts, rng: np.random.Generator, flips: int = FLIPS) -> float:
     """The probability of a difference as large as this one, were objects of both groups missed alike.
 
     Each recording contributes by how many more objects of the group than of the others it misses than the common rate

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from scenicq.evaluate.classes import ClassFigures
-from scenicq.evaluate.comparison import Comparison, Share, p_text
+from scenicq.evaluate.comparison import ObjectComparison, Share, p_text
 from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation
 from scenicq.evaluate.precision import ERRORS
 from scenicq.evaluate.slices import Slice
@@ -50,7 +50,7 @@ def _share(share: Share) -> dict[str, Any]:
     return {"missed": share.missed, "of": share.of, "rate": _number(share.rate), "low": low, "high": high}
 
 
-def _comparison(each: Comparison) -> dict[str, Any]:
+def _comparison(each: ObjectComparison) -> dict[str, Any]:
     return {
         "about": each.about,
         "missed": _share(each.share),
@@ -233,7 +233,7 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
     return [table for table in found if table[2]]
 
 
-def _compared(each: Comparison) -> tuple[str, ...]:
+def _compared(each: ObjectComparison) -> tuple[str, ...]:
     def shown(value: float) -> str:
         return "-" if math.isnan(value) else p_text(value).removeprefix("p ").removeprefix("= ")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.evaluate.comparison import Comparison, Share
+from scenicq.evaluate.comparison import ObjectComparison, Share
 from scenicq.evaluate.resampling import rate_interval, resamples
 
 __all__ = ["Simulated", "read_simulated", "verdict"]
@@ -88,7 +88,7 @@ def _share(values: np.ndarray[tuple[int], np.dtype[np.float64]], seed: int) -> S
     return Share(float(values.sum()), float(len(values)), rate, rate_interval(drawn, rate, float(len(values))))
 
 
-def verdict(share: Share, real: Comparison) -> Simulated:
+def verdict(share: Share, real: ObjectComparison) -> Simulated:
     """Whether recordings bear out what was simulated.
 
     They speak for it where objects in question are missed more often than others that are alike (p < 0.05), against it

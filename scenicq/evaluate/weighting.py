@@ -2,9 +2,11 @@
 
 The frames of a dataset that match are not spread as the program would draw them: some gaps, some roads are more
 frequent on the way. A frame counts by the density with which the program generates its values of random variables, over
-that with which the dataset has them (importance sampling). The second is estimated from the frames themselves, by a
-kernel density estimate with reflection at the ends of what is seen (Silverman 1986, sections 2.10 and 4.5). So weights
-are as smooth as that: what a dataset has hardly ever still counts too little, the more so the more variables there are.
+that with which the dataset has them (importance sampling). The second is estimated from the other frames, by a kernel
+density estimate with reflection at the ends of what is seen (Silverman 1986, sections 2.10 and 4.5) that leaves the
+frame itself out: else what a dataset has hardly ever would count too little, the more so the more variables there are
+(Delyon and Portier 2016, "Integral approximation by kernel smoothing"). A frame without neighbours counts much, which
+the number of equally weighted objects tells.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ Bools = NDArray[np.bool_]
 _MOST = 2000
 """Frames of which the estimate is made, at most."""
 _CHUNK = 500
+_LEAST = 0.1
+"""What the kernels of all other frames come to at least, a frame at the same place being 1: bounds the weights."""
 
 
 def log_weights(log_density: Reals, values: Reals, finite: Sequence[Hashable], seed: int = 0) -> Reals:
@@ -55,15 +59,17 @@ def log_weights(log_density: Reals, values: Reals, finite: Sequence[Hashable], s
     found = np.empty(count)
     for start in range(0, count, _CHUNK):
         mine = slice(start, start + _CHUNK)
-        near = (kind[mine, None] == kind[None, chosen]).astype(np.float64)
+        alike = kind[mine, None] == kind[None, chosen]
+        others = alike & (np.arange(count)[mine, None] != chosen)
+        near = others.astype(np.float64)
         for axis in range(dimension):
             one, other = points[mine, None, axis], points[None, chosen, axis]
             away = (one - other, one + other - 2 * low[axis], one + other - 2 * high[axis])
             near *= sum(np.exp(-np.square(each) / (2 * width * width)) for each in away)
-        with np.errstate(divide="ignore"):
-            found[mine] = log_density[mine] - np.log(near.sum(axis=1))
-    # where none of the frames that were chosen is near, the estimate says nothing: such a frame counts as the most
-    found = np.where(np.isfinite(found), found, found[np.isfinite(found)].max(initial=0.0))
+        # as if the frame itself were as near to all others as they are in the mean; alone of its kind it is one
+        number = others.sum(axis=1)
+        near_all = np.maximum(near.sum(axis=1), _LEAST) * alike.sum(axis=1) / np.maximum(number, 1)
+        found[mine] = log_density[mine] - np.log(np.where(number > 0, near_all, 1.0))
     return found - found.max() - math.log(float(np.exp(found - found.max()).mean()))
 
 

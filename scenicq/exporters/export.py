@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 from pyarrow import feather
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.exporters.export_record import Matched
+from scenicq.exporters.export_record import MatchedFrame
 from scenicq.exporters.interchange import write_interchange
 from scenicq.exporters.openlabel import write_openlabel
 from scenicq.match.verdict import Match, Unknown
@@ -67,7 +67,7 @@ class Exporter:
     dataset: Dataset
     target: Path
     scenario: str = ""
-    _matched: dict[str, Matched] = field(default_factory=dict[str, Matched], init=False, repr=False)
+    _matched: dict[str, MatchedFrame] = field(default_factory=dict[str, MatchedFrame], init=False, repr=False)
     _further: int = field(default=0, init=False, repr=False)
     _unknown: int = field(default=0, init=False, repr=False)
 
@@ -94,11 +94,15 @@ class Exporter:
         if isinstance(result.verdict, Match) and result.interval is not None:
             for label, roles in frames_of(self.dataset, result):
                 self._further += label.frame in self._matched
-                self._matched.setdefault(label.frame, Matched(label.frame, label.recording, roles, dict(label.sensors)))
+                self._matched.setdefault(
+                    label.frame, MatchedFrame(label.frame, label.recording, roles, dict(label.sensors))
+                )
         elif isinstance(result.verdict, Match):
             roles = dict(result.verdict.correspondence)
             self._further += result.frame in self._matched
-            self._matched.setdefault(result.frame, Matched(result.frame, result.recording, roles, dict(result.sensors)))
+            self._matched.setdefault(
+                result.frame, MatchedFrame(result.frame, result.recording, roles, dict(result.sensors))
+            )
         self._unknown += isinstance(result.verdict, Unknown)
 
     def finish(self) -> ExportSummary:
@@ -134,7 +138,7 @@ class Exporter:
         return ExportSummary(self.target, tuple(files), len(self._matched), tuple(problems))
 
     @property
-    def matched(self) -> Mapping[str, Matched]:
+    def matched(self) -> Mapping[str, MatchedFrame]:
         """The matching frames by name, in the order in which they came."""
         return self._matched
 

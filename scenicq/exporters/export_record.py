@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-__all__ = ["Matched"]
+__all__ = ["MatchedFrame"]
 
 
 @dataclass(frozen=True, slots=True)
-class Matched:
+class MatchedFrame:
     """A frame that matches.
 
     Attributes:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from scenicq.errors import Diagnostic
-from scenicq.exporters.export_record import Matched
+from scenicq.exporters.export_record import MatchedFrame
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label, LabelObject
 
@@ -26,7 +26,9 @@ _UUID = re.compile("[0-9a-fA-F]{8}(-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}")
 """What an object may be called by, besides a whole number: other names of tracks are its `name` only."""
 
 
-def write_openlabel(dataset: Dataset, matched: Mapping[str, Matched], folder: Path, scenario: str) -> list[Diagnostic]:
+def write_openlabel(
+    dataset: Dataset, matched: Mapping[str, MatchedFrame], folder: Path, scenario: str
+) -> list[Diagnostic]:
     """Write matching frames.
 
     Args:
@@ -61,7 +63,7 @@ def _members(label: Label) -> tuple[LabelObject, ...]:
     return (label.ego, *label.objects) if label.has_ego else label.objects
 
 
-def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str, Matched], scenario: str) -> None:
+def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str, MatchedFrame], scenario: str) -> None:
     keys: dict[str, str] = {}
     objects: dict[str, dict[str, Any]] = {}
     frames: dict[str, Any] = {}

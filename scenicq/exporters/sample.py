@@ -39,20 +39,20 @@ def _number(value: Value) -> float | None:
 
 
 def _object(scenario: Scenario, scene: Scene, index: int) -> LabelObject:
-    thing = scenario.objects[index]
-    values = {name: scene.values[index, name] for name in thing.properties}
+    owner = scenario.objects[index]
+    values = {name: scene.values[index, name] for name in owner.properties}
     position, heading, velocity = values["position"], values["heading"], values.get("velocity")
     assert isinstance(position, tuple)
     assert isinstance(heading, float)
-    category = thing.category if is_class(thing.category) else ROOT
+    category = owner.category if is_class(owner.category) else ROOT
     # a library's default height is made up: Scenic needs it, but no program of the plane means it
-    height = values.get("height") if "height" in thing.properties and thing.properties["height"].explicit else None
+    height = values.get("height") if "height" in owner.properties and owner.properties["height"].explicit else None
     attributes: dict[str, str | float | bool] = {}
     for name, value in values.items():
-        if thing.properties[name].explicit and name not in _MACHINERY and isinstance(value, str | float | bool):
+        if owner.properties[name].explicit and name not in _MACHINERY and isinstance(value, str | float | bool):
             attributes[name] = value
     return LabelObject(
-        thing.name, category, category, *position, normalize(heading),
+        owner.name, category, category, *position, normalize(heading),
         _number(values.get("width")), _number(values.get("length")), _number(height),
         velocity if isinstance(velocity, tuple) else None,
         attributes=attributes,
@@ -90,10 +90,10 @@ def sample_labels(
             raise _late(scenario, improviser, number, timeout_s) from None
         if scene is None:
             raise _hopeless(scenario, improviser, number)
-        things = [_object(scenario, scene, thing.index) for thing in scenario.objects]
-        ego = things.pop(scenario.ego)
+        members = [_object(scenario, scene, owner.index) for owner in scenario.objects]
+        ego = members.pop(scenario.ego)
         params = {name: value for name, value in scene.params.items() if isinstance(value, str | float | bool)}
-        yield Label(f"scene-{number:04}", "sample", number, scenario.map, ego, tuple(things), params)
+        yield Label(f"scene-{number:04}", "sample", number, scenario.map, ego, tuple(members), params)
 
 
 def _late(scenario: Scenario, improviser: Improviser, drawn: int, timeout_s: float) -> ScenarioError:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
 
 from scenicq.forest import build
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Constant, DirectionAt, Feature, Node
+from scenicq.forest.walk import rebuild
 
 __all__ = ["any_turn", "one_turn"]
-
-_DEEPEST = 20
 
 
 def one_turn(heading: Node) -> Node:
@@ -23,28 +22,39 @@ def one_turn(heading: Node) -> Node:
 
 def any_turn(heading: Node) -> Node:
     """The same heading up to full turns, without what `one_turn` does to its parts; what is shared stays shared."""
-    return _any_turn(heading, 0, {})
-
-
-def _any_turn(heading: Node, depth: int, known: dict[int, Node]) -> Node:
-    if id(heading) not in known:
-        known[id(heading)] = _without_wraps(heading, depth, known)
+    known: dict[int, Node] = {}
+    todo = [heading]
+    while todo:
+        node = todo[-1]
+        terms = _terms(node)
+        missing = [term for term in terms if id(term) not in known]
+        if missing:
+            todo += reversed(missing)
+            continue
+        todo.pop()
+        known[id(node)] = _of_terms(node, [known[id(term)] for term in terms])
     return known[id(heading)]
 
 
-def _without_wraps(heading: Node, depth: int, known: dict[int, Node]) -> Node:
-    if not isinstance(heading, Arithmetic) or depth > _DEEPEST:
-        return heading
-    match heading.op, heading.args:
-        case ArithmeticOp.WRAP, (turned,):
-            return _any_turn(turned, depth + 1, known)
-        case ((ArithmeticOp.ADD | ArithmeticOp.SUB | ArithmeticOp.NEG), parts):
-            plain = tuple(_any_turn(part, depth + 1, known) for part in parts)
-        case ArithmeticOp.MUL, (turned, Constant(value=float() as times)) if times.is_integer():
-            plain = (_any_turn(turned, depth + 1, known), heading.args[1])
-        case ArithmeticOp.MUL, (Constant(value=float() as times), turned) if times.is_integer():
-            plain = (heading.args[0], _any_turn(turned, depth + 1, known))
+def _terms(heading: Node) -> tuple[Node, ...]:
+    """What of a heading may be off by full turns: then it is off by full turns too."""
+    match heading:
+        case Arithmetic(op=ArithmeticOp.WRAP | ArithmeticOp.ADD | ArithmeticOp.SUB | ArithmeticOp.NEG, args=parts):
+            return parts
+        case Arithmetic(op=ArithmeticOp.MUL, args=(turned, Constant(value=float() as times))) if times.is_integer():
+            return (turned,)
+        case Arithmetic(op=ArithmeticOp.MUL, args=(Constant(value=float() as times), turned)) if times.is_integer():
+            return (turned,)
         case _:
-            return heading
-    same = all(one is other for one, other in zip(plain, heading.args, strict=True))
-    return heading if same else replace(heading, args=plain)
+            return ()
+
+
+def _of_terms(heading: Node, terms: Sequence[Node]) -> Node:
+    """The heading with other terms, and without the one full turn that it may be cut to."""
+    if not terms:
+        return heading
+    assert isinstance(heading, Arithmetic)
+    if heading.op is ArithmeticOp.WRAP:
+        return terms[0]
+    changed = dict(zip(map(id, _terms(heading)), terms, strict=True))
+    return rebuild(heading, tuple(changed.get(id(part), part) for part in heading.args))

@@ -13,26 +13,25 @@ from typing import TypeAlias, cast
 
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.interval_ends import FLOATS
-from scenicq.forest.interval_values import Bounds, IntervalVector
-from scenicq.forest.interval_values import Interval as Ends
+from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import Constant, Identity, Node, PointIn, Rotate, Scale, VectorSum
 
-__all__ = ["EVERYTHING", "Box", "Interval", "leaf_boxes", "point_boxes", "scalar_bounds", "vector_bounds"]
+__all__ = ["EVERYTHING", "Box", "FloatInterval", "leaf_boxes", "point_boxes", "scalar_bounds", "vector_bounds"]
 
-Interval: TypeAlias = tuple[float, float]
-Box: TypeAlias = tuple[Interval, Interval]
+FloatInterval: TypeAlias = tuple[float, float]
+Box: TypeAlias = tuple[FloatInterval, FloatInterval]
 
-EVERYTHING: Interval = (-math.inf, math.inf)
+EVERYTHING: FloatInterval = (-math.inf, math.inf)
 _PLANE: Box = (EVERYTHING, EVERYTHING)
 _DOMAIN = IntervalDomain(FLOATS)
 
 
-def _pair(value: Bounds[float]) -> Interval:
-    return (value.low, value.high) if isinstance(value, Ends) else EVERYTHING
+def _pair(value: IntervalValue[float]) -> FloatInterval:
+    return (value.low, value.high) if isinstance(value, Interval) else EVERYTHING
 
 
-def _box(value: Bounds[float]) -> Box:
+def _box(value: IntervalValue[float]) -> Box:
     return (_pair(value.x), _pair(value.y)) if isinstance(value, IntervalVector) else _PLANE
 
 
@@ -41,7 +40,7 @@ def _vector(box: Box) -> IntervalVector[float]:
     return IntervalVector(FLOATS.between(x0, x1), FLOATS.between(y0, y1))
 
 
-def scalar_bounds(node: Node, leaves: Mapping[Identity, Box] | None = None) -> Interval:
+def scalar_bounds(node: Node, leaves: Mapping[Identity, Box] | None = None) -> FloatInterval:
     """Bounds of a scalar expression.
 
     Args:
@@ -56,7 +55,7 @@ def vector_bounds(node: Node, leaves: Mapping[Identity, Box] | None = None) -> B
     return _box(_bounds(node, leaves))
 
 
-def _bounds(node: Node, leaves: Mapping[Identity, Box] | None) -> Bounds[float]:
+def _bounds(node: Node, leaves: Mapping[Identity, Box] | None) -> IntervalValue[float]:
     domain = IntervalDomain(FLOATS, points=leaves) if leaves else _DOMAIN
     return interpret(steps_of(node), domain)[id(node)]
 

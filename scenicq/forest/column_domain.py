@@ -23,9 +23,9 @@ from scenicq.forest.columns import (
     Array,
     Coded,
     Column,
+    ColumnPlaces,
     Data,
     Placed,
-    Places,
     common_status,
     constant_column,
     distances,
@@ -267,7 +267,7 @@ class ColumnDomain:
         return self._each(partial(compute, node), args)
 
     def _contained(self, node: Contains, regions: Coded, args: Sequence[Column]) -> Column:
-        places = Places((*args,))
+        places = ColumnPlaces((*args,))
         self._check(len(places.defined), "whether a region holds them")
         found = np.zeros(places.count, dtype=np.bool_)
         xy, which = places.points(args[1].data), places.spread(regions.which)[places.defined]
@@ -281,7 +281,7 @@ class ColumnDomain:
         return Column(found.reshape(places.shape), places.status.reshape(places.shape))
 
     def _direction(self, node: DirectionAt, field: Column, point: Column) -> Column:
-        places = Places((field, point))
+        places = ColumnPlaces((field, point))
         self._check(len(places.defined), "directions")
         allowed = _allowed(places, field.data, point.data)
         most = max(map(len, allowed), default=1)
@@ -305,7 +305,7 @@ class ColumnDomain:
 
     def _each(self, meaning: Callable[[tuple[Value, ...]], Value], args: Sequence[Column]) -> Column:
         """The values of a meaning, computed once for each combination of arguments."""
-        places = Places(args)
+        places = ColumnPlaces(args)
         status = places.status.copy()
         first, number = places.combinations(args)
         self._check(len(first), "values one by one")
@@ -343,7 +343,7 @@ def _picked(which: Array, options: Sequence[Array]) -> Array:
     return found
 
 
-def _allowed(places: Places, field: Data, point: Data) -> Sequence[tuple[float, ...]]:
+def _allowed(places: ColumnPlaces, field: Data, point: Data) -> Sequence[tuple[float, ...]]:
     """The headings that a field allows at each defined place."""
     if not len(places.defined):
         return ()

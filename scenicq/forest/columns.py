@@ -19,8 +19,23 @@ from scenicq.forest.nodes import DiscAt, Node, RectangleAt, SectorAt, Undefined,
 from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 
 __all__ = [
-    "DEFINED", "UNDEFINED", "UNKNOWN", "Array", "Coded", "Column", "Data", "Placed", "Places", "Vectors",
-    "column_of", "common_status", "constant_column", "distances", "packed", "truth_of", "value_reader",
+    "DEFINED",
+    "UNDEFINED",
+    "UNKNOWN",
+    "Array",
+    "Coded",
+    "Column",
+    "ColumnPlaces",
+    "Data",
+    "Placed",
+    "Vectors",
+    "column_of",
+    "common_status",
+    "constant_column",
+    "distances",
+    "packed",
+    "truth_of",
+    "value_reader",
 ]  # fmt: skip
 
 Array: TypeAlias = NDArray[Any]
@@ -74,7 +89,7 @@ class Column(NamedTuple):
     status: NDArray[np.int8]
 
 
-class Places:
+class ColumnPlaces:
     """The places of some columns in one row, with what holds at each."""
 
     def __init__(self, columns: Sequence[Column]) -> None:

@@ -93,14 +93,16 @@ class _Cutter:
 
 def _area(region: Region) -> Shape | None:
     """A region as one shape, where it is made of polygons."""
-    match region:
-        case PolygonSet():
-            return shapes.union_all(region.pieces)
-        case Rectangle():
-            return box_polygon(*region.center, region.heading, region.width, region.length)
-        case UnionOf():
-            parts = [_area(part) for part in region.parts]
-            known = [part for part in parts if part is not None]
-            return shapes.union_all(known) if len(known) == len(parts) else None
-        case _:
-            return None
+    found: list[Shape] = []
+    todo = [region]
+    while todo:
+        match todo.pop():
+            case PolygonSet(pieces=pieces):
+                found.append(shapes.union_all(pieces))
+            case Rectangle() as box:
+                found.append(box_polygon(*box.center, box.heading, box.width, box.length))
+            case UnionOf(parts=parts):
+                todo += reversed(parts)
+            case _:
+                return None
+    return found[0] if len(found) == 1 else shapes.union_all(found)

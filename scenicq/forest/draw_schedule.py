@@ -26,7 +26,7 @@ __all__ = ["DrawSchedule", "lay_out"]
 _Values = list[Value]
 
 
-class Step(Protocol):
+class DrawStep(Protocol):
     """One step: computes a value, or tests one."""
 
     def run(self, values: _Values, rng: random.Random) -> bool:
@@ -114,7 +114,7 @@ class _Part:
     """Steps that depend on some random variables (a bit each) and on no others."""
 
     mask: int
-    steps: list[Step] = field(default_factory=list[Step])
+    steps: list[DrawStep] = field(default_factory=list[DrawStep])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +129,7 @@ class DrawSchedule:
         places: The slots of the expressions that were asked for, in their order.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[DrawStep, ...]
     restarts: tuple[int, ...]
     slots: int
     constants: Mapping[int, Value]
@@ -180,7 +180,7 @@ class _Layout:
         self.leaf_slots: dict[Identity, int] = {}
         self.constants: dict[int, Value] = {}
         self.slots = 0
-        self.restart: dict[int, Step] = {}
+        self.restart: dict[int, DrawStep] = {}
 
     def add_check(self, check: Check, mask: int) -> None:
         """Put a condition, and what it needs, after all parts that it depends on, which become one."""
@@ -199,7 +199,7 @@ class _Layout:
 
     def finish(self, roots: tuple[Node, ...]) -> DrawSchedule:
         """The whole schedule."""
-        rest: list[Step] = []
+        rest: list[DrawStep] = []
         for root in roots:
             rest += self._needed(root)
         steps = [step for part in self.parts for step in part.steps] + rest
@@ -209,9 +209,9 @@ class _Layout:
             tuple(steps), restarts, self.slots, self.constants, tuple(self.slot_of[id(root)] for root in roots)
         )  # fmt: skip
 
-    def _needed(self, root: Node) -> list[Step]:
+    def _needed(self, root: Node) -> list[DrawStep]:
         """Steps for the nodes below a root that have none yet."""
-        steps: list[Step] = []
+        steps: list[DrawStep] = []
         stack: list[tuple[Node, bool]] = [(root, False)]
         while stack:
             node, ready = stack.pop()
@@ -226,7 +226,7 @@ class _Layout:
                 stack += ((child, False) for child in reversed(below) if id(child) not in self.slot_of)
         return steps
 
-    def _step(self, node: Node) -> Step | None:
+    def _step(self, node: Node) -> DrawStep | None:
         if is_leaf(node) and (known := self.leaf_slots.get(cast(Leaf, node).identity)) is not None:
             self.slot_of[id(node)] = known
             return None

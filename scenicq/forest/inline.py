@@ -79,16 +79,16 @@ def assemble(scenario: Scenario, enforce: Set[BuiltIn]) -> Assembled:
     """
     definitions = _Definitions()
     plain = _plain(scenario, definitions)
-    noise = {key: node for thing in scenario.objects if thing.mutated for key, node in _noise(thing, plain)}
+    noise = {key: node for owner in scenario.objects if owner.mutated for key, node in _noise(owner, plain)}
     before, after = definitions.into, definitions.into_with(noise) if noise else definitions.into
     params = {name: before(given.value) for name, given in scenario.params.items()}
     checks: list[Check] = []
-    for thing in scenario.objects:
+    for owner in scenario.objects:
         for name in ("position", "heading"):
-            given = thing.properties[name]
-            span = given.span if given.explicit else thing.span
-            text = f"the {name} of `{thing.name}`"
-            checks.append(Check(plain[thing.index, name], -1 - thing.index, text, span, defined=True))
+            given = owner.properties[name]
+            span = given.span if given.explicit else owner.span
+            text = f"the {name} of `{owner.name}`"
+            checks.append(Check(plain[owner.index, name], -1 - owner.index, text, span, defined=True))
     for number, each in enumerate(_requirements(scenario, enforce)):
         into = before if each.built_in is None else after
         text = _told(scenario, each)
@@ -164,9 +164,9 @@ def _step(node: Node, definitions: Mapping[Key, Node]) -> Node:
 def _plain(scenario: Scenario, definitions: _Definitions) -> dict[Key, Node]:
     """The expression of each property, without noise; those that others refer to come first."""
     given = {
-        (thing.index, name): one_turn(each.value) if name == "heading" and scenario.version == 3 else each.value
-        for thing in scenario.objects
-        for name, each in thing.properties.items()
+        (owner.index, name): one_turn(each.value) if name == "heading" and scenario.version == 3 else each.value
+        for owner in scenario.objects
+        for name, each in owner.properties.items()
     }
     found = definitions.found
     todo = list(reversed(given))
@@ -182,17 +182,17 @@ def _plain(scenario: Scenario, definitions: _Definitions) -> dict[Key, Node]:
     return {key: found[key] for key in given}
 
 
-def _noise(thing: ScenarioObject, plain: Mapping[Key, Node]) -> Iterator[tuple[Key, Node]]:
+def _noise(owner: ScenarioObject, plain: Mapping[Key, Node]) -> Iterator[tuple[Key, Node]]:
     """Position and heading of a mutated object with the noise added (language paper, section 4.2)."""
-    scale = plain[thing.index, "mutationScale"]
+    scale = plain[owner.index, "mutationScale"]
 
     def deviation(name: str) -> Node:
-        return build.arithmetic(ArithmeticOp.MUL, plain[thing.index, name], scale, span=thing.span)
+        return build.arithmetic(ArithmeticOp.MUL, plain[owner.index, name], scale, span=owner.span)
 
     def normal(spread: Node) -> Node:
-        return Normal(build.constant(0.0), spread, span=thing.span)
+        return Normal(build.constant(0.0), spread, span=owner.span)
 
     spread, turn = deviation("positionStdDev"), deviation("headingStdDev")
-    position, heading = ((thing.index, name) for name in ("position", "heading"))
+    position, heading = ((owner.index, name) for name in ("position", "heading"))
     yield position, build.vector_sum(plain[position], build.vector(normal(spread), normal(spread)))
     yield heading, build.add(plain[heading], normal(turn))

@@ -49,7 +49,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import children, postorder
 
-__all__ = ["Domain", "OnMap", "RegionNode", "Steps", "interpret", "steps_of"]
+__all__ = ["AbstractDomain", "OnMap", "RegionNode", "Steps", "interpret", "steps_of"]
 
 V = TypeVar("V")
 
@@ -60,7 +60,7 @@ Steps: TypeAlias = Sequence[tuple[Node, tuple[Node, ...]]]
 """Nodes with their children, which come before them."""
 
 
-class Domain(Protocol[V]):
+class AbstractDomain(Protocol[V]):
     """What the operations of the node language do to abstract values."""
 
     def constant(self, value: Value) -> V:
@@ -133,7 +133,7 @@ def steps_of(*roots: Node) -> Steps:
     return tuple((node, children(node)) for node in postorder(roots))
 
 
-def interpret(steps: Steps, domain: Domain[V], given: Mapping[int, V] | None = None) -> dict[int, V]:
+def interpret(steps: Steps, domain: AbstractDomain[V], given: Mapping[int, V] | None = None) -> dict[int, V]:
     """The abstract value of each node, by the node's id.
 
     Args:
@@ -148,7 +148,7 @@ def interpret(steps: Steps, domain: Domain[V], given: Mapping[int, V] | None = N
     return known
 
 
-def _value(node: Node, args: list[V], domain: Domain[V]) -> V:
+def _value(node: Node, args: list[V], domain: AbstractDomain[V]) -> V:
     match node:
         case Constant():
             return domain.constant(node.value)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from scenicq.forest.interval_ends import Ends
-from scenicq.forest.interval_values import Array, Interval
+from scenicq.forest.interval_values import FloatOrArray, Interval
 from scenicq.forest.nodes import ArithmeticOp
 
 __all__ = ["IntervalArithmetic"]
@@ -162,11 +162,11 @@ class IntervalArithmetic(Generic[E]):
         inside = ends.both(ends.at_most(ends.negative(most), angle.low), ends.at_most(angle.high, most))
         return self.heading_unless(ends.negation(inside), angle)
 
-    def heading_unless(self, vague: Array, heading: Interval[E]) -> Interval[E]:
+    def heading_unless(self, vague: FloatOrArray, heading: Interval[E]) -> Interval[E]:
         """A heading that is anything in (-pi, pi] where something makes it vague."""
         ends, half = self.ends, self.ends.number(math.pi)
         return ends.between(ends.where(vague, ends.negative(half), heading.low), ends.where(vague, half, heading.high))
 
-    def at_most(self, a: E, b: E, beyond: float = 0.0) -> Array:
+    def at_most(self, a: E, b: E, beyond: float = 0.0) -> FloatOrArray:
         """Whether an end is at most another, or so little beyond it that rounding may have put it there."""
         return self.ends.at_most(a, self.ends.plus(b, self.ends.number(self.slack + beyond)))

@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar, cast
 
 import numpy as np
 
-from scenicq.forest.interval_values import Array, Interval
+from scenicq.forest.interval_values import FloatOrArray, Interval
 from scenicq.geometry.angles import heading_of, heading_of_array, normalize
 
 __all__ = ["ARRAYS", "FLOATS", "Ends"]
@@ -83,23 +83,23 @@ class Ends(Protocol[E]):
         """An angle in radians, less whole turns, in [-pi, pi]."""
         ...
 
-    def at_most(self, a: E, b: E) -> Array:
+    def at_most(self, a: E, b: E) -> FloatOrArray:
         """Whether an end is at most another."""
         ...
 
-    def both(self, a: Array, b: Array) -> Array:
+    def both(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         """Whether both hold."""
         ...
 
-    def either(self, a: Array, b: Array) -> Array:
+    def either(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         """Whether one of two holds."""
         ...
 
-    def negation(self, a: Array) -> Array:
+    def negation(self, a: FloatOrArray) -> FloatOrArray:
         """Whether something does not hold."""
         ...
 
-    def where(self, condition: Array, a: E, b: E) -> E:
+    def where(self, condition: FloatOrArray, a: E, b: E) -> E:
         """The first where a condition holds, else the second."""
         ...
 
@@ -174,79 +174,79 @@ class _Floats:
 class _Arrays:
     """Ends that are arrays or floats; what is no number is dealt with by the caller's `np.errstate`."""
 
-    def number(self, value: float) -> Array:
+    def number(self, value: float) -> FloatOrArray:
         return value
 
-    def between(self, low: Array, high: Array) -> Interval[Array]:
+    def between(self, low: FloatOrArray, high: FloatOrArray) -> Interval[FloatOrArray]:
         return Interval(low, high)
 
-    def known(self, value: Array) -> Interval[Array]:
+    def known(self, value: FloatOrArray) -> Interval[FloatOrArray]:
         defined = np.isfinite(value)
         if np.all(defined):
             return Interval(value, value, True)
         return Interval(np.where(defined, value, -np.inf), np.where(defined, value, np.inf))
 
-    def plus(self, a: Array, b: Array) -> Array:
+    def plus(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         return a + b
 
-    def negative(self, a: Array) -> Array:
+    def negative(self, a: FloatOrArray) -> FloatOrArray:
         return -a
 
-    def times(self, a: Array, b: Array) -> Array:
+    def times(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         product = a * b
         return np.where(np.isnan(product), 0.0, product)
 
-    def divided(self, a: Array, b: Array) -> Array:
+    def divided(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         return np.where(np.isinf(b), 0.0, np.divide(a, b))
 
-    def least(self, parts: Sequence[Array]) -> Array:
+    def least(self, parts: Sequence[FloatOrArray]) -> FloatOrArray:
         found = parts[0]
         for part in parts[1:]:
             found = np.minimum(found, part)
         return found
 
-    def most(self, parts: Sequence[Array]) -> Array:
+    def most(self, parts: Sequence[FloatOrArray]) -> FloatOrArray:
         found = parts[0]
         for part in parts[1:]:
             found = np.maximum(found, part)
         return found
 
-    def hypot(self, a: Array, b: Array) -> Array:
+    def hypot(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         return np.hypot(a, b)
 
-    def root(self, a: Array) -> Array:
+    def root(self, a: FloatOrArray) -> FloatOrArray:
         return np.sqrt(a)
 
-    def sine(self, a: Array) -> Array:
+    def sine(self, a: FloatOrArray) -> FloatOrArray:
         return np.sin(a)
 
-    def cosine(self, a: Array) -> Array:
+    def cosine(self, a: FloatOrArray) -> FloatOrArray:
         return np.cos(a)
 
-    def magnitude(self, a: Array) -> Array:
+    def magnitude(self, a: FloatOrArray) -> FloatOrArray:
         return np.abs(a)
 
-    def heading(self, x: Array, y: Array) -> Array:
+    def heading(self, x: FloatOrArray, y: FloatOrArray) -> FloatOrArray:
         return heading_of_array(x, y)
 
-    def turned(self, a: Array) -> Array:
+    def turned(self, a: FloatOrArray) -> FloatOrArray:
         return np.remainder(a + math.pi, math.tau) - math.pi
 
-    def at_most(self, a: Array, b: Array) -> Array:
+    def at_most(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         return np.less_equal(a, b)
 
-    def both(self, a: Array, b: Array) -> Array:
+    def both(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         return np.logical_and(a, b)
 
-    def either(self, a: Array, b: Array) -> Array:
+    def either(self, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
         return np.logical_or(a, b)
 
-    def negation(self, a: Array) -> Array:
+    def negation(self, a: FloatOrArray) -> FloatOrArray:
         return np.logical_not(a)
 
-    def where(self, condition: Array, a: Array, b: Array) -> Array:
-        return cast("Array", np.where(condition, a, b))
+    def where(self, condition: FloatOrArray, a: FloatOrArray, b: FloatOrArray) -> FloatOrArray:
+        return cast("FloatOrArray", np.where(condition, a, b))
 
 
 FLOATS: Ends[float] = _Floats()
-ARRAYS: Ends[Array] = _Arrays()
+ARRAYS: Ends[FloatOrArray] = _Arrays()

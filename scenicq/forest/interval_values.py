@@ -6,10 +6,10 @@ from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
-__all__ = ["Array", "Bounds", "Interval", "IntervalVector", "Truth", "can_hold"]
+__all__ = ["FloatOrArray", "Interval", "IntervalValue", "IntervalVector", "Truth", "can_hold"]
 
 E = TypeVar("E")
-Array: TypeAlias = Any
+FloatOrArray: TypeAlias = Any
 """A float or an array of floats; as a truth value, a bool or an array of them."""
 
 
@@ -36,14 +36,14 @@ class IntervalVector(NamedTuple, Generic[E]):
 class Truth(NamedTuple):
     """Whether a condition can hold, and whether it can fail: bools, or arrays of them."""
 
-    can_hold: Array
-    can_fail: Array
+    can_hold: FloatOrArray
+    can_fail: FloatOrArray
 
 
-Bounds: TypeAlias = Interval[E] | IntervalVector[E] | Truth | None
+IntervalValue: TypeAlias = Interval[E] | IntervalVector[E] | Truth | None
 
 
-def can_hold(value: Bounds[Array]) -> Array:
+def can_hold(value: IntervalValue[FloatOrArray]) -> FloatOrArray:
     """Whether a value can count as true where it stands as a condition."""
     if isinstance(value, Truth):
         return value.can_hold

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 from scenicq.forest.interpret import OnMap, RegionNode
 from scenicq.forest.interval_arithmetic import IntervalArithmetic
-from scenicq.forest.interval_values import Array, Bounds, Interval, IntervalVector, Truth
+from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.nodes import (
     ArithmeticOp,
     CompareOp,
@@ -62,7 +62,7 @@ class IntervalDomain(IntervalArithmetic[E]):
         boxed: Whether the boxes of regions say something of what is asked of regions.
     """
 
-    observed: Callable[[Feature], Bounds[E]] = _unobserved
+    observed: Callable[[Feature], IntervalValue[E]] = _unobserved
     points: Mapping[Identity, tuple[tuple[float, float], tuple[float, float]]] = field(
         default_factory=dict["Identity", tuple[tuple[float, float], tuple[float, float]]]
     )
@@ -71,17 +71,17 @@ class IntervalDomain(IntervalArithmetic[E]):
     def _plane(self) -> IntervalVector[E]:
         return IntervalVector(self.everything(), self.everything())
 
-    def _scalar(self, value: Bounds[E]) -> Interval[E]:
+    def _scalar(self, value: IntervalValue[E]) -> Interval[E]:
         if isinstance(value, Interval):
             return value
         return self.within(0.0, 1.0) if isinstance(value, Truth) else self.everything()
 
-    def _pair(self, value: Bounds[E]) -> IntervalVector[E]:
+    def _pair(self, value: IntervalValue[E]) -> IntervalVector[E]:
         return value if isinstance(value, IntervalVector) else self._plane()
 
     # --- leaves
 
-    def constant(self, value: Value) -> Bounds[E]:
+    def constant(self, value: Value) -> IntervalValue[E]:
         """A known value; an undefined one is unbounded."""
         if isinstance(value, bool):
             return Truth(value, not value)
@@ -94,14 +94,14 @@ class IntervalDomain(IntervalArithmetic[E]):
             return IntervalVector(self.within(west, east), self.within(south, north))
         return self.everything() if isinstance(value, Undefined) else None
 
-    def feature(self, node: Feature) -> Bounds[E]:
+    def feature(self, node: Feature) -> IntervalValue[E]:
         """What is observed, or anything of its kind."""
         found = self.observed(node)
         if found is not None:
             return found
         return self._plane() if node.kind == "vector" else self.everything() if node.kind == "scalar" else None
 
-    def variable(self, node: Leaf, args: Sequence[Bounds[E]]) -> Bounds[E]:
+    def variable(self, node: Leaf, args: Sequence[IntervalValue[E]]) -> IntervalValue[E]:
         """The support of a random variable."""
         match node:
             case Range() | DiscreteRange():
@@ -129,27 +129,27 @@ class IntervalDomain(IntervalArithmetic[E]):
 
     # --- scalars
 
-    def arithmetic(self, op: ArithmeticOp, args: Sequence[Bounds[E]]) -> Interval[E]:
+    def arithmetic(self, op: ArithmeticOp, args: Sequence[IntervalValue[E]]) -> Interval[E]:
         """An operation on numbers; a truth value counts as 0 or 1."""
         return self.operation(op, [self._scalar(arg) for arg in args])
 
     # --- vectors
 
-    def vector(self, x: Bounds[E], y: Bounds[E]) -> IntervalVector[E]:
+    def vector(self, x: IntervalValue[E], y: IntervalValue[E]) -> IntervalVector[E]:
         """A vector of two numbers."""
         return IntervalVector(self._scalar(x), self._scalar(y))
 
-    def sum(self, left: Bounds[E], right: Bounds[E]) -> IntervalVector[E]:
+    def sum(self, left: IntervalValue[E], right: IntervalValue[E]) -> IntervalVector[E]:
         """The sum of two vectors."""
         a, b = self._pair(left), self._pair(right)
         return IntervalVector(self.add(a.x, b.x), self.add(a.y, b.y))
 
-    def scale(self, vector: Bounds[E], factor: Bounds[E]) -> IntervalVector[E]:
+    def scale(self, vector: IntervalValue[E], factor: IntervalValue[E]) -> IntervalVector[E]:
         """A vector times a number."""
         a, by = self._pair(vector), self._scalar(factor)
         return IntervalVector(self.multiply(a.x, by), self.multiply(a.y, by))
 
-    def rotate(self, vector: Bounds[E], angle: Bounds[E]) -> IntervalVector[E]:
+    def rotate(self, vector: IntervalValue[E], angle: IntervalValue[E]) -> IntervalVector[E]:
         """A box around what a vector turns to."""
         (x, y), by = self._pair(vector), self._scalar(angle)
         ends = self.ends
@@ -161,11 +161,11 @@ class IntervalDomain(IntervalArithmetic[E]):
         across = self.add(self.multiply(x, c), self.negative(self.multiply(y, s)))
         return IntervalVector(across, self.add(self.multiply(x, s), self.multiply(y, c)))
 
-    def coordinate(self, vector: Bounds[E], axis: int) -> Interval[E]:
+    def coordinate(self, vector: IntervalValue[E], axis: int) -> Interval[E]:
         """One coordinate."""
         return self._pair(vector)[axis]
 
-    def norm(self, vector: Bounds[E]) -> Interval[E]:
+    def norm(self, vector: IntervalValue[E]) -> Interval[E]:
         """The length of a vector."""
         x, y = self._pair(vector)
         if x.exact and y.exact:
@@ -173,7 +173,7 @@ class IntervalDomain(IntervalArithmetic[E]):
         far = self.ends.hypot(self.largest(x), self.largest(y))
         return self.ends.between(self.ends.hypot(self.nearest(x), self.nearest(y)), far)
 
-    def bearing(self, vector: Bounds[E]) -> Interval[E]:
+    def bearing(self, vector: IntervalValue[E]) -> Interval[E]:
         """The heading of a known vector; of others, and of those of hardly any length, it is anything."""
         x, y = self._pair(vector)
         if not x.exact or not y.exact:
@@ -186,7 +186,7 @@ class IntervalDomain(IntervalArithmetic[E]):
 
     # --- truth
 
-    def compare(self, op: CompareOp, left: Bounds[E], right: Bounds[E]) -> Truth:
+    def compare(self, op: CompareOp, left: IntervalValue[E], right: IntervalValue[E]) -> Truth:
         """A comparison of numbers; open for other values."""
         if not isinstance(left, Interval) or not isinstance(right, Interval):
             return _OPEN
@@ -201,7 +201,7 @@ class IntervalDomain(IntervalArithmetic[E]):
             case CompareOp.NE:
                 return Truth(True, self.ends.both(below, above))
 
-    def logic(self, op: LogicOp, args: Sequence[Bounds[E]]) -> Truth:
+    def logic(self, op: LogicOp, args: Sequence[IntervalValue[E]]) -> Truth:
         """A combination of truth values."""
         parts = [arg if isinstance(arg, Truth) else _OPEN for arg in args]
         if op is LogicOp.NOT:
@@ -215,7 +215,7 @@ class IntervalDomain(IntervalArithmetic[E]):
                 hold, fail = either(hold, part.can_hold), both(fail, part.can_fail)
         return Truth(hold, fail)
 
-    def select(self, index: Bounds[E], options: Sequence[Bounds[E]]) -> Bounds[E]:
+    def select(self, index: IntervalValue[E], options: Sequence[IntervalValue[E]]) -> IntervalValue[E]:
         """What holds all options."""
         if any(isinstance(option, Truth) for option in options):
             return _OPEN
@@ -229,7 +229,7 @@ class IntervalDomain(IntervalArithmetic[E]):
 
     # --- the map
 
-    def on_map(self, node: OnMap, args: Sequence[Bounds[E]]) -> Bounds[E]:
+    def on_map(self, node: OnMap, args: Sequence[IntervalValue[E]]) -> IntervalValue[E]:
         """Points are in a region only where they are in its box, and no closer to it than to its box."""
         match node:
             case DirectionAt():
@@ -251,12 +251,12 @@ class IntervalDomain(IntervalArithmetic[E]):
             ends.where(ends.at_most(zero, near), near, zero), ends.where(ends.at_most(zero, far), far, endless)
         )
 
-    def _meet(self, a: IntervalVector[E], b: IntervalVector[E]) -> Array:
+    def _meet(self, a: IntervalVector[E], b: IntervalVector[E]) -> FloatOrArray:
         """Whether two boxes have a point in common."""
         found = [self.at_most(p.low, q.high, SLACK) for p, q in (*zip(a, b, strict=True), *zip(b, a, strict=True))]
         return reduce(self.ends.both, found)
 
-    def region(self, node: RegionNode, args: Sequence[Bounds[E]]) -> Bounds[E]:
+    def region(self, node: RegionNode, args: Sequence[IntervalValue[E]]) -> IntervalValue[E]:
         """The box of a region."""
         boxes = [self._pair(arg) for arg in args]
         match node:

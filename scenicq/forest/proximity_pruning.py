@@ -18,7 +18,7 @@ from typing import cast
 
 import numpy as np
 
-from scenicq.forest.bounds import Box, Interval, scalar_bounds, vector_bounds
+from scenicq.forest.bounds import Box, FloatInterval, scalar_bounds, vector_bounds
 from scenicq.forest.nodes import (
     Compare,
     CompareOp,
@@ -240,7 +240,7 @@ _LESS = {CompareOp.LT, CompareOp.LE}
 _MORE = {CompareOp.GT, CompareOp.GE}
 
 
-def _largest(interval: Interval) -> float:
+def _largest(interval: FloatInterval) -> float:
     return max(abs(interval[0]), abs(interval[1]))
 
 

@@ -104,12 +104,12 @@ def _show(
 def show_forest(scenario: Scenario) -> list[str]:
     """The whole forest as lines: what is random or set by the program of each object, requirements, parameters."""
     numbers: dict[Identity, int] = {}
-    names = {thing.index: thing.name for thing in scenario.objects}
+    names = {owner.index: owner.name for owner in scenario.objects}
     lines: list[str] = []
-    for thing in scenario.objects:
-        for name, given in thing.properties.items():
+    for owner in scenario.objects:
+        for name, given in owner.properties.items():
             if given.explicit or not isinstance(given.value, Constant):
-                lines.append(f"{thing.name}.{name} = {show(given.value, names, numbers)}")
+                lines.append(f"{owner.name}.{name} = {show(given.value, names, numbers)}")
     lines += [f"param {name} = {show(given.value, names, numbers)}" for name, given in scenario.params.items()]
     for requirement in scenario.requirements:
         kind = f" ({requirement.built_in.value})" if requirement.built_in else ""

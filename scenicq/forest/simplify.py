@@ -23,7 +23,7 @@ __all__ = ["rebuilt", "roots_of", "simplify"]
 
 def roots_of(scenario: Scenario) -> list[Node]:
     """All expressions of a scenario."""
-    found = [given.value for thing in scenario.objects for given in thing.properties.values()]
+    found = [given.value for owner in scenario.objects for given in owner.properties.values()]
     found += [each.condition for each in (*scenario.requirements, *scenario.soft)]
     found += scenario.dynamics.conditions if scenario.dynamics is not None else ()
     return [*found, *(p.value for p in scenario.params.values())]
@@ -82,8 +82,8 @@ def _alternatives(pick: Select, by_chance: Callable[[Select], bool]) -> Iterator
 def rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
     """The scenario with each of its expressions changed."""
     objects = tuple(
-        replace(thing, properties={name: replace(p, value=change(p.value)) for name, p in thing.properties.items()})
-        for thing in scenario.objects
+        replace(owner, properties={name: replace(p, value=change(p.value)) for name, p in owner.properties.items()})
+        for owner in scenario.objects
     )
     requirements, soft = (
         tuple(replace(each, condition=change(each.condition)) for each in conditions)

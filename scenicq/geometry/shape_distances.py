@@ -12,16 +12,16 @@ import numpy as np
 
 __all__ = ["to_discs", "to_rectangles", "to_sectors"]
 
-Numbers: TypeAlias = Any
+_Numbers: TypeAlias = Any
 """A float, or an array of floats that broadcasts with the others."""
 
 
-def _turned(x: Numbers, y: Numbers, angle: Numbers) -> tuple[Numbers, Numbers]:
+def _turned(x: _Numbers, y: _Numbers, angle: _Numbers) -> tuple[_Numbers, _Numbers]:
     cos, sin = np.cos(angle), np.sin(angle)
     return x * cos - y * sin, x * sin + y * cos
 
 
-def to_discs(dx: Numbers, dy: Numbers, radius: Numbers) -> Numbers:
+def to_discs(dx: _Numbers, dy: _Numbers, radius: _Numbers) -> _Numbers:
     """Distances to discs in metres, inf to those of negative radius.
 
     Args:
@@ -32,7 +32,7 @@ def to_discs(dx: Numbers, dy: Numbers, radius: Numbers) -> Numbers:
     return np.where(np.less(radius, 0), np.inf, np.maximum(np.hypot(dx, dy) - radius, 0.0))
 
 
-def to_sectors(dx: Numbers, dy: Numbers, radius: Numbers, heading: Numbers, angle: Numbers) -> Numbers:
+def to_sectors(dx: _Numbers, dy: _Numbers, radius: _Numbers, heading: _Numbers, angle: _Numbers) -> _Numbers:
     """Distances to sectors in metres, inf to those of negative radius.
 
     Args:
@@ -50,11 +50,11 @@ def to_sectors(dx: Numbers, dy: Numbers, radius: Numbers, heading: Numbers, angl
     along = np.minimum(np.maximum(aside * east + ahead * north, 0.0), radius)
     to_side = np.hypot(aside - along * east, ahead - along * north)
     return np.where(
-        np.less(radius, 0), np.inf, cast(Numbers, np.where(within, to_discs(aside, ahead, radius), to_side))
+        np.less(radius, 0), np.inf, cast(_Numbers, np.where(within, to_discs(aside, ahead, radius), to_side))
     )
 
 
-def to_rectangles(dx: Numbers, dy: Numbers, heading: Numbers, width: Numbers, length: Numbers) -> Numbers:
+def to_rectangles(dx: _Numbers, dy: _Numbers, heading: _Numbers, width: _Numbers, length: _Numbers) -> _Numbers:
     """Distances to rectangles in metres.
 
     Args:

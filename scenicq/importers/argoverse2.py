@@ -18,8 +18,8 @@ from typing import Any
 
 from scenicq.importers.argoverse2_cameras import POSE, calibration_of, check_pose, nearest, views_of
 from scenicq.importers.argoverse2_map import read_archive
-from scenicq.importers.base import ClassNames, Options, Source, read_maps
-from scenicq.importers.by_file import Place, by_file_source, missing, take_map
+from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_feather
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.folders import first_files, readable
@@ -55,7 +55,7 @@ class Argoverse2:
         """Whether the path is a log, or a folder of them, or one of the official folders above."""
         return bool(argoverse2_logs(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open logs; each is read when it is its turn, so memory is that of the largest and of the maps.
 
         Raises:
@@ -72,7 +72,9 @@ class Argoverse2:
             f"argoverse2-{path.resolve().name}",
             maps,
             [
-                Place(log.name, (*(log / name for name in ARGOVERSE2_FILES), *calibration_of(log)), path, log.name)
+                RecordingFiles(
+                    log.name, (*(log / name for name in ARGOVERSE2_FILES), *calibration_of(log)), path, log.name
+                )
                 for log in logs
             ],
             {**taxonomy("argoverse2"), **options.class_map},
@@ -106,7 +108,7 @@ def archive_of(folder: Path) -> Path | None:
     return next(iter(first_files(folder, "log_map_archive_*.json")), None)
 
 
-def _read_log(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+def _read_log(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     labels = _Log(place, classes, report).labels()
     return [(label, f"{place.name}/{_BOXES}") for label in labels]
 
@@ -114,7 +116,7 @@ def _read_log(place: Place, classes: ClassNames, report: Report) -> list[tuple[L
 class _Log:
     """One log; what is unsound is reported and left out."""
 
-    def __init__(self, place: Place, classes: ClassNames, report: Report) -> None:
+    def __init__(self, place: RecordingFiles, classes: ClassNames, report: Report) -> None:
         log = place.files[0].parent
         self._log = log
         self._folder = log.relative_to(place.root).as_posix()

@@ -13,8 +13,8 @@ from typing import Any
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.argoverse2 import archive_of
 from scenicq.importers.argoverse2_map import read_archive
-from scenicq.importers.base import ClassNames, Options, Source, read_maps
-from scenicq.importers.by_file import Place, by_file_source, missing, take_map
+from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_parquet
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import argoverse2_scenarios
@@ -43,7 +43,7 @@ class Argoverse2Forecasting:
         """Whether the path is a scenario's folder, or one that holds them at up to two levels."""
         return bool(argoverse2_scenarios(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open scenarios; each is a recording.
 
         Raises:
@@ -59,7 +59,7 @@ class Argoverse2Forecasting:
         return by_file_source(
             f"argoverse2-forecasting-{path.resolve().name}",
             maps,
-            [Place(_name(file), (file,), path, _name(file)) for file in files],
+            [RecordingFiles(_name(file), (file,), path, _name(file)) for file in files],
             {**taxonomy("argoverse2"), **options.class_map},
             _read_scenario,
             frames=_STEPS * len(files),
@@ -72,7 +72,7 @@ def _name(file: Path) -> str:
     return file.stem.removeprefix("scenario_")
 
 
-def _read_scenario(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
     rows = read_parquet(file, _COLUMNS, _OPTIONAL)
     steps: dict[int, list[LabelObject]] = {}

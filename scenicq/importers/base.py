@@ -30,9 +30,9 @@ __all__ = [
     "Entry",
     "Importer",
     "Labels",
+    "OpenedSource",
     "Options",
     "Reader",
-    "Source",
     "on_the_map",
     "read_class_map",
     "read_maps",
@@ -86,7 +86,7 @@ class Reader(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class OpenedSource:
     """An opened source.
 
     Attributes:
@@ -129,7 +129,7 @@ class Importer(Protocol):
         """Whether a source is of this format: cheap, and True for no source of another format."""
         ...
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open a source.
 
         What is unsound goes to the report and is left out; a source that cannot be read at all is an error.

@@ -11,18 +11,18 @@ from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature, ProblemSink
-from scenicq.importers.base import ClassNames, Entry, Labels, Source
+from scenicq.importers.base import ClassNames, Entry, Labels, OpenedSource
 from scenicq.importers.folders import readable
 from scenicq.importers.report import Report
 from scenicq.store.labels import Label, Recording
 
-__all__ = ["FileReader", "Place", "by_file_source", "content_digest", "map_sink", "missing", "take_map"]
+__all__ = ["FileReader", "RecordingFiles", "by_file_source", "content_digest", "map_sink", "missing", "take_map"]
 
-Make = Callable[["Place", ClassNames, Report], list[tuple[Label, str]]]
+Make = Callable[["RecordingFiles", ClassNames, Report], list[tuple[Label, str]]]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class RecordingFiles:
     """Where a recording lies.
 
     Attributes:
@@ -54,7 +54,7 @@ class FileReader:
         make: Function of a module that reads a recording: labels with their places for messages.
     """
 
-    places: tuple[Place, ...]
+    places: tuple[RecordingFiles, ...]
     classes: Mapping[str, str]
     make: Make
 
@@ -75,14 +75,14 @@ class FileReader:
 def by_file_source(
     name: str,
     maps: Mapping[str, tuple[MapFeature, ...]],
-    places: Sequence[Place],
+    places: Sequence[RecordingFiles],
     classes: Mapping[str, str],
     make: Make,
     *,
     frames: int,
     object_bytes: int,
     facts: Mapping[str, Any],
-) -> Source:
+) -> OpenedSource:
     """A source of such recordings.
 
     Args:
@@ -93,12 +93,12 @@ def by_file_source(
         make: See `FileReader`.
         frames: Number of labels, for progress only.
         object_bytes: About what a label object takes in the main file.
-        facts: See `Source`.
+        facts: See `OpenedSource`.
     """
     named = (replace(place, name=readable(place.name), map=readable(place.map)) for place in places)
     ordered = sorted(named, key=lambda place: place.name)
     by_name = {place.name: place for place in ordered}
-    return Source(
+    return OpenedSource(
         name=readable(name),
         maps=maps,
         entries=tuple(

@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element
 
 from scenicq.geometry.angles import direction
 from scenicq.geometry.features import MapFeature, ProblemSink
-from scenicq.importers.base import ClassNames, Options, Source, read_maps
-from scenicq.importers.by_file import Place, by_file_source, missing, take_map
+from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.commonroad_map import lanelet_features
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
@@ -40,7 +40,7 @@ class CommonRoad:
         """Whether the path is such a file or a folder of them."""
         return bool(commonroad_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open scenarios: their maps are read here, obstacles in turn.
 
         Raises:
@@ -56,7 +56,7 @@ class CommonRoad:
         return by_file_source(
             f"commonroad-{path.resolve().stem}",
             maps,
-            [Place(file.stem, (file,), path, file.stem, choice) for file in files],
+            [RecordingFiles(file.stem, (file,), path, file.stem, choice) for file in files],
             {**taxonomy("commonroad"), **options.class_map},
             _read_scenario,
             frames=_FRAMES * len(files),
@@ -69,7 +69,7 @@ def _read_map(file: Path, on_problem: ProblemSink) -> tuple[MapFeature, ...]:
     return lanelet_features(read_xml(file), on_problem)
 
 
-def _read_scenario(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
     root = read_xml(file)
     step_s = _step(root)

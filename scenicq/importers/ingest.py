@@ -14,7 +14,7 @@ from pathlib import Path
 
 from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.base import Entry, Importer, Options, Source, on_the_map, read_class_map
+from scenicq.importers.base import Entry, Importer, OpenedSource, Options, on_the_map, read_class_map
 from scenicq.importers.folders import readable
 from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
@@ -177,7 +177,7 @@ def _known(writer: DatasetWriter, target: Path | None) -> _Known:
 
 
 def _write_all(
-    opened: Source,
+    opened: OpenedSource,
     writer: DatasetWriter,
     groups: Sequence[Sequence[Entry]],
     known: _Known,
@@ -269,7 +269,7 @@ def _map_files(maps: Sequence[str | Path]) -> dict[str, Path]:
 
 
 def _provenance(
-    source: Path, opened: Source, options: Options, class_map: str | Path | None, strict: bool
+    source: Path, opened: OpenedSource, options: Options, class_map: str | Path | None, strict: bool
 ) -> dict[str, object]:
     return {
         "source": readable(source),

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.base import ClassNames, Options, Source, read_maps
-from scenicq.importers.by_file import Place, by_file_source, missing, take_map
+from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.lanelet2_map import read_lanelets
@@ -39,7 +39,7 @@ class Interaction:
         """Whether the path is the dataset, a scene's folder or one above."""
         return bool(interaction_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open track files; each is a recording.
 
         Raises:
@@ -50,7 +50,7 @@ class Interaction:
             raise missing(path, "no `vehicle_tracks_*.csv`")
         maps = read_maps(options.maps, report)
         choice = () if options.ego is None else (options.ego,)
-        places: list[Place] = []
+        places: list[RecordingFiles] = []
         for file in files:
             scene = file.resolve().parent.name
             if (map_file := _map_file(file, scene)) is not None:
@@ -58,7 +58,7 @@ class Interaction:
             number = file.stem.removeprefix("vehicle_tracks_")
             walkers = file.with_name(f"pedestrian_tracks_{number}.csv")
             both = (file, walkers) if walkers.is_file() else (file,)
-            places.append(Place(f"{scene}/{number}", both, path, scene, choice))
+            places.append(RecordingFiles(f"{scene}/{number}", both, path, scene, choice))
         return by_file_source(
             f"interaction-{path.resolve().name}",
             maps,
@@ -77,7 +77,7 @@ def _map_file(file: Path, scene: str) -> Path | None:
     return next((candidate for candidate in found if candidate.is_file()), None)
 
 
-def _read_tracks(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+def _read_tracks(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     times: dict[int, int] = {}
     members: dict[int, list[LabelObject]] = {}
     for file in place.files:

@@ -24,8 +24,8 @@ from scenicq.importers.base import (
     ClassNames,
     Entry,
     Labels,
+    OpenedSource,
     Options,
-    Source,
     read_class_map,
     read_maps,
 )
@@ -66,7 +66,7 @@ class Interchange:
         """Whether `dataset.json` has the key `interchange`."""
         return is_interchange(path)
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open an interchange folder.
 
         Raises:
@@ -85,7 +85,7 @@ class Interchange:
         maps = read_maps({**found, **options.maps}, report)
         lines, about, count = group_lines(files, options.scratch, report)
         name = header.get("name")
-        return Source(
+        return OpenedSource(
             name=name if isinstance(name, str) and name else readable(path.resolve().name),
             maps=maps,
             entries=tuple(Entry(name, size // _OBJECT_BYTES, digest) for name, (size, digest) in about.items()),

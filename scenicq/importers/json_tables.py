@@ -14,7 +14,7 @@ import msgspec
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
 
-__all__ = ["Block", "Rows", "read_list"]
+__all__ = ["ElementBlock", "Rows", "read_list"]
 
 Rows: TypeAlias = "msgspec.json.Decoder[list[Any]]"
 """Decodes elements that are sound, as structs or what else msgspec has for objects."""
@@ -30,7 +30,7 @@ _BETWEEN = re.compile(r"\}\s{0,99},\s{0,99}\{")
 _decode = json.JSONDecoder().raw_decode
 
 
-class Block:
+class ElementBlock:
     """Neighbouring elements of a list.
 
     Attributes:
@@ -70,7 +70,7 @@ class Block:
         return self._lines[number]
 
 
-def read_list(path: Path, rows: Rows | None = None) -> Iterator[Block]:
+def read_list(path: Path, rows: Rows | None = None) -> Iterator[ElementBlock]:
     """The elements of a JSON list in order.
 
     Memory is that of a chunk of the file and of what it holds, or of one element.
@@ -108,7 +108,7 @@ def read_list(path: Path, rows: Rows | None = None) -> Iterator[Block]:
                             raise _invalid(path, line, "is cut off or is not JSON here") from error
                         buffer, position, untried = buffer[position:] + more, 0, True
                         continue
-                    block = Block(buffer[position:end], line, elements=[element])
+                    block = ElementBlock(buffer[position:end], line, elements=[element])
                 yield block
                 line += block.text.count("\n")
                 position += len(block.text)
@@ -124,7 +124,7 @@ def _skip_gap(text: str, line: int, position: int) -> tuple[int, int]:
     return line + text.count("\n", position, end), end
 
 
-def _at_once(buffer: str, position: int, line: int, rows: Rows | None) -> Block | None:
+def _at_once(buffer: str, position: int, line: int, rows: Rows | None) -> ElementBlock | None:
     """All elements but what may be cut off; None where they must be read one by one.
 
     Wherever the text is cut but between two elements of the list, it is left with an open string or bracket. So what
@@ -137,9 +137,9 @@ def _at_once(buffer: str, position: int, line: int, rows: Rows | None) -> Block 
     with without_collector():
         if rows is not None:
             with suppress(RecursionError, msgspec.DecodeError):
-                return Block(text, line, rows=rows.decode(f"[{text}]"))
+                return ElementBlock(text, line, rows=rows.decode(f"[{text}]"))
         with suppress(RecursionError, ValueError):
-            return Block(text, line, elements=json.loads(f"[{text}]"))
+            return ElementBlock(text, line, elements=json.loads(f"[{text}]"))
     return None
 
 

@@ -12,8 +12,8 @@ from collections import defaultdict
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.base import ClassNames, Options, Source, read_maps
-from scenicq.importers.by_file import Place, by_file_source, missing
+from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import kitti_files
 from scenicq.importers.motion import Rigid, euler, matrix, velocities
@@ -42,7 +42,7 @@ class Kitti:
         """Whether the path has the labels."""
         return bool(kitti_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open sequences; each is a recording.
 
         Raises:
@@ -68,13 +68,13 @@ class Kitti:
         )
 
 
-def _place(file: Path, root: Path, map_name: str) -> Place:
+def _place(file: Path, root: Path, map_name: str) -> RecordingFiles:
     base = file.parent.parent
     others = (base / "oxts" / file.name, base / "calib" / file.name)
-    return Place(file.stem, (file, *(other for other in others if other.is_file())), root, map_name)
+    return RecordingFiles(file.stem, (file, *(other for other in others if other.is_file())), root, map_name)
 
 
-def _read_sequence(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
     extra = {path.parent.name: path for path in place.files[1:]}
     camera = _FORWARD_CAMERA
@@ -103,7 +103,9 @@ def _read_sequence(place: Place, classes: ClassNames, report: Report) -> list[tu
     return _labels(place, by_frame, poses)
 
 
-def _labels(place: Place, by_frame: dict[int, list[LabelObject]], poses: list[Rigid] | None) -> list[tuple[Label, str]]:
+def _labels(
+    place: RecordingFiles, by_frame: dict[int, list[LabelObject]], poses: list[Rigid] | None
+) -> list[tuple[Label, str]]:
     tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
     for frame in sorted(by_frame) if poses else ():
         for member in by_frame[frame]:
@@ -128,7 +130,7 @@ def _labels(place: Place, by_frame: dict[int, list[LabelObject]], poses: list[Ri
     return made
 
 
-def _prefix(place: Place) -> str:
+def _prefix(place: RecordingFiles) -> str:
     relative = place.files[0].parent.parent.relative_to(place.root).as_posix()
     return "" if relative == "." else f"{relative}/"
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.base import Entry, Options, Source, read_maps
+from scenicq.importers.base import Entry, OpenedSource, Options, read_maps
 from scenicq.importers.folders import readable
 from scenicq.importers.layouts import is_nuscenes, nuscenes_folders
 from scenicq.importers.nuscenes_scenes import AXLE_TO_CENTRE_M, EGO_SIZE_M, LONGEST_STEP_US, POSE_CHANNEL, SceneReader
@@ -40,7 +40,7 @@ class NuScenes:
         """Whether the path is a folder of tables, or has exactly one."""
         return is_nuscenes(path)
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open a dataroot or one of its `v1.0-*` folders.
 
         All tables are read here; memory grows with the source, about 200 bytes an annotation.
@@ -62,7 +62,7 @@ class NuScenes:
         classes = {**taxonomy("nuscenes"), **options.class_map}
         scenes = sorted(((tables.scene(token) for token in tables.scenes)), key=lambda scene: scene.name)
         by_name = {scene.name: scene for scene in scenes}
-        return Source(
+        return OpenedSource(
             name=readable(f"nuscenes-{folder.name}"),
             maps=maps,
             entries=tuple(Entry(scene.name, scene.weight, scene.digest()) for scene in scenes),

@@ -16,7 +16,7 @@ from scenicq.importers import fields
 from scenicq.importers.cameras import Mount, Pose, posed
 from scenicq.importers.cameras import pose_of as vehicle_pose
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.json_tables import Block, Rows, read_list
+from scenicq.importers.json_tables import ElementBlock, Rows, read_list
 from scenicq.importers.nuscenes_boxes import Box, Boxes, BoxReader, found, joined, of_rows, pose
 from scenicq.importers.nuscenes_rows import ANNOTATIONS, EGO_POSES, SENSOR_FILES
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
@@ -75,7 +75,7 @@ class _Place:
 
     __slots__ = ("_block", "_file", "_number")
 
-    def __init__(self, file: str, block: Block, number: int) -> None:
+    def __init__(self, file: str, block: ElementBlock, number: int) -> None:
         self._file = file
         self._block = block
         self._number = number
@@ -222,7 +222,7 @@ class Tables:
                 first += self._boxes_of[sample.token]
         self._order = np.argsort(rank[self._boxes.samples], kind="stable")
 
-    def _boxes_in(self, reader: BoxReader, file: str, block: Block) -> Boxes:
+    def _boxes_in(self, reader: BoxReader, file: str, block: ElementBlock) -> Boxes:
         boxes = reader.columns(block.rows) if block.rows is not None else None
         if boxes is not None:
             return boxes
@@ -248,7 +248,7 @@ class Tables:
             yield from self._rows_in(block, path.name, what, block.rows)
 
     def _rows_in(
-        self, block: Block, file: str, what: str, decoded: list[Any] | None = None
+        self, block: ElementBlock, file: str, what: str, decoded: list[Any] | None = None
     ) -> Iterator[tuple[str, Record, _Place]]:
         # only where a character is named by its number can there be half of one
         escapes = decoded is None and "\\u" in block.text

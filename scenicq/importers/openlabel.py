@@ -16,8 +16,8 @@ from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers import fields
-from scenicq.importers.base import ClassNames, Options, Source, read_maps
-from scenicq.importers.by_file import Place, by_file_source, missing
+from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.layouts import openlabel_files
@@ -45,7 +45,7 @@ class OpenLabel:
         """Whether the path is such a file or a folder of them."""
         return bool(openlabel_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open files.
 
         Raises:
@@ -60,7 +60,7 @@ class OpenLabel:
         return by_file_source(
             f"openlabel-{path.resolve().stem}",
             maps,
-            [Place(file.stem, (file,), path, map_name, choice) for file in files],
+            [RecordingFiles(file.stem, (file,), path, map_name, choice) for file in files],
             {**taxonomy("scenic"), **taxonomy("openlabel"), **options.class_map},
             _read_file,
             frames=0,
@@ -72,7 +72,7 @@ class OpenLabel:
         )
 
 
-def _read_file(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+def _read_file(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
     try:
         if file.stat().st_size > _LARGEST_BYTES:

@@ -97,6 +97,8 @@ def read_predictions(path: Path) -> Predictions:
         case _:
             message = f"{path}: its name does not say which kind of predictions it holds"
             raise DataError(Diagnostic("file-invalid", message, hints=(_HINT,)))
+    # the pool keeps what the file's table took, twice the room of the boxes
+    pa.default_memory_pool().release_unused()
     _check(found)
     return found
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.folders import readable
 from scenicq.store.manifest import LeftOut
-from scenicq.store.segment import Problem
+from scenicq.store.segment import SourceProblem
 
 __all__ = ["Report"]
 
@@ -31,7 +31,7 @@ class Report:
         """
         self._strict = strict
         self._counts: Counter[tuple[bool, str, str, str]] = Counter()
-        self._told: list[Problem] = []
+        self._told: list[SourceProblem] = []
         self._told_of: Counter[tuple[str, str]] = Counter()
 
     def left_out(self, what: str, code: str, message: str, *, hints: tuple[str, ...] = ()) -> None:
@@ -46,7 +46,7 @@ class Report:
         Raises:
             DataError: The ingest is strict.
         """
-        self._add(Problem(what, code, "", False, message, hints))
+        self._add(SourceProblem(what, code, "", False, message, hints))
 
     def kept(self, what: str, code: str, message: str, *, name: str = "", hints: tuple[str, ...] = ()) -> None:
         """Something is taken with a defect.
@@ -65,9 +65,9 @@ class Report:
         if name and key in self._counts:
             self._counts[key] += 1
         else:
-            self._add(Problem(what, code, name, True, message, hints))
+            self._add(SourceProblem(what, code, name, True, message, hints))
 
-    def merge(self, counts: Iterable[tuple[str, str, str, bool, int]], told: Iterable[Problem]) -> None:
+    def merge(self, counts: Iterable[tuple[str, str, str, bool, int]], told: Iterable[SourceProblem]) -> None:
         """Take in the `tally` and the `told` of another report, as if its problems had been reported here."""
         before = {key for key in self._counts if key[0] and key[3]}
         for problem in told:
@@ -83,7 +83,7 @@ class Report:
         return tuple((entry.what, entry.code, entry.name, entry.kept, entry.count) for entry in self.counts)
 
     @property
-    def told(self) -> tuple[Problem, ...]:
+    def told(self) -> tuple[SourceProblem, ...]:
         """The first problems of each kind."""
         return tuple(self._told)
 
@@ -107,7 +107,7 @@ class Report:
     def _total(self, what: str, code: str) -> int:
         return sum(count for (_, *key, _name), count in self._counts.items() if key == [what, code])
 
-    def _add(self, problem: Problem) -> None:
+    def _add(self, problem: SourceProblem) -> None:
         problem = replace(problem, name=readable(problem.name), message=readable(problem.message))
         if self._strict:
             raise DataError(Diagnostic(problem.code, problem.message, hints=problem.hints))
@@ -118,5 +118,5 @@ class Report:
             self._told.append(problem)
 
 
-def _key(problem: Problem) -> tuple[bool, str, str, str]:
+def _key(problem: SourceProblem) -> tuple[bool, str, str, str]:
     return problem.kept, problem.what, problem.code, problem.name

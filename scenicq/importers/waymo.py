@@ -13,8 +13,8 @@ from pathlib import Path
 
 from scenicq.errors import DataError
 from scenicq.geometry.features import MapFeature
-from scenicq.importers.base import ClassNames, Options, Source, read_maps
-from scenicq.importers.by_file import Place, by_file_source, map_sink, missing
+from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.by_file import RecordingFiles, by_file_source, map_sink, missing
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import waymo_files
 from scenicq.importers.motion import heading_of_yaw
@@ -44,7 +44,7 @@ class Waymo:
         """Whether the path is such a file or a folder of them."""
         return bool(waymo_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         """Open files: their scenarios are listed and their maps are read; tracks are read in turn.
 
         Raises:
@@ -54,7 +54,7 @@ class Waymo:
         if not files:
             raise missing(path, "no `*.tfrecord`")
         maps = read_maps(options.maps, report)
-        places: dict[str, Place] = {}
+        places: dict[str, RecordingFiles] = {}
         for file in files:
             try:
                 _list_scenarios(file, path, maps, places, report)
@@ -77,7 +77,7 @@ class Waymo:
 
 
 def _list_scenarios(
-    file: Path, root: Path, maps: dict[str, tuple[MapFeature, ...]], places: dict[str, Place], report: Report
+    file: Path, root: Path, maps: dict[str, tuple[MapFeature, ...]], places: dict[str, RecordingFiles], report: Report
 ) -> None:
     for offset, content in records(file):
         where = f"{file.name}: the record at byte {offset}"
@@ -93,12 +93,12 @@ def _list_scenarios(
             continue
         digest = hashlib.blake2b(content, digest_size=16).hexdigest()
         weight = len(content) // _OBJECT_BYTES
-        places[name] = Place(name, (file,), root, name, (str(offset),), weight, digest)
+        places[name] = RecordingFiles(name, (file,), root, name, (str(offset),), weight, digest)
         if name not in maps:
             maps[name] = scenario_features(scenario.get(_MAP, []), map_sink(f"{file.name}: scenario {name}", report))
 
 
-def _read_scenario(place: Place, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
+def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     where = f"{place.files[0].name}: scenario {place.name}"
     try:
         scenario = parse(read_record(place.files[0], int(place.options[0])))

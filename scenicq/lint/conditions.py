@@ -76,7 +76,7 @@ def _dropped(scenario: Scenario, body: tuple[ast.Statement, ...]) -> Iterator[Di
     """Requirements that are known to hold without a scene: the compiler has left them out."""
     kept = {each.span for each in (*scenario.requirements, *scenario.soft)}
     for statement in body:
-        timed = isinstance(statement, ast.Require) and isinstance(statement.condition, ast.Temporal | ast.Until)
+        timed = isinstance(statement, ast.Require) and isinstance(statement.condition, ast.Temporal | ast.UntilOperator)
         if isinstance(statement, ast.Require) and not timed and statement.span not in kept:
             yield _always(statement.span)
 
@@ -228,13 +228,13 @@ def _may_hold(shape: Polygon | MultiPolygon, short: float, long: float) -> bool:
 def _folded(scenario: Scenario, options: MatchOptions) -> Iterator[Diagnostic]:
     """Classes that the program names and `--classes coarse` does not tell from others."""
     told: dict[str, None] = {}
-    for thing in scenario.objects:
-        if options.classes == "fine" or thing.category in told or not is_class(thing.category):
+    for owner in scenario.objects:
+        if options.classes == "fine" or owner.category in told or not is_class(owner.category):
             continue
-        folded = fold(thing.category, options.classes)
-        if folded != thing.category:
-            told[thing.category] = None
+        folded = fold(owner.category, options.classes)
+        if folded != owner.category:
+            told[owner.category] = None
             yield _warning(
-                "class-folded", f"with coarse classes `{thing.category}` matches every `{folded}`", thing.span,
+                "class-folded", f"with coarse classes `{owner.category}` matches every `{folded}`", owner.span,
                 "this class is folded", "`--classes fine` tells them apart",
             )  # fmt: skip

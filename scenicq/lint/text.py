@@ -52,12 +52,12 @@ def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[
 # --- angles
 
 
-def _number(node: ast.Node) -> float | None:
+def _number(node: ast.SyntaxNode) -> float | None:
     """The value of a number that the text says outright."""
     match node:
-        case ast.Constant(value=bool()):
+        case ast.LiteralValue(value=bool()):
             return None
-        case ast.Constant(value=int() | float() as value):
+        case ast.LiteralValue(value=int() | float() as value):
             return float(value)
         case ast.UnaryOp(operator="-" | "+" as sign):
             inner = _number(node.operand)
@@ -69,7 +69,7 @@ def _number(node: ast.Node) -> float | None:
             return None
 
 
-def _terms(node: ast.Node) -> Iterator[ast.Node]:
+def _terms(node: ast.SyntaxNode) -> Iterator[ast.SyntaxNode]:
     """The numbers that an expression of an angle is made of, down to those with `deg`."""
     stack = [node]
     while stack:
@@ -88,7 +88,7 @@ def _terms(node: ast.Node) -> Iterator[ast.Node]:
                 pass
 
 
-def _is_angle(node: ast.Node) -> bool:
+def _is_angle(node: ast.SyntaxNode) -> bool:
     match node:
         case ast.Attribute(name=name):
             return name in _ANGLE_PROPERTIES
@@ -102,9 +102,9 @@ def _is_angle(node: ast.Node) -> bool:
             return isinstance(node, _ANGLES)
 
 
-def _angles(node: ast.Node) -> Iterator[Diagnostic]:
+def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Numbers of more than a full turn where an angle stands."""
-    places: list[ast.Node] = []
+    places: list[ast.SyntaxNode] = []
     match node:
         case ast.FacingSpecifier() | ast.ApparentlyFacingSpecifier():
             places = [node.heading]
@@ -112,7 +112,7 @@ def _angles(node: ast.Node) -> Iterator[Diagnostic]:
             places = [node.value]
         case ast.PropertyDefault(name=name) if name in _ANGLE_PROPERTIES:
             places = [node.value]
-        case ast.Compare():
+        case ast.ComparisonChain():
             sides = [node.left, *(each.right for each in node.comparisons if each.operator in _ORDERS)]
             if any(map(_is_angle, sides)):
                 places = [side for side in sides if not _is_angle(side)]
@@ -132,7 +132,7 @@ def _angles(node: ast.Node) -> Iterator[Diagnostic]:
 # --- ranges
 
 
-def _range(node: ast.Node) -> Iterator[Diagnostic]:
+def _range(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     match node:
         case ast.Call(function=ast.Name(id=name)) if name in _RANGES and len(node.arguments) >= 2:
             low, high = (_number(argument.value) for argument in node.arguments[-2:])
@@ -149,7 +149,7 @@ def _range(node: ast.Node) -> Iterator[Diagnostic]:
 # --- names
 
 
-def _unused(nodes: list[ast.Node]) -> Iterator[Diagnostic]:
+def _unused(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     """Variables that are set and never read; an object is there whether it is named again or not."""
     assigned = [(target, node) for node in nodes if isinstance(node, ast.Assign) for target in node.targets]
     written = {id(target) for target, _ in assigned}
@@ -181,7 +181,7 @@ def _library_properties() -> frozenset[str]:
     return frozenset(names | roots) | _OF_SCENIC
 
 
-def _unknown_properties(nodes: Iterable[ast.Node]) -> Iterator[Diagnostic]:
+def _unknown_properties(nodes: Iterable[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     """Properties that no class has and that the program does not read itself."""
     nodes = list(nodes)
     known = set(_library_properties())

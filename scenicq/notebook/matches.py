@@ -18,7 +18,7 @@ from scenicq.evaluate.evaluation import evaluate
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.notebook.judgements import Judgement
-from scenicq.notebook.pictures import Picture, Text
+from scenicq.notebook.pictures import DisplayedText, Picture
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.result_origin import ORIGIN, name_origin
 from scenicq.query.execution.result_tables import result_schema, result_table
@@ -92,7 +92,7 @@ class FrameResult:
         """The sensor file of each channel."""
         return self.record["sensors"]
 
-    def explain(self) -> Text:
+    def explain(self) -> DisplayedText:
         """Why the frame matches, or what keeps it from it."""
         return self.matches.explain(self.frame)
 
@@ -105,7 +105,7 @@ class FrameResult:
 
     def __repr__(self) -> str:
         """Frame, verdict and roles."""
-        roles = " ".join(f"{role}={thing}" for role, thing in self.roles.items() if (role, thing) != ("ego", "ego"))
+        roles = " ".join(f"{role}={played}" for role, played in self.roles.items() if (role, played) != ("ego", "ego"))
         return f"<{self.verdict} {self.frame}{': ' if roles else ''}{roles}>"
 
 
@@ -167,9 +167,9 @@ class Matches(Sequence[FrameResult]):
         return self.query.funnel
 
     @property
-    def warnings(self) -> tuple[Text, ...]:
+    def warnings(self) -> tuple[DisplayedText, ...]:
         """What the author of the program should know."""
-        return tuple(Text(render(each)) for each in self.funnel.warnings)
+        return tuple(DisplayedText(render(each)) for each in self.funnel.warnings)
 
     def to_arrow(self) -> pa.Table:
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
@@ -191,7 +191,7 @@ class Matches(Sequence[FrameResult]):
             self._backdrops[label.map] = Backdrop(self.query.dataset.network(label.map))
         return Shot(label, world.scenario, verdict, why), self._backdrops[label.map]
 
-    def explain(self, frame: str) -> Text:
+    def explain(self, frame: str) -> DisplayedText:
         """Why a frame matches, or what keeps it from it and which tolerance would do.
 
         Args:
@@ -203,7 +203,7 @@ class Matches(Sequence[FrameResult]):
         label = self.query.dataset.label(frame)
         with LazySolver(self.query.options.solver) as solver:
             matcher = Matcher(self.query.world(label.map).scenario, self.query.options.match, solver)
-            return Text(show_explanation(explain(matcher, label)))
+            return DisplayedText(show_explanation(explain(matcher, label)))
 
     def show(self, frame: str, *, half: float | None = None, width: int = 600) -> Picture:
         """A frame from above, with what the program says of it.
@@ -284,5 +284,5 @@ class Matches(Sequence[FrameResult]):
 
 
 def _cells(each: FrameResult) -> str:
-    objects = ", ".join(f"{role}={thing}" for role, thing in each.roles.items() if (role, thing) != ("ego", "ego"))
+    objects = ", ".join(f"{role}={played}" for role, played in each.roles.items() if (role, played) != ("ego", "ego"))
     return "".join(f"<td>{escape(text)}</td>" for text in (each.frame, each.recording, each.verdict, objects))

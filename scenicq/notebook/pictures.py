@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-__all__ = ["Picture", "Text"]
+__all__ = ["DisplayedText", "Picture"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Picture:
         return f"<picture, {len(self.svg):,} characters of SVG>"
 
 
-class Text(str):
+class DisplayedText(str):
     """A text of several lines that a notebook shows as it is."""
 
     __slots__ = ()

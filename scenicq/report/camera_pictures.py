@@ -31,22 +31,22 @@ class SpaceBox:
     told: str
 
 
-def space_box(thing: LabelObject, kind: str, told: str) -> SpaceBox | None:
+def space_box(member: LabelObject, kind: str, told: str) -> SpaceBox | None:
     """The box of a label object; None where its height, heading or size is not known.
 
     Args:
-        thing: The object; where its tilt is not known it stands upright.
+        member: The object; where its tilt is not known it stands upright.
         kind: Classes for the style.
         told: What is said of it.
     """
-    space, size = thing.out_of_plane, (thing.width, thing.length, thing.height)
-    if space is None or space.z is None or thing.heading is None:
+    space, size = member.out_of_plane, (member.width, member.length, member.height)
+    if space is None or space.z is None or member.heading is None:
         return None
     width, length, height = size
     if width is None or length is None or height is None:
         return None
     corners = box_corners(
-        (thing.x, thing.y, space.z), (width, length, height), thing.heading, space.pitch or 0.0, space.roll or 0.0
+        (member.x, member.y, space.z), (width, length, height), member.heading, space.pitch or 0.0, space.roll or 0.0
     )
     return SpaceBox(corners, kind, told)
 

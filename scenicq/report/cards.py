@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.frames import badge, frame_facts
 from scenicq.report.picture import Shot, View, draw_shot, ground, plane_of, view_of
-from scenicq.report.runs import Run
+from scenicq.report.runs import FrameRun
 from scenicq.report.sensors import Sensor
 from scenicq.report.sheet import tile
 from scenicq.report.svg import element, escape
@@ -35,7 +35,7 @@ class Card:
     """
 
     number: int
-    run: Run
+    run: FrameRun
     shots: tuple[Shot, ...]
     sensors: tuple[Sequence[Sensor], ...]
     backdrop: Backdrop
@@ -49,7 +49,7 @@ class Card:
 
 
 def _told(shot: Shot) -> str:
-    played = ", ".join(f"{role.name} is {role.thing.id}" for role in shot.roles)
+    played = ", ".join(f"{role.name} is {role.member.id}" for role in shot.roles)
     return f"Bird's-eye view of frame {shot.label.frame}: {played or 'no roles'}"
 
 
@@ -83,7 +83,7 @@ def _inline(card: Card) -> str:
     )
 
 
-def best_frame(run: Run, shots: Sequence[Shot]) -> int:
+def best_frame(run: FrameRun, shots: Sequence[Shot]) -> int:
     """Index of the frame in which the farthest of the roles is nearest to the ego, of equal ones the middle one.
 
     Args:
@@ -91,7 +91,7 @@ def best_frame(run: Run, shots: Sequence[Shot]) -> int:
         shots: Its frames.
     """
     middle = (len(shots) - 1) / 2
-    far = [max((math.hypot(r.thing.x - s.label.ego.x, r.thing.y - s.label.ego.y) for r in s.roles), default=0.0)
+    far = [max((math.hypot(r.member.x - s.label.ego.x, r.member.y - s.label.ego.y) for r in s.roles), default=0.0)
            for s in shots]  # fmt: skip
     return min(range(len(run.results)), key=lambda place: (round(far[place], 1), abs(place - middle)))
 

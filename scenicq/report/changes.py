@@ -15,7 +15,7 @@ from scenicq.report.frames import table
 from scenicq.report.page import page
 from scenicq.report.svg import element, escape
 
-__all__ = ["Change", "changes", "changes_page", "changes_text", "check_datasets"]
+__all__ = ["FrameChange", "changes", "changes_page", "changes_text", "check_datasets"]
 
 Kind = Literal["came", "went", "recast", "stayed"]
 _TOLD: dict[Kind, str] = {
@@ -28,7 +28,7 @@ _MARKS: dict[Kind, str] = {"came": "+", "went": "-", "recast": "~", "stayed": "=
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class FrameChange:
     """What became of one frame that matches in either file.
 
     Attributes:
@@ -51,7 +51,7 @@ def _played(record: Record | None) -> dict[str, str] | None:
         return None
     given = record.get("correspondence")
     roles = cast("dict[object, object]", given) if isinstance(given, dict) else {}
-    return {str(role): str(thing) for role, thing in roles.items()}
+    return {str(role): str(played) for role, played in roles.items()}
 
 
 def _why(record: Record | None) -> str:
@@ -64,14 +64,14 @@ def _why(record: Record | None) -> str:
     return ": ".join((parts[0], ", ".join(parts[1:]))) if parts[1:] else parts[0]
 
 
-def changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> list[Change]:
+def changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> list[FrameChange]:
     """What became of each frame that matches in either, by recording, then time.
 
     Args:
         before: Records of the first file by frame.
         after: Records of the second.
     """
-    found: list[tuple[tuple[str, int, str], Change]] = []
+    found: list[tuple[tuple[str, int, str], FrameChange]] = []
     for frame in before.keys() | after.keys():
         old, new = before.get(frame), after.get(frame)
         was, is_ = _played(old), _played(new)
@@ -80,7 +80,7 @@ def changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> list[C
         record = cast(Record, new if is_ is not None else old)
         kind: Kind = "came" if was is None else "went" if is_ is None else "stayed" if was == is_ else "recast"
         why = _why(old if was is None else new if is_ is None else None)
-        change = Change(kind, frame, record["recording"], was or {}, is_ or {}, why)
+        change = FrameChange(kind, frame, record["recording"], was or {}, is_ or {}, why)
         time = record.get("timestamp_us")
         found.append(((record["recording"], time if isinstance(time, int) else 0, frame), change))
     return [change for _, change in sorted(found, key=lambda each: each[0])]
@@ -114,25 +114,25 @@ def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) ->
 
 
 def _cast(roles: Mapping[str, str]) -> str:
-    return " ".join(f"{role}={thing}" for role, thing in roles.items() if (role, thing) != ("ego", "ego"))
+    return " ".join(f"{role}={played}" for role, played in roles.items() if (role, played) != ("ego", "ego"))
 
 
-def _objects(change: Change) -> str:
+def _objects(change: FrameChange) -> str:
     if change.kind == "recast":
         return f"{_cast(change.before)} -> {_cast(change.after)}"
     return _cast(change.after or change.before)
 
 
-def _elsewhere(change: Change) -> str:
+def _elsewhere(change: FrameChange) -> str:
     """What the file in which the frame does not match says of it."""
     return change.why and f"in {'A' if change.kind == 'came' else 'B'} {change.why}"
 
 
-def _counts(found: Sequence[Change]) -> list[tuple[Kind, int]]:
+def _counts(found: Sequence[FrameChange]) -> list[tuple[Kind, int]]:
     return [(kind, sum(change.kind == kind for change in found)) for kind in _TOLD]
 
 
-def changes_text(found: Sequence[Change], *, every: bool = False) -> str:
+def changes_text(found: Sequence[FrameChange], *, every: bool = False) -> str:
     """The changes as text, without a newline at the end.
 
     Args:
@@ -151,7 +151,7 @@ def changes_text(found: Sequence[Change], *, every: bool = False) -> str:
     return "\n".join(lines)
 
 
-def _section(kind: Kind, found: Sequence[Change]) -> str:
+def _section(kind: Kind, found: Sequence[FrameChange]) -> str:
     """What became of some frames in the same way: why, then which; those in a row alike share an item."""
     causes = Counter(_elsewhere(change) for change in found if change.why)
     told = [(escape(cause), f"{count:,}") for cause, count in causes.most_common()]
@@ -166,7 +166,7 @@ def _section(kind: Kind, found: Sequence[Change]) -> str:
     return element("details", title, reasons, element("ul", *items), open=kind != "stayed", class_="change")
 
 
-def changes_page(found: Sequence[Change], names: tuple[str, str]) -> str:
+def changes_page(found: Sequence[FrameChange], names: tuple[str, str]) -> str:
     """The changes as a page that needs nothing but itself.
 
     Args:

@@ -53,18 +53,20 @@ def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str
 
 
 def _roles(shot: Shot) -> str:
-    ego = next((role.thing for role in shot.roles if shot.scenario and role.index == shot.scenario.ego), None)
+    ego = next((role.member for role in shot.roles if shot.scenario and role.index == shot.scenario.ego), None)
     rows: list[tuple[str, ...]] = []
     for role in shot.roles:
-        thing = role.thing
+        member = role.member
         where: list[str] = []
-        if ego is not None and thing is not ego and ego.heading is not None:
-            right, ahead = rotate(thing.x - ego.x, thing.y - ego.y, -ego.heading)
+        if ego is not None and member is not ego and ego.heading is not None:
+            right, ahead = rotate(member.x - ego.x, member.y - ego.y, -ego.heading)
             where = [f"{ahead:+z.1f} m ahead", f"{right:+z.1f} m right"]
-            if thing.heading is not None:
-                where.append(f"{math.degrees(normalize(thing.heading - ego.heading)):+z.0f}\N{DEGREE SIGN} turned")
+            if member.heading is not None:
+                where.append(f"{math.degrees(normalize(member.heading - ego.heading)):+z.0f}\N{DEGREE SIGN} turned")
         name = element("span", escape(role.name), class_=f"chip {role.colour}")
-        played = element("span", escape(thing.id), class_="id") + element("div", escape(thing.category), class_="time")
+        played = element("span", escape(member.id), class_="id") + element(
+            "div", escape(member.category), class_="time"
+        )
         rows.append((name, played, "<br>".join(element("span", escape(each), class_="where") for each in where)))
     return table("Roles", ("role", "object and class", "from the ego"), rows)
 
@@ -82,7 +84,7 @@ def variable_texts(scenario: Scenario) -> dict[str, str]:
     """
     roots = [requirement.condition for requirement in scenario.requirements]
     roots += [given.value for given in scenario.params.values()]
-    roots += [given.value for thing in scenario.objects for given in thing.properties.values()]
+    roots += [given.value for owner in scenario.objects for given in owner.properties.values()]
     return {leaf.span.mark: " ".join(leaf.span.text.split()) for leaf in leaves(*roots) if leaf.span is not None}
 
 
@@ -169,11 +171,13 @@ def _sensors(shot: Shot, sensors: Sequence[Sensor]) -> str:
 
 def _boxes(shot: Shot) -> Iterator[SpaceBox]:
     """The objects of a frame, those with a role in its colour and last."""
-    roles = {role.thing.id: role for role in shot.roles}
-    for thing in sorted(shot.label.objects, key=lambda thing: thing.id in roles):
-        role = roles.get(thing.id)
-        told = f"{thing.id}, {thing.category}" if role is None else f"role {role.name}, {thing.id}, {thing.category}"
-        box = space_box(thing, "other" if role is None else f"asked {role.colour}", told)
+    roles = {role.member.id: role for role in shot.roles}
+    for member in sorted(shot.label.objects, key=lambda member: member.id in roles):
+        role = roles.get(member.id)
+        told = (
+            f"{member.id}, {member.category}" if role is None else f"role {role.name}, {member.id}, {member.category}"
+        )
+        box = space_box(member, "other" if role is None else f"asked {role.colour}", told)
         if box is not None:
             yield box
 

@@ -17,7 +17,7 @@ from typing import assert_never, cast
 
 import shapely
 
-from scenicq.forest.bounds import Interval, scalar_bounds, vector_bounds
+from scenicq.forest.bounds import FloatInterval, scalar_bounds, vector_bounds
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.condition import condition
 from scenicq.forest.evaluate import Observation, evaluate
@@ -59,7 +59,7 @@ from scenicq.geometry.shapes import Bounds, Shape
 from scenicq.geometry.terms import rectangle_shape
 from scenicq.query.explain.violations import choices
 
-__all__ = ["Place", "allowed_headings", "allowed_place", "outline", "views"]
+__all__ = ["PossibleArea", "allowed_headings", "allowed_place", "outline", "views"]
 
 _MOST_RANGES = 6
 _THIN = 0.2
@@ -69,7 +69,7 @@ _STEP = math.tau / 128
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PossibleArea:
     """Where an object may be.
 
     Attributes:
@@ -187,7 +187,7 @@ def _reach(root: Node, bounds: Bounds) -> tuple[list[Shape], bool] | None:
     return ([shapes.box(*box)] if box[0] <= box[2] and box[1] <= box[3] else []), False
 
 
-def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds: Bounds) -> Place | None:
+def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds: Bounds) -> PossibleArea | None:
     """Where an object may be, as far as the values of the other objects' features are known.
 
     Args:
@@ -199,9 +199,9 @@ def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds:
     Returns:
         None where anything is allowed, or nothing can be said.
     """
-    thing = scenario.objects[index]
-    given = thing.properties.get("position")
-    if given is None or thing.mutated:
+    owner = scenario.objects[index]
+    given = owner.properties.get("position")
+    if given is None or owner.mutated:
         return None
     pieces: list[Shape] = []
     exact = True
@@ -218,17 +218,17 @@ def allowed_place(scenario: Scenario, index: int, observed: Observation, bounds:
             exact = exact and found[1]
     except CannotEvaluate:
         return None
-    return Place(_visible(pieces), exact, not features(given.value)) if options else None
+    return PossibleArea(_visible(pieces), exact, not features(given.value)) if options else None
 
 
-def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> tuple[Interval, ...] | None:
+def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> tuple[FloatInterval, ...] | None:
     """The headings that an object may have, in radians; arguments and None as of `allowed_place`.
 
     Outer bounds where a heading is not affine. An interval may pass pi.
     """
-    thing = scenario.objects[index]
-    given = thing.properties.get("heading")
-    if given is None or thing.mutated:
+    owner = scenario.objects[index]
+    given = owner.properties.get("heading")
+    if given is None or owner.mutated:
         return None
     try:
         root = condition(given.value, observed)
@@ -245,7 +245,7 @@ def allowed_headings(scenario: Scenario, index: int, observed: Observation) -> t
 def views(scenario: Scenario, observed: Observation) -> tuple[Disc | Sector, ...]:
     """The view regions that the scenario's positions and requirements speak of, as far as they are known."""
     roots = [requirement.condition for requirement in scenario.requirements]
-    roots += [thing.properties["position"].value for thing in scenario.objects if "position" in thing.properties]
+    roots += [owner.properties["position"].value for owner in scenario.objects if "position" in owner.properties]
     found: dict[tuple[float, ...], Disc | Sector] = {}
     for node in postorder(roots):
         if isinstance(node, SectorAt | DiscAt):

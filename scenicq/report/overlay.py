@@ -49,7 +49,7 @@ def blames(scenario: Scenario, causes: Iterable[tuple[str, Span | None]]) -> tup
     found: list[Blame] = []
     for what, span in causes:
         name, _, _ = what.partition(".")
-        about = frozenset(thing.index for thing in scenario.objects if thing.name == name)
+        about = frozenset(owner.index for owner in scenario.objects if owner.name == name)
         stated = next((each for each in scenario.requirements if span is not None and each.span == span), None)
         if stated is not None and not about:
             about = frozenset(stated.objects) or frozenset(index for index, _ in features(stated.condition))
@@ -62,8 +62,8 @@ def _red(broken: tuple[Blame, ...], role: Role, name: str) -> str:
 
 
 def _wedge(role: Role, low: float, high: float, plane: Plane) -> str:
-    x, y = role.thing.x, role.thing.y
-    width, length, _ = box_of(role.thing)
+    x, y = role.member.x, role.member.y
+    width, length, _ = box_of(role.member)
     radius = math.hypot(width, length) / 2 + 2.0
     count = max(1, math.ceil((high - low) / _ARC_STEP))
     turns = [direction(low + (high - low) * number / count) for number in range(count + 1)]
@@ -118,7 +118,7 @@ def draw_witness(verdict: Verdict | None, roles: tuple[Role, ...], plane: Plane,
         if not isinstance(value, tuple):
             continue
         x, y = value
-        seen = any(math.hypot(role.thing.x - x, role.thing.y - y) < 0.05 for role in roles)
+        seen = any(math.hypot(role.member.x - x, role.member.y - y) < 0.05 for role in roles)
         if not seen and bounds[0] < x < bounds[2] and bounds[1] < y < bounds[3]:
             left, top = plane.at(x, y)
             told = element("title", escape(f"hidden point of {place}: ({x:z.2f}, {y:z.2f})"))
@@ -139,7 +139,7 @@ def draw_blame(broken: tuple[Blame, ...], roles: tuple[Role, ...], plane: Plane)
     for blame in broken:
         found = [role for role in roles if role.index in blame.objects]
         if blame.requirement and len(found) > 1:
-            ends = (plane.at(role.thing.x, role.thing.y) for role in found)
+            ends = (plane.at(role.member.x, role.member.y) for role in found)
             told = element("title", escape(f"excluded by {blame.what}"))
             way = "L".join(f"{x} {y}" for x, y in ends)
             parts.append(element("path", told, class_="between blamed", d=f"M{way}"))

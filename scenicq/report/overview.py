@@ -99,7 +99,7 @@ def funnel_section(funnel: Funnel, total: int) -> str:
             ("intervals that are unknown", funnel.unknowns),
         ]
     else:
-        steps.append(("with an object for every role", funnel.cast))
+        steps.append(("with an object for every role", funnel.with_roles))
         steps += [("matches", funnel.matches), ("unknown", funnel.unknowns)]
     rows = [_step(name, number, funnel.frames) for name, number in steps]
     rows += [_step(name, number) for name, number in counted]

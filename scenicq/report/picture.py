@@ -135,7 +135,7 @@ def view_of(label: Label, roles: tuple[Role, ...], half: float | None = None) ->
     """
     ego = label.ego
     if half is None:
-        far = (math.hypot(role.thing.x - ego.x, role.thing.y - ego.y) + box_of(role.thing)[1] for role in roles)
+        far = (math.hypot(role.member.x - ego.x, role.member.y - ego.y) + box_of(role.member)[1] for role in roles)
         half = math.ceil(min(_FARTHEST, max(_NEAREST, 1.25 * max(far, default=0.0))))
     return View((ego.x, ego.y), half)
 
@@ -191,21 +191,21 @@ def draw_shot(shot: Shot, plane: Plane, view: View, letters: float = LETTERS) ->
     """
     label, scenario, bounds = shot.label, shot.scenario, view.bounds
     roles = shot.roles
-    by_id = {role.thing.id: role for role in roles}
+    by_id = {role.member.id: role for role in roles}
     broken = shot.broken
     guilty = frozenset[int]().union(*(each.objects for each in broken))
     parts: list[str] = []
     if scenario is not None:
         parts.append(draw_overlay(scenario, broken, roles, plane, view.drawn))
-    for thing in (*label.objects, *([label.ego] if label.has_ego else [])):
-        reach = math.hypot(*box_of(thing)[:2])
-        if abs(thing.x - view.center[0]) < view.half + reach and abs(thing.y - view.center[1]) < view.half + reach:
-            role = by_id.get(thing.id)
+    for member in (*label.objects, *([label.ego] if label.has_ego else [])):
+        reach = math.hypot(*box_of(member)[:2])
+        if abs(member.x - view.center[0]) < view.half + reach and abs(member.y - view.center[1]) < view.half + reach:
+            role = by_id.get(member.id)
             blamed = role is not None and role.index in guilty
-            parts.append(draw_object(thing, plane, role=role, blamed=blamed, least=_LEAST * view.half))
+            parts.append(draw_object(member, plane, role=role, blamed=blamed, least=_LEAST * view.half))
     for role in roles:
-        if math.hypot(*box_of(role.thing)[:2]) < _SMALL * view.half:
-            x, y = plane.at(role.thing.x, role.thing.y)
+        if math.hypot(*box_of(role.member)[:2]) < _SMALL * view.half:
+            x, y = plane.at(role.member.x, role.member.y)
             parts.append(element("circle", class_=f"ring {role.colour}", cx=x, cy=y, r=round(_SMALL * 50 * view.half)))
     if scenario is not None:
         parts += [draw_witness(shot.verdict, roles, plane, bounds), draw_blame(broken, roles, plane)]
@@ -238,8 +238,8 @@ def caption(shot: Shot) -> list[tuple[str, str]]:
         case None:
             pass
     for role in shot.roles:
-        thing = role.thing
-        lines.append((f"name {role.colour}", f"{role.name} = {thing.id} ({thing.source_class or thing.category})"))
+        member = role.member
+        lines.append((f"name {role.colour}", f"{role.name} = {member.id} ({member.source_class or member.category})"))
     return lines
 
 

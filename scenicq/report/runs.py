@@ -10,11 +10,11 @@ from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.results import Result
 from scenicq.store.dataset import Dataset
 
-__all__ = ["Run", "find_runs", "frame_numbers"]
+__all__ = ["FrameRun", "find_runs", "frame_numbers"]
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class FrameRun:
     """Consecutive frames of a recording with one kind of verdict.
 
     Attributes:
@@ -63,14 +63,14 @@ def frame_numbers(dataset: Dataset, recordings: Iterable[str]) -> dict[str, tupl
     return {frame: (number, count) for frame, number, count in cast("list[tuple[str, int, int]]", cast(Any, rows))}
 
 
-def find_runs(results: Sequence[Result], numbers: dict[str, tuple[int, int]]) -> list[Run]:
+def find_runs(results: Sequence[Result], numbers: dict[str, tuple[int, int]]) -> list[FrameRun]:
     """Group results into runs, in their own order.
 
     Args:
         results: In order of recording and time.
         numbers: As `frame_numbers` gives them.
     """
-    runs: list[Run] = []
+    runs: list[FrameRun] = []
     for result in results:
         number, count = numbers[result.frame]
         last = runs[-1] if runs else None
@@ -80,7 +80,7 @@ def find_runs(results: Sequence[Result], numbers: dict[str, tuple[int, int]]) ->
             and last.first + len(last.results) == number
             and type(last.results[-1].verdict) is type(result.verdict)
         ):
-            runs[-1] = Run(last.recording, (*last.results, result), last.first, count)
+            runs[-1] = FrameRun(last.recording, (*last.results, result), last.first, count)
         else:
-            runs.append(Run(result.recording, (result,), number, count))
+            runs.append(FrameRun(result.recording, (result,), number, count))
     return runs

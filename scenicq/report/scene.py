@@ -36,12 +36,12 @@ class Role:
     Attributes:
         index: Index of the scenario's object.
         name: Its name.
-        thing: The label object.
+        member: The label object.
     """
 
     index: int
     name: str
-    thing: LabelObject
+    member: LabelObject
 
     @property
     def colour(self) -> str:
@@ -51,72 +51,72 @@ class Role:
 
 def find_roles(scenario: Scenario, label: Label, correspondence: Mapping[str, str]) -> tuple[Role, ...]:
     """The roles of a correspondence, in program order; the ego's is there also where the correspondence is empty."""
-    known = {thing.id: thing for thing in label.objects} | ({"ego": label.ego} if label.has_ego else {})
+    known = {member.id: member for member in label.objects} | ({"ego": label.ego} if label.has_ego else {})
     found: list[Role] = []
-    for thing in scenario.objects:
-        played = correspondence.get(thing.name, "ego" if thing.index == scenario.ego and not correspondence else "")
+    for owner in scenario.objects:
+        played = correspondence.get(owner.name, "ego" if owner.index == scenario.ego and not correspondence else "")
         if played in known:
-            found.append(Role(thing.index, thing.name, known[played]))
+            found.append(Role(owner.index, owner.name, known[played]))
     return tuple(found)
 
 
 def observed_by(roles: tuple[Role, ...]) -> Observation:
     """What the label observes of the objects that are played."""
-    return {(role.index, name): value for role in roles for name, value in observe(role.thing).items()}
+    return {(role.index, name): value for role in roles for name, value in observe(role.member).items()}
 
 
-def box_of(thing: LabelObject) -> tuple[float, float, bool]:
+def box_of(member: LabelObject) -> tuple[float, float, bool]:
     """Width and length in metres with which an object is drawn, and whether the label has them."""
-    if thing.width is not None and thing.length is not None:
-        return thing.width, thing.length, True
+    if member.width is not None and member.length is not None:
+        return member.width, member.length, True
     for category, width, length in _NOMINAL:
-        if class_matches(category, thing.category, "fine"):
+        if class_matches(category, member.category, "fine"):
             return width, length, False
     return (*_OTHER, False)
 
 
-def _point_ahead(thing: LabelObject, heading: float, metres: float) -> XY:
+def _point_ahead(member: LabelObject, heading: float, metres: float) -> XY:
     dx, dy = direction(heading)
-    return thing.x + metres * dx, thing.y + metres * dy
+    return member.x + metres * dx, member.y + metres * dy
 
 
-def _told(thing: LabelObject, role: str) -> str:
-    heading = "no heading" if thing.heading is None else f"heading {math.degrees(thing.heading):z.1f}\N{DEGREE SIGN}"
-    where = f"({thing.x:z.2f}, {thing.y:z.2f}) m"
-    said = [role and f"role {role}", thing.id, thing.category, where, heading]
-    if thing.velocity is not None:
-        said.append(f"{math.hypot(*thing.velocity):.1f} m/s")
+def _told(member: LabelObject, role: str) -> str:
+    heading = "no heading" if member.heading is None else f"heading {math.degrees(member.heading):z.1f}\N{DEGREE SIGN}"
+    where = f"({member.x:z.2f}, {member.y:z.2f}) m"
+    said = [role and f"role {role}", member.id, member.category, where, heading]
+    if member.velocity is not None:
+        said.append(f"{math.hypot(*member.velocity):.1f} m/s")
     return ", ".join(filter(None, said))
 
 
 def draw_object(
-    thing: LabelObject, plane: Plane, *, role: Role | None = None, blamed: bool = False, least: float = 0.0
+    member: LabelObject, plane: Plane, *, role: Role | None = None, blamed: bool = False, least: float = 0.0
 ) -> str:
     """An object's box with its front marked; what the label does not know is dashed, or a dot without heading.
 
     Args:
-        thing: The object.
+        member: The object.
         plane: Where the picture lies.
         role: Its role, if it has one.
         blamed: Whether it is part of what excludes the frame.
         least: Radius in metres of the dot under people, whose boxes may be too small to see.
     """
-    width, length, measured = box_of(thing)
-    classes = ["box", "ego" if thing.id == "ego" else "other", role.colour if role else "", "blamed" if blamed else ""]
-    person = class_matches("Pedestrian", thing.category, "fine")
+    width, length, measured = box_of(member)
+    classes = ["box", "ego" if member.id == "ego" else "other", role.colour if role else "", "blamed" if blamed else ""]
+    person = class_matches("Pedestrian", member.category, "fine")
     classes += ["person"] * person + ["nominal"] * (not measured)
-    told = element("title", escape(_told(thing, role.name if role else "")))
-    if thing.heading is None:
-        x, y = plane.at(thing.x, thing.y)
+    told = element("title", escape(_told(member, role.name if role else "")))
+    if member.heading is None:
+        x, y = plane.at(member.x, member.y)
         shape = element("circle", cx=x, cy=y, r=round(50 * min(width, length)))
     else:
-        outline = plane.to_picture(corners(thing.x, thing.y, thing.heading, width, length))
-        front = _point_ahead(thing, thing.heading, length / 2)
-        nose = plane.to_picture(np.array([(thing.x, thing.y), front]))
+        outline = plane.to_picture(corners(member.x, member.y, member.heading, width, length))
+        front = _point_ahead(member, member.heading, length / 2)
+        nose = plane.to_picture(np.array([(member.x, member.y), front]))
         shape = element("path", class_="outline", d=points_path(outline.tolist(), closed=True))
         shape += element("path", class_="nose", d=points_path(nose.tolist(), closed=False))
     if person:
-        x, y = plane.at(thing.x, thing.y)
+        x, y = plane.at(member.x, member.y)
         shape = element("circle", class_="dot", cx=x, cy=y, r=round(100 * max(least, width / 2))) + shape
     return element("g", told, shape, class_=" ".join(filter(None, classes)))
 
@@ -130,20 +130,20 @@ def draw_text(roles: tuple[Role, ...], plane: Plane, bounds: Bounds, size: int) 
         bounds: What is drawn, in metres.
         size: Height of the letters in centimetres.
     """
-    taken = [(*plane.at(role.thing.x, role.thing.y), 100 * box_of(role.thing)[1] / 2) for role in roles]
+    taken = [(*plane.at(role.member.x, role.member.y), 100 * box_of(role.member)[1] / 2) for role in roles]
     # the wedge of what each may face lies ahead of it
     taken += [
-        (*plane.at(*_point_ahead(role.thing, role.thing.heading, box_of(role.thing)[1] / 2 + _AHEAD)), 100 * _AHEAD)
+        (*plane.at(*_point_ahead(role.member, role.member.heading, box_of(role.member)[1] / 2 + _AHEAD)), 100 * _AHEAD)
         for role in roles
-        if role.thing.heading is not None
+        if role.member.heading is not None
     ]
     west, north = plane.at(bounds[0], bounds[3])
     east, south = plane.at(bounds[2], bounds[1])
     placed: list[tuple[float, float, float]] = []
     parts: list[str] = []
     for role in roles:
-        x, y = plane.at(role.thing.x, role.thing.y)
-        wide, away = size * 0.34 * len(role.name), 55 * math.hypot(*box_of(role.thing)[:2]) + size * 0.3
+        x, y = plane.at(role.member.x, role.member.y)
+        wide, away = size * 0.34 * len(role.name), 55 * math.hypot(*box_of(role.member)[:2]) + size * 0.3
         spots = ((x + away + wide, y), (x - away - wide, y), (x, y - away - size / 2), (x, y + away + size / 2))
 
         def crowded(spot: tuple[float, float], wide: float = wide) -> float:

@@ -41,16 +41,16 @@ def spans_of(scenario: Scenario) -> dict[str, Span]:
     for name, given in scenario.params.items():
         if given.span is not None:
             found[f"param {name}"] = given.span
-    for thing in scenario.objects:
-        if thing.span is not None:
-            found[f"{thing.name}.class"] = thing.span
-        for name, given in thing.properties.items():
-            span = given.span or thing.span
+    for owner in scenario.objects:
+        if owner.span is not None:
+            found[f"{owner.name}.class"] = owner.span
+        for name, given in owner.properties.items():
+            span = given.span or owner.span
             if span is not None and span.source is scenario.source:
-                found[f"{thing.name}.{name}"] = span
-            elif thing.span is not None:
+                found[f"{owner.name}.{name}"] = span
+            elif owner.span is not None:
                 # a library's default is the line's that makes the object
-                found[f"{thing.name}.{name}"] = thing.span
+                found[f"{owner.name}.{name}"] = owner.span
     return found
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 
-from scenicq.report.runs import Run
+from scenicq.report.runs import FrameRun
 from scenicq.report.svg import element, escape
 
 __all__ = ["TILES", "sheet_section", "tile", "timelines_section", "to_picture"]
@@ -20,7 +20,7 @@ _LEAST = 0.006
 """Share of a timeline's width that a run has at least, so that it is seen."""
 
 
-def to_picture(runs: Sequence[Run]) -> frozenset[int]:
+def to_picture(runs: Sequence[FrameRun]) -> frozenset[int]:
     """Numbers from 1 of the runs that are pictured side by side: first one of each recording, then their next ones.
 
     Args:
@@ -34,7 +34,7 @@ def to_picture(runs: Sequence[Run]) -> frozenset[int]:
     return frozenset(number for _, number in sorted(turns)[:TILES])
 
 
-def tile(run: Run, number: int, best: int, picture: str) -> str:
+def tile(run: FrameRun, number: int, best: int, picture: str) -> str:
     """A run's best frame, small, which leads to the run.
 
     Args:
@@ -72,7 +72,7 @@ def sheet_section(tiles: Sequence[str], runs: int) -> str:
     )
 
 
-def timelines_section(runs: Sequence[Run], *, over_time: bool = False) -> str:
+def timelines_section(runs: Sequence[FrameRun], *, over_time: bool = False) -> str:
     """Where in each recording the runs are.
 
     Args:
@@ -95,7 +95,7 @@ def timelines_section(runs: Sequence[Run], *, over_time: bool = False) -> str:
     )
 
 
-def _timeline(name: str, runs: Sequence[tuple[int, Run]], *, over_time: bool) -> str:
+def _timeline(name: str, runs: Sequence[tuple[int, FrameRun]], *, over_time: bool) -> str:
     of = runs[0][1].of
     marks: list[str] = []
     for number, run in runs:

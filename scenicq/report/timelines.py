@@ -9,10 +9,10 @@ from scenicq.query.execution.interval_frames import frames_of, locate
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.interval_explanation import Band, bands_of
-from scenicq.report.runs import Run
+from scenicq.report.runs import FrameRun
 from scenicq.report.svg import element, escape
 from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader
-from scenicq.temporal.intervals import Interval
+from scenicq.temporal.intervals import IntervalVerdict
 from scenicq.temporal.truth import TRUE
 
 __all__ = ["interval_runs"]
@@ -20,7 +20,7 @@ __all__ = ["interval_runs"]
 _WORDS = ("false", "unknown", "true")
 
 
-def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tuple[int, int]]) -> Iterator[Run]:
+def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tuple[int, int]]) -> Iterator[FrameRun]:
     """A run for each interval, whose frames have the label objects of the roles.
 
     Args:
@@ -34,7 +34,7 @@ def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tu
             for label, roles in frames_of(query.dataset, result)
         )
         number, count = numbers[result.frame]
-        yield Run(result.recording, frames, number, count, _timeline(query, result))
+        yield FrameRun(result.recording, frames, number, count, _timeline(query, result))
 
 
 def _at(verdict: Verdict, roles: dict[str, str]) -> Verdict:
@@ -58,10 +58,10 @@ def _timeline(query: Query, result: Result) -> str:
         return ""
     with TrackReader(query.dataset, part) as reader:
         tracks = reader.read(first, end)
-    names = {thing.name: thing.index for thing in scenario.objects}
+    names = {owner.name: owner.index for owner in scenario.objects}
     binding = tuple((names[name], _key(tracks, track)) for name, track in verdict.correspondence.items())
     start, last = tracks.frames.index(result.frame), tracks.frames.index(result.interval.last)
-    return _drawn(bands_of(scenario, tracks, Interval(start, last, int(TRUE), binding)))
+    return _drawn(bands_of(scenario, tracks, IntervalVerdict(start, last, int(TRUE), binding)))
 
 
 def _key(tracks: RecordingTracks, name: str) -> TrackKey:

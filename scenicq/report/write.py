@@ -23,7 +23,7 @@ from scenicq.report.frames import variable_texts
 from scenicq.report.overview import funnel_section, how_section, program_section
 from scenicq.report.page import GENERATOR, page, runs_section
 from scenicq.report.picture import LETTERS, Shot, draw
-from scenicq.report.runs import Run, find_runs, frame_numbers
+from scenicq.report.runs import FrameRun, find_runs, frame_numbers
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.report.shares import program_lines
 from scenicq.report.sheet import sheet_section, timelines_section, to_picture
@@ -207,7 +207,7 @@ class _Report:
         numbers = frame_numbers(dataset, {result.recording for result in (*shown, *near)})
         over_time = any(each.interval is not None for each in shown)
         found = interval_runs(self.query, shown, numbers) if over_time else find_runs(shown, numbers)
-        runs = [*found, *(Run(r.recording, (r,), *numbers[r.frame]) for r in near)]
+        runs = [*found, *(FrameRun(r.recording, (r,), *numbers[r.frame]) for r in near)]
         cards = list(self.cards(runs, inline=inline))
         recordings = list(dict.fromkeys(run.recording for run in runs))
         left = len(results) - len(shown)
@@ -243,7 +243,7 @@ class _Report:
         skip = element("a", "Skip to the frames", href="#runs-title", class_="skip")
         return page(f"{name}: {told}", [skip, head, main])
 
-    def cards(self, runs: Sequence[Run], *, inline: bool) -> Iterator[str]:
+    def cards(self, runs: Sequence[FrameRun], *, inline: bool) -> Iterator[str]:
         """The cards of runs."""
         frames = [result.frame for run in runs for result in run.results]
         labels = {label.frame: label for label in self.query.dataset.labels(frames)} if frames else {}

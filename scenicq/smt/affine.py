@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from scenicq.smt.formula import Atom, Num, Operator, Relation, Term, Var
+from scenicq.smt.formula import Num, Operator, Relation, Term, TermComparison, Var
 
 __all__ = ["EMPTY", "ENTAILED", "MAYBE", "AffineAtom", "Forms", "affine_atoms", "contract_affine"]
 
@@ -58,7 +58,7 @@ Forms = dict[int, "_Form | None"]
 """What is known of terms, by identity; shared by all atoms of a problem."""
 
 
-def affine_atoms(atom: Atom, index: Mapping[str, int], forms: Forms) -> tuple[AffineAtom, ...] | None:
+def affine_atoms(atom: TermComparison, index: Mapping[str, int], forms: Forms) -> tuple[AffineAtom, ...] | None:
     """The one (or, for an equality, two) affine constraints that an atom stands for; None if it is not affine.
 
     Args:

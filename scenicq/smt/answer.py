@@ -9,7 +9,7 @@ from typing import Protocol, Self
 
 from scenicq.smt.formula import Problem
 
-__all__ = ["Answer", "Sat", "Solver", "SolverSession", "SolverStatus", "Unknown", "Unsat"]
+__all__ = ["Answer", "NoAnswer", "Sat", "Solver", "SolverSession", "SolverStatus", "Unsat"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Unsat:
 
 
 @dataclass(frozen=True, slots=True)
-class Unknown:
+class NoAnswer:
     """The solver did not decide.
 
     Attributes:
@@ -41,7 +41,7 @@ class Unknown:
     reason: str
 
 
-Answer = Sat | Unsat | Unknown
+Answer = Sat | Unsat | NoAnswer
 
 
 @dataclass(frozen=True, slots=True)

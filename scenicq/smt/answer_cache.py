@@ -12,7 +12,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Hashable
 
-from scenicq.smt.answer import Answer, Solver, Unknown
+from scenicq.smt.answer import Answer, NoAnswer, Solver
 from scenicq.smt.formula import Problem
 
 __all__ = ["RememberingSolver"]
@@ -55,7 +55,7 @@ class RememberingSolver:
                 return known
             self.passed_on += 1
         answer = self._solver.check(problem, precision=precision, timeout_s=timeout_s)
-        if not isinstance(answer, Unknown):
+        if not isinstance(answer, NoAnswer):
             with self._lock:
                 self._known[key] = answer
                 while len(self._known) > MOST:

@@ -6,8 +6,8 @@ A solver that gets lost among the cells of a map, or the directions at a point, 
 from __future__ import annotations
 
 from scenicq.budget import clock
-from scenicq.smt.answer import Answer, Sat, Solver, Unknown, Unsat
-from scenicq.smt.formula import And, Or, Problem, conjunction
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Solver, Unsat
+from scenicq.smt.formula import Conjunction, Disjunction, Problem, conjunction
 
 __all__ = ["cases", "check_by_cases"]
 
@@ -17,8 +17,8 @@ _MOST_CASES = 64
 def cases(problem: Problem) -> list[Problem]:
     """The problem split by its widest disjunction, so that it has a solution if one of these has; empty without one."""
     root = problem.constraint
-    parts = root.args if isinstance(root, And) else (root,)
-    choices = [part for part in parts if isinstance(part, Or) and 1 < len(part.args) <= _MOST_CASES]
+    parts = root.args if isinstance(root, Conjunction) else (root,)
+    choices = [part for part in parts if isinstance(part, Disjunction) and 1 < len(part.args) <= _MOST_CASES]
     if not choices:
         return []
     chosen = max(choices, key=lambda part: len(part.args))
@@ -38,7 +38,7 @@ def check_by_cases(solver: Solver, problem: Problem, *, precision: float, timeou
         timeout_s: See `Solver.check`; for the whole, and once more for all cases together.
     """
     answer = solver.check(problem, precision=precision, timeout_s=timeout_s)
-    if not isinstance(answer, Unknown) or answer.reason not in ("timeout", "budget"):
+    if not isinstance(answer, NoAnswer) or answer.reason not in ("timeout", "budget"):
         return answer
     waiting = cases(problem)
     if not waiting:

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import IO, Self
 
 from scenicq.errors import Diagnostic, SolverError
-from scenicq.smt.answer import Answer, Sat, Unknown
+from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem
 from scenicq.smt.pool import end_group
@@ -67,14 +67,14 @@ class SmtlibSolver:
         with self._spawn() as process:
             text, expired = _converse(process, to_smtlib(problem, precision).encode(), timeout_s)
         if len(text) > REPLY_BYTES:
-            return Unknown("garbage")
+            return NoAnswer("garbage")
         answer = read_reply(text.decode(errors="replace"), problem)
-        if expired and answer == Unknown("garbage"):
-            return Unknown("timeout")
-        if answer == Unknown("garbage") and process.returncode:
-            return Unknown("crash")
+        if expired and answer == NoAnswer("garbage"):
+            return NoAnswer("timeout")
+        if answer == NoAnswer("garbage") and process.returncode:
+            return NoAnswer("crash")
         if isinstance(answer, Sat) and not holds(problem, answer.witness, precision):
-            return Unknown("precision")
+            return NoAnswer("precision")
         return answer
 
     def check_many(self, problems: Sequence[Problem], *, precision: float, timeout_s: float) -> list[Answer]:

@@ -21,10 +21,10 @@ from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
 from scenicq.smt.formula import Formula, Num, Operator, Term, apply, compare, conjunction, disjunction
-from scenicq.smt.region_membership import UnsupportedError, Vector, convex_cell, disc
+from scenicq.smt.region_membership import TermVector, UnsupportedError, convex_cell, disc
 
 __all__ = [
-    "Frame",
+    "BoxTerms",
     "box_meets",
     "boxes_meet",
     "disc_meets",
@@ -39,25 +39,25 @@ _MOST_SEGMENTS = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class BoxTerms:
     """A box as terms: centre, unit vectors to the right and ahead, half width and half length."""
 
-    center: Vector
-    right: Vector
-    ahead: Vector
+    center: TermVector
+    right: TermVector
+    ahead: TermVector
     half_width: Term
     half_length: Term
 
     @classmethod
-    def of(cls, center: Vector, heading: Term, width: Term, length: Term) -> Frame:
+    def of(cls, center: TermVector, heading: Term, width: Term, length: Term) -> BoxTerms:
         """The frame of a box."""
         c, s = apply(Operator.COS, heading), apply(Operator.SIN, heading)
         halves = (apply(Operator.MUL, size, 0.5) for size in (width, length))
         return cls(center, (c, s), (apply(Operator.NEG, s), c), *halves)
 
-    def corners(self) -> list[Vector]:
+    def corners(self) -> list[TermVector]:
         """The four corners."""
-        found: list[Vector] = []
+        found: list[TermVector] = []
         for a, b in ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)):
             side, front = apply(Operator.MUL, self.half_width, a), apply(Operator.MUL, self.half_length, b)
             x, y = (
@@ -67,7 +67,7 @@ class Frame:
             found.append((x, y))
         return found
 
-    def extent(self, axis: Vector) -> Term:
+    def extent(self, axis: TermVector) -> Term:
         """Half of the box's extent along a unit vector."""
         return apply(
             Operator.ADD,
@@ -76,21 +76,21 @@ class Frame:
         )
 
 
-def dot(a: Vector, b: Vector) -> Term:
+def dot(a: TermVector, b: TermVector) -> Term:
     """The scalar product."""
     return apply(Operator.ADD, apply(Operator.MUL, a[0], b[0]), apply(Operator.MUL, a[1], b[1]))
 
 
-def minus(a: Vector, b: Vector) -> Vector:
+def minus(a: TermVector, b: TermVector) -> TermVector:
     """The difference."""
     return apply(Operator.SUB, a[0], b[0]), apply(Operator.SUB, a[1], b[1])
 
 
-def _square_length(a: Vector) -> Term:
+def _square_length(a: TermVector) -> Term:
     return apply(Operator.ADD, apply(Operator.POW, a[0], 2.0), apply(Operator.POW, a[1], 2.0))
 
 
-def length(a: Vector) -> Term:
+def length(a: TermVector) -> Term:
     """The length of a vector."""
     return apply(Operator.SQRT, _square_length(a))
 
@@ -116,7 +116,7 @@ def _points(region: Region) -> np.ndarray:
             raise UnsupportedError(f"the distance from a random point to a {type(region).__name__}")
 
 
-def distance_term(region: Region, point: Vector, around: Box) -> tuple[Term, list[tuple[Formula, Term]]]:
+def distance_term(region: Region, point: TermVector, around: Box) -> tuple[Term, list[tuple[Formula, Term]]]:
     """The distance from a point to a region: a term for points outside, and cases where it is something else.
 
     Args:
@@ -152,11 +152,11 @@ def _nearest_only(segments: np.ndarray, around: Box) -> np.ndarray:
     return segments[away <= away.min() + math.hypot(x1 - x0, y1 - y0) + 1e-6]
 
 
-def _to_segment(point: Vector, segment: Sequence[float]) -> Term:
+def _to_segment(point: TermVector, segment: Sequence[float]) -> Term:
     return apply(Operator.SQRT, squared_distance(point, segment))
 
 
-def squared_distance(point: Vector, segment: Sequence[float]) -> Term:
+def squared_distance(point: TermVector, segment: Sequence[float]) -> Term:
     """The square of the distance from a point to a segment x0, y0, x1, y1."""
     x0, y0, x1, y1 = segment
     dx, dy = x1 - x0, y1 - y0
@@ -169,7 +169,7 @@ def squared_distance(point: Vector, segment: Sequence[float]) -> Term:
     return _square_length(offset)
 
 
-def boxes_meet(one: Frame, other: Frame) -> Formula:
+def boxes_meet(one: BoxTerms, other: BoxTerms) -> Formula:
     """Whether two boxes have a point in common: none of their four axes separates them."""
     offset = minus(one.center, other.center)
     return conjunction(
@@ -178,7 +178,7 @@ def boxes_meet(one: Frame, other: Frame) -> Formula:
     )
 
 
-def disc_meets(box: Frame, center: Vector, radius: Term) -> Formula:
+def disc_meets(box: BoxTerms, center: TermVector, radius: Term) -> Formula:
     """Whether a box and a disc have a point in common."""
     offset = minus(center, box.center)
     gaps = [
@@ -188,7 +188,7 @@ def disc_meets(box: Frame, center: Vector, radius: Term) -> Formula:
     return conjunction([compare(">=", radius, 0.0), disc(gaps[0], gaps[1], radius)])
 
 
-def box_meets(box: Frame, region: Region) -> Formula:
+def box_meets(box: BoxTerms, region: Region) -> Formula:
     """Whether a box and a known region have a point in common.
 
     Args:
@@ -201,7 +201,7 @@ def box_meets(box: Frame, region: Region) -> Formula:
     match region:
         case Rectangle():
             sizes = Num(region.heading), Num(region.width), Num(region.length)
-            return boxes_meet(box, Frame.of((Num(region.center[0]), Num(region.center[1])), *sizes))
+            return boxes_meet(box, BoxTerms.of((Num(region.center[0]), Num(region.center[1])), *sizes))
         case Disc():
             return disc_meets(box, (Num(region.center[0]), Num(region.center[1])), Num(region.radius))
         case PolygonSet():
@@ -215,7 +215,7 @@ def box_meets(box: Frame, region: Region) -> Formula:
             raise UnsupportedError(f"whether a random box meets a {type(region).__name__}")
 
 
-def _box_meets_cell(box: Frame, cell: np.ndarray) -> Formula:
+def _box_meets_cell(box: BoxTerms, cell: np.ndarray) -> Formula:
     parts: list[Formula] = []
     for (ax, ay), (bx, by) in zip(cell.tolist(), np.roll(cell, -1, axis=0).tolist(), strict=True):
         size = math.hypot(bx - ax, by - ay)

@@ -12,19 +12,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import (
-    And,
-    Atom,
+    Conjunction,
+    Disjunction,
     Formula,
     Node,
     Num,
     Op,
     Operator,
-    Or,
     Problem,
     Relation,
+    TermComparison,
     Var,
     compare,
     conjunction,
@@ -97,13 +97,13 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         near, given = (_formula(_bounds(related, reach), variables, precision) for reach in (NEAR, math.inf))
     except (ValueError, RuntimeError) as error:
         # constants outside of a function's domain
-        return Unknown(f"unsupported: {error}")
+        return NoAnswer(f"unsupported: {error}")
     doubtful: Sat | None = None
     waiting: list[list[Symbolic]] = [[]]
     while waiting:
         chosen = waiting.pop()
         if time.thread_time() > deadline:
-            return Unknown("timeout")
+            return NoAnswer("timeout")
         if len(chosen) < len(options):
             # most alternatives contradict those that were chosen before, which a coarse look tells
             if chosen and dreal.CheckSatisfiability(_all([given, common, *chosen]), max(precision, COARSE)) is None:
@@ -113,7 +113,7 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         # the box of an answer can be so wide that its middle is no solution: then finer, and close to the origin
         for bounds, delta in ((given, precision), (near, precision), (near, precision / 100)):
             if time.thread_time() > deadline:
-                return Unknown("timeout")
+                return NoAnswer("timeout")
             box = dreal.CheckSatisfiability(_all([bounds, common, *chosen]), delta)
             if box is None:
                 break
@@ -126,11 +126,11 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
 
 def _cases(constraint: Formula) -> tuple[list[Formula], list[tuple[Formula, ...]]]:
     """The parts of a conjunction that stay, and the alternatives that are tried one by one."""
-    parts = constraint.args if isinstance(constraint, And) else (constraint,)
-    fixed: list[Formula] = [part for part in parts if not isinstance(part, Or)]
+    parts = constraint.args if isinstance(constraint, Conjunction) else (constraint,)
+    fixed: list[Formula] = [part for part in parts if not isinstance(part, Disjunction)]
     choices: list[tuple[Formula, ...]] = []
     count = 1
-    for part in sorted((part for part in parts if isinstance(part, Or)), key=lambda part: len(part.args)):
+    for part in sorted((part for part in parts if isinstance(part, Disjunction)), key=lambda part: len(part.args)):
         count *= max(1, len(part.args))
         if count <= CASES:
             choices.append(part.args)
@@ -171,13 +171,13 @@ def _formula(root: Node, variables: dict[str, Symbolic], precision: float) -> Sy
                 made[id(node)] = dreal.Expression(float(value))
             case Op(function, args):
                 made[id(node)] = _operation(function, [made[id(arg)] for arg in args])
-            case Atom(_, Num(left), Num(right)):
+            case TermComparison(_, Num(left), Num(right)):
                 # only atoms that rounding decides are ground
                 close = abs(left - right) <= precision
                 made[id(node)] = dreal.Formula.TRUE() if close else dreal.Formula.FALSE()
-            case Atom(relation, left, right):
+            case TermComparison(relation, left, right):
                 made[id(node)] = _RELATIONS[relation](made[id(left)], made[id(right)])
-            case Or(args):
+            case Disjunction(args):
                 made[id(node)] = dreal.logical_or(dreal.Formula.FALSE(), *(made[id(arg)] for arg in args))
             case _:
                 made[id(node)] = _all([made[id(arg)] for arg in node.args])

@@ -15,7 +15,7 @@ from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, Everywhere, IntersectionOf, Nowhere, PolygonSet, Rectangle, Region, UnionOf
 from scenicq.geometry.shapes import Shape
 from scenicq.geometry.terms import overlap, rectangle_shape
-from scenicq.smt.distance_terms import Frame, dot, minus
+from scenicq.smt.distance_terms import BoxTerms, dot, minus
 from scenicq.smt.formula import FALSE, TRUE, Formula, Num, Operator, apply, compare, conjunction, disjunction
 from scenicq.smt.region_membership import UnsupportedError, convex_cell, disc
 
@@ -24,7 +24,7 @@ __all__ = ["box_holds"]
 _MOST_EDGES = 400
 
 
-def box_holds(box: Frame, region: Region, around: Box) -> Formula:
+def box_holds(box: BoxTerms, region: Region, around: Box) -> Formula:
     """Whether a known region holds all of a box.
 
     Args:
@@ -68,7 +68,7 @@ def _near(regions: list[PolygonSet], around: Box) -> Shape:
     return shapes.union_all(found)
 
 
-def _area_holds(box: Frame, area: Shape, around: Box) -> Formula:
+def _area_holds(box: BoxTerms, area: Shape, around: Box) -> Formula:
     cells = [cell for piece in shapes.polygonal_part(area) for cell in convex_parts(piece)]
     if len(cells) == 1:
         return conjunction(convex_cell(corner, cells[0]) for corner in box.corners())
@@ -85,7 +85,7 @@ def _area_holds(box: Frame, area: Shape, around: Box) -> Formula:
     return conjunction([inside, *(_missed(box, *edge) for edge in close)])
 
 
-def _missed(box: Frame, ax: float, ay: float, bx: float, by: float) -> Formula:
+def _missed(box: BoxTerms, ax: float, ay: float, bx: float, by: float) -> Formula:
     """That a segment has no point inside a box."""
     length = math.hypot(bx - ax, by - ay)
     if length == 0.0:

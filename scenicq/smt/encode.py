@@ -30,7 +30,7 @@ from scenicq.smt.formula import (
     conjunction,
     disjunction,
 )
-from scenicq.smt.region_membership import UnsupportedError, Vector, disc
+from scenicq.smt.region_membership import TermVector, UnsupportedError, disc
 from scenicq.smt.unknowns import Unknowns
 from scenicq.smt.value_codes import (
     between,
@@ -122,7 +122,7 @@ def _item(item: Item, expressions: Expressions, boxes: Mapping[Identity, Box]) -
     if target.shape is None:
         return truth(code)
     if isinstance(observed, tuple):
-        x, y = cast(Vector, code)
+        x, y = cast(TermVector, code)
         dx, dy = apply(Operator.SUB, x, observed[0]), apply(Operator.SUB, y, observed[1])
         if target.shape == "box":
             return conjunction([*between(dx, -target.a, target.a), *between(dy, -target.b, target.b)])

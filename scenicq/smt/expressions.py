@@ -51,7 +51,7 @@ from scenicq.forest.walk import children, postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Rectangle
-from scenicq.smt.distance_terms import Frame, box_meets, boxes_meet, disc_meets, distance_term, length, minus
+from scenicq.smt.distance_terms import BoxTerms, box_meets, boxes_meet, disc_meets, distance_term, length, minus
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.field import field_cells
 from scenicq.smt.formula import (
@@ -67,10 +67,10 @@ from scenicq.smt.formula import (
     disjunction,
     negation,
 )
-from scenicq.smt.region_membership import UnsupportedError, Vector, inside_region, picked
+from scenicq.smt.region_membership import TermVector, UnsupportedError, inside_region, picked
 from scenicq.smt.unknowns import Unknowns
 from scenicq.smt.value_codes import (
-    Choice,
+    CodeChoice,
     cases,
     compare_codes,
     connect,
@@ -152,37 +152,37 @@ class Expressions:
             case Arithmetic():
                 return self._arithmetic(node, terms)
             case Coordinate():
-                return cast(Vector, args[0])[node.axis]
+                return cast(TermVector, args[0])[node.axis]
             case VectorOf():
                 return (terms[0], terms[1])
             case VectorSum():
-                (a, b), (c, d) = cast("list[Vector]", args)
+                (a, b), (c, d) = cast("list[TermVector]", args)
                 return (apply(Operator.ADD, a, c), apply(Operator.ADD, b, d))
             case Scale():
-                x, y = cast(Vector, args[0])
+                x, y = cast(TermVector, args[0])
                 return (apply(Operator.MUL, x, terms[1]), apply(Operator.MUL, y, terms[1]))
             case Rotate():
-                return rotated(cast(Vector, args[0]), terms[1])
+                return rotated(cast(TermVector, args[0]), terms[1])
             case Norm():
-                x, y = cast(Vector, args[0])
+                x, y = cast(TermVector, args[0])
                 return apply(
                     Operator.SQRT, apply(Operator.ADD, apply(Operator.POW, x, 2.0), apply(Operator.POW, y, 2.0))
                 )
             case Bearing():
-                x, y = cast(Vector, args[0])
+                x, y = cast(TermVector, args[0])
                 return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
             case DirectionAt():
-                return self._direction(node, cast(Vector, args[1]))
+                return self._direction(node, cast(TermVector, args[1]))
             case Compare():
                 return compare_codes(node.op, args[0], args[1])
             case Logic():
                 return connect(node.op, args)
             case Contains():
-                return inside_region(node.region, cast(Vector, args[1]), self._around(node.point), self.code)
+                return inside_region(node.region, cast(TermVector, args[1]), self._around(node.point), self.code)
             case DiscAt() | SectorAt() | RectangleAt() | RegionUnion() | RegionIntersection() | RegionDifference():
                 return None
             case Distance():
-                return self._distance(node, cast(Vector, args[1]))
+                return self._distance(node, cast(TermVector, args[1]))
             case Intersects():
                 return self._meeting(node)
             case Encloses():
@@ -205,7 +205,7 @@ class Expressions:
             case _:
                 return EVERYWHERE
 
-    def _point(self, node: PointIn) -> Vector:
+    def _point(self, node: PointIn) -> TermVector:
         if node.identity in self.unknowns.names:
             x, y = self.unknowns.names[node.identity]
             return (Var(x), Var(y))
@@ -234,16 +234,18 @@ class Expressions:
             both = [
                 FALSE
                 if isinstance(option, Undefined)
-                else conjunction([equal(mine, theirs) for mine, theirs in zip(pair, cast(Vector, option), strict=True)])
+                else conjunction(
+                    [equal(mine, theirs) for mine, theirs in zip(pair, cast(TermVector, option), strict=True)]
+                )
                 for option in options
             ]
             self.unknowns.side.append(cases(index, both))
             return pair
         if all(isinstance(option, Formula) for option in defined):
             return cases(index, [option if isinstance(option, Formula) else FALSE for option in options])
-        return Choice(tuple((picked(index, n), option) for n, option in enumerate(options)))
+        return CodeChoice(tuple((picked(index, n), option) for n, option in enumerate(options)))
 
-    def _distance(self, node: Distance, point: Vector) -> Term:
+    def _distance(self, node: Distance, point: TermVector) -> Term:
         outside, inner = distance_term(known_region(node.region), point, self._around(node.point))
         if not inner:
             return outside
@@ -266,27 +268,27 @@ class Expressions:
         return box_meets(self._frame(boxes[0]), known_region(other))
 
     def _disc_meets(self, disc: DiscAt, other: Node) -> Formula:
-        center, radius = cast(Vector, self.code(disc.center)), cast(Term, self.code(disc.radius))
+        center, radius = cast(TermVector, self.code(disc.center)), cast(Term, self.code(disc.radius))
         if is_box(other):
             return disc_meets(self._frame(other), center, radius)
         reach = compare(">=", radius, 0.0)
         if isinstance(other, DiscAt):
             size = cast(Term, self.code(other.radius))
-            other_center = cast(Vector, self.code(other.center))
+            other_center = cast(TermVector, self.code(other.center))
             away = length(minus(center, other_center))
             sizes = compare(">=", size, 0.0), compare("<=", away, apply(Operator.ADD, radius, size))
             return conjunction([reach, *sizes])
         return conjunction([reach, compare("<=", self._distance(Distance(other, disc.center), center), radius)])
 
-    def _frame(self, node: Node) -> Frame:
+    def _frame(self, node: Node) -> BoxTerms:
         """A box whose place may be random."""
         match node:
             case RectangleAt():
-                center = cast(Vector, self.code(node.center))
+                center = cast(TermVector, self.code(node.center))
                 sizes = [cast(Term, self.code(part)) for part in (node.heading, node.width, node.length)]
-                return Frame.of(center, *sizes)
+                return BoxTerms.of(center, *sizes)
             case Constant(value=Rectangle() as box):
-                return Frame.of(
+                return BoxTerms.of(
                     (Num(box.center[0]), Num(box.center[1])), Num(box.heading), Num(box.width), Num(box.length)
                 )
             case _:
@@ -350,7 +352,7 @@ class Expressions:
         self.unknowns.side.append(disjunction(equal(result, apply(Operator.SUB, angle, math.tau * k)) for k in turns))
         return result
 
-    def _direction(self, node: DirectionAt, point: Vector) -> Term:
+    def _direction(self, node: DirectionAt, point: TermVector) -> Term:
         """The direction of a field at a random point: one case per cell near it."""
         if not isinstance(node.field, Constant):
             raise UnsupportedError("a random vector field at a random point")

@@ -14,7 +14,7 @@ from scenicq.geometry.shapes import Bounds, Shape, polygonal_part
 from scenicq.geometry.terms import overlap
 from scenicq.smt.distance_terms import squared_distance
 from scenicq.smt.formula import Formula, Operator, Term, apply, compare, conjunction, disjunction, negation
-from scenicq.smt.region_membership import Vector, convex_cell
+from scenicq.smt.region_membership import TermVector, convex_cell
 
 __all__ = ["field_cells"]
 
@@ -23,7 +23,7 @@ _ROUNDING = 1e-7
 
 
 def field_cells(
-    field: VectorField, point: Vector, limits: Bounds, *, borders: bool = True
+    field: VectorField, point: TermVector, limits: Bounds, *, borders: bool = True
 ) -> list[tuple[float, Formula]]:
     """The headings that a field may have at a point, each with where it has it.
 
@@ -72,7 +72,7 @@ def _misses(polygon: NDArray[np.float64], box: Bounds) -> bool:
     return bool((sides.max(axis=1) < -_ROUNDING * np.hypot(along[:, 0], along[:, 1])).any())
 
 
-def _guard(guard: Guard, point: Vector) -> Formula:
+def _guard(guard: Guard, point: TermVector) -> Formula:
     match guard:
         case Nearer():
             return compare("<=", _least(point, guard.own), _least(point, guard.rivals))
@@ -84,10 +84,10 @@ def _guard(guard: Guard, point: Vector) -> Formula:
             assert_never(guard)
 
 
-def _least(point: Vector, segments: Segments) -> Term:
+def _least(point: TermVector, segments: Segments) -> Term:
     """The square of the distance to the nearest of some segments: squares compare alike, and are polynomial."""
     return apply(Operator.MIN, *(squared_distance(point, segment) for segment in segments.tolist()))
 
 
-def _inside(point: Vector, area: Shape) -> Formula:
+def _inside(point: TermVector, area: Shape) -> Formula:
     return disjunction(convex_cell(point, cell) for piece in polygonal_part(area) for cell in convex_parts(piece))

@@ -23,18 +23,18 @@ from scenicq.smt.operators import Operator, operate
 __all__ = [
     "FALSE",
     "TRUE",
-    "And",
-    "Atom",
+    "Conjunction",
+    "Disjunction",
     "Formula",
     "Node",
     "Num",
     "Op",
     "Operator",
-    "Or",
     "Problem",
     "Relation",
     "Row",
     "Term",
+    "TermComparison",
     "Var",
     "Variable",
     "apply",
@@ -100,7 +100,7 @@ class Op(_Shared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Atom(_Shared):
+class TermComparison(_Shared):
     """A comparison of two terms."""
 
     relation: Relation
@@ -109,27 +109,27 @@ class Atom(_Shared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class And(_Shared):
+class Conjunction(_Shared):
     """All of the formulas hold; of none: true."""
 
     args: tuple[Formula, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Or(_Shared):
+class Disjunction(_Shared):
     """At least one of the formulas holds; of none: false."""
 
     args: tuple[Formula, ...]
 
 
 Term = Var | Num | Op
-Formula = Atom | And | Or
+Formula = TermComparison | Conjunction | Disjunction
 Node = Term | Formula
 Row = tuple[str, str, tuple[int, ...]]
 """A node of a flattened graph: operator, relation or kind; name or number; the rows of the children."""
 
-TRUE = And(())
-FALSE = Or(())
+TRUE = Conjunction(())
+FALSE = Disjunction(())
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +214,7 @@ def compare(relation: str, left: Term | float, right: Term | float) -> Formula:
     """
     if relation in (">=", ">"):
         return compare("<" + relation[1:], right, left)
-    atom = Atom(Relation(relation), _term(left), _term(right))
+    atom = TermComparison(Relation(relation), _term(left), _term(right))
     if not (isinstance(atom.left, Num) and isinstance(atom.right, Num)):
         return atom
     low, high = atom.left.value, atom.right.value
@@ -226,25 +226,29 @@ def compare(relation: str, left: Term | float, right: Term | float) -> Formula:
 
 def conjunction(formulas: Iterable[Formula]) -> Formula:
     """All of the formulas: `TRUE` of none, `FALSE` if one is, nested conjunctions merged."""
-    args = _merge(formulas, And)
-    if any(isinstance(arg, Or) and not arg.args for arg in args):
+    args = _merge(formulas, Conjunction)
+    if any(isinstance(arg, Disjunction) and not arg.args for arg in args):
         return FALSE
-    return TRUE if not args else args[0] if len(args) == 1 else And(args)
+    return TRUE if not args else args[0] if len(args) == 1 else Conjunction(args)
 
 
 def disjunction(formulas: Iterable[Formula]) -> Formula:
     """At least one of the formulas: `FALSE` of none, `TRUE` if one is, nested disjunctions merged."""
-    args = _merge(formulas, Or)
-    if any(isinstance(arg, And) and not arg.args for arg in args):
+    args = _merge(formulas, Disjunction)
+    if any(isinstance(arg, Conjunction) and not arg.args for arg in args):
         return TRUE
-    return FALSE if not args else args[0] if len(args) == 1 else Or(args)
+    return FALSE if not args else args[0] if len(args) == 1 else Disjunction(args)
 
 
-def _merge(formulas: Iterable[Formula], kind: type[And | Or]) -> tuple[Formula, ...]:
+def _merge(formulas: Iterable[Formula], kind: type[Conjunction | Disjunction]) -> tuple[Formula, ...]:
     merged: dict[int, Formula] = {}
     for formula in formulas:
         look()
-        members = formula.args if isinstance(formula, (And, Or)) and isinstance(formula, kind) else (formula,)
+        members = (
+            formula.args
+            if isinstance(formula, (Conjunction, Disjunction)) and isinstance(formula, kind)
+            else (formula,)
+        )
         merged.update((id(member), member) for member in members)
     return tuple(merged.values())
 
@@ -254,15 +258,15 @@ def negation(formula: Formula) -> Formula:
     opposite: dict[int, Formula] = {}
     for node in postorder(formula):
         match node:
-            case Atom(Relation.LE, left, right):
+            case TermComparison(Relation.LE, left, right):
                 opposite[id(node)] = compare("<", right, left)
-            case Atom(Relation.LT, left, right):
+            case TermComparison(Relation.LT, left, right):
                 opposite[id(node)] = compare("<=", right, left)
-            case Atom(_, left, right):
+            case TermComparison(_, left, right):
                 opposite[id(node)] = disjunction((compare("<", left, right), compare("<", right, left)))
-            case And(args):
+            case Conjunction(args):
                 opposite[id(node)] = disjunction(opposite[id(arg)] for arg in args)
-            case Or(args):
+            case Disjunction(args):
                 opposite[id(node)] = conjunction(opposite[id(arg)] for arg in args)
             case _:
                 pass
@@ -293,9 +297,9 @@ def postorder(root: Node, *, terms: bool = True) -> list[Node]:
 
 
 def _children(node: Node, *, terms: bool) -> tuple[Node, ...]:
-    if isinstance(node, (Op, And, Or)):
+    if isinstance(node, (Op, Conjunction, Disjunction)):
         return node.args
-    return (node.left, node.right) if terms and isinstance(node, Atom) else ()
+    return (node.left, node.right) if terms and isinstance(node, TermComparison) else ()
 
 
 def flatten(root: Node) -> tuple[Row, ...]:
@@ -309,10 +313,10 @@ def flatten(root: Node) -> tuple[Row, ...]:
             row = ("var", node.name, ())
         elif isinstance(node, Num):
             row = ("num", repr(float(node.value)), ())
-        elif isinstance(node, Atom):
+        elif isinstance(node, TermComparison):
             row = (node.relation.value, "", (index[id(node.left)], index[id(node.right)]))
         else:
-            row = ("and" if isinstance(node, And) else "or", "", tuple([index[id(arg)] for arg in node.args]))
+            row = ("and" if isinstance(node, Conjunction) else "or", "", tuple([index[id(arg)] for arg in node.args]))
         index[id(node)] = rows.setdefault(row, len(rows))
     return tuple(rows)
 
@@ -332,11 +336,11 @@ def _node(kind: str, text: str, children: tuple[Node, ...]) -> Node:
         case "num":
             return Num(float(text))
         case "and":
-            return And(children) if children else TRUE  # type: ignore[arg-type]
+            return Conjunction(children) if children else TRUE  # type: ignore[arg-type]
         case "or":
-            return Or(children) if children else FALSE  # type: ignore[arg-type]
+            return Disjunction(children) if children else FALSE  # type: ignore[arg-type]
         case "<=" | "<" | "==":
-            return Atom(Relation(kind), *children)  # type: ignore[arg-type]
+            return TermComparison(Relation(kind), *children)  # type: ignore[arg-type]
         case _:
             return Op(Operator(kind), children)  # type: ignore[arg-type]
 

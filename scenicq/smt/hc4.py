@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import inf
 
 from scenicq.smt.backward import BACKWARD, root
-from scenicq.smt.formula import And, Atom, Operator, Relation, flatten
+from scenicq.smt.formula import Conjunction, Operator, Relation, TermComparison, flatten
 from scenicq.smt.interval import FORWARD, EmptyError, Interval, power
 
 __all__ = ["Tape"]
@@ -24,7 +24,7 @@ _Step = tuple[int, Callable[..., Interval], Callable[..., tuple[Interval, ...]],
 class Tape:
     """The operations of several atoms in order."""
 
-    def __init__(self, atoms: Sequence[Atom], index: Mapping[str, int]) -> None:
+    def __init__(self, atoms: Sequence[TermComparison], index: Mapping[str, int]) -> None:
         """Write the operations down.
 
         Args:
@@ -36,7 +36,7 @@ class Tape:
         self._steps: list[_Step] = []
         self._atoms: list[tuple[str, int, int]] = []
         places: list[int] = []
-        for kind, text, children in flatten(And(tuple(atoms))):
+        for kind, text, children in flatten(Conjunction(tuple(atoms))):
             args = [places[child] for child in children] if kind != "and" else []
             places.append(-1)
             if kind == "var":

@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 
 from scenicq.smt.formula import (
-    And,
-    Atom,
+    Conjunction,
+    Disjunction,
     Formula,
     Op,
     Operator,
-    Or,
     Problem,
     Term,
+    TermComparison,
     Var,
     Variable,
     compare,
@@ -44,7 +44,7 @@ def without_inverses(problem: Problem) -> Problem:
         return problem
     variables = list(problem.variables)
     terms: dict[int, Term] = {}
-    relations: dict[int, dict[Atom, None]] = {}
+    relations: dict[int, dict[TermComparison, None]] = {}
     formulas: dict[int, Formula] = {}
     for node in order:
         match node:
@@ -58,20 +58,22 @@ def without_inverses(problem: Problem) -> Problem:
                     terms[id(node)] = Op(operator, new)
                 if found:
                     relations[id(node)] = found
-            case Atom(relation, left, right):
+            case TermComparison(relation, left, right):
                 found = {**relations.get(id(left), {}), **relations.get(id(right), {})}
-                atom = Atom(relation, terms.get(id(left), left), terms.get(id(right), right))
+                atom = TermComparison(relation, terms.get(id(left), left), terms.get(id(right), right))
                 formulas[id(node)] = conjunction([atom, *found])
-            case And(args):
+            case Conjunction(args):
                 formulas[id(node)] = conjunction(formulas[id(arg)] for arg in args)
-            case Or(args):
+            case Disjunction(args):
                 formulas[id(node)] = disjunction(formulas[id(arg)] for arg in args)
             case _:
                 terms[id(node)] = node
     return Problem(tuple(variables), formulas[id(problem.constraint)])
 
 
-def _related(operator: Operator, args: tuple[Term, ...], variables: list[Variable]) -> tuple[Term, list[Atom]]:
+def _related(
+    operator: Operator, args: tuple[Term, ...], variables: list[Variable]
+) -> tuple[Term, list[TermComparison]]:
     """A new angle, and what relates it to the arguments; new variables are added to the list."""
     low, high = _RANGES[operator]
     angle = Var(f" {len(variables)}")
@@ -87,6 +89,6 @@ def _related(operator: Operator, args: tuple[Term, ...], variables: list[Variabl
     return angle, _equalities((Op(Operator.MUL, (length, sine)), y), (Op(Operator.MUL, (length, cosine)), x))
 
 
-def _equalities(*pairs: tuple[Term, Term]) -> list[Atom]:
+def _equalities(*pairs: tuple[Term, Term]) -> list[TermComparison]:
     atoms = [compare("==", left, right) for left, right in pairs]
-    return [atom for atom in atoms if isinstance(atom, Atom)]
+    return [atom for atom in atoms if isinstance(atom, TermComparison)]

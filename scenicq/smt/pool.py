@@ -1,6 +1,6 @@
 """Worker processes that run a solver: what they do to themselves harms one problem, never the caller.
 
-A worker that crashes, hangs, is killed or talks nonsense is replaced, and its problem's answer is `Unknown`. Workers
+A worker that crashes, hangs, is killed or talks nonsense is replaced, and its problem's answer is `NoAnswer`. Workers
 start when they are first needed and import the solver themselves, because a library can change the rounding mode of the
 process, print, or fail to load.
 """
@@ -25,7 +25,7 @@ from typing import IO, Self
 
 from scenicq.budget import leave_out, uncounted
 from scenicq.errors import Diagnostic, SolverError
-from scenicq.smt.answer import Answer, Sat, Unknown
+from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem
 from scenicq.smt.worker import Request, Setup, read_answer, seconds_of
@@ -104,7 +104,7 @@ class WorkerSolver:
         finally:
             self._idle.put(worker)
         if isinstance(answer, Sat) and not _replays(problem, answer, precision):
-            return Unknown("precision")
+            return NoAnswer("precision")
         return answer
 
     def check_many(self, problems: Sequence[Problem], *, precision: float, timeout_s: float) -> list[Answer]:
@@ -199,7 +199,7 @@ class _Worker:
             self.start()
         except SolverError:
             if self._loads:
-                return Unknown("crash")
+                return NoAnswer("crash")
             raise
         request = Request(problem, precision, timeout_s, timeout_s + GRACE_S)
         began = time.perf_counter()
@@ -209,11 +209,11 @@ class _Worker:
             expired = expired or self._ended_by_alarm()
             self.stop()
             leave_out(max(0.0, waited - timeout_s) if expired else 0.0)
-            return Unknown("timeout" if expired else "garbage" if len(line) > ANSWER_BYTES else "crash")
+            return NoAnswer("timeout" if expired else "garbage" if len(line) > ANSWER_BYTES else "crash")
         took = seconds_of(line)
         leave_out(max(0.0, waited - took) if took is not None else 0.0)
         answer = read_answer(line)
-        if isinstance(answer, Unknown) and answer.reason in ("garbage", "memory"):
+        if isinstance(answer, NoAnswer) and answer.reason in ("garbage", "memory"):
             self.stop()
         return answer
 

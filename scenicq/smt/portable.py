@@ -17,9 +17,9 @@ from collections import deque
 from dataclasses import dataclass
 
 from scenicq.smt.affine import EMPTY, ENTAILED
-from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.evaluation import holds
-from scenicq.smt.formula import Atom, Problem, Relation, postorder
+from scenicq.smt.formula import Problem, Relation, TermComparison, postorder
 from scenicq.smt.system import Alternative, System, TooDeepError, compile_system, contract_choice
 from scenicq.smt.variable_isolation import Recipe, recipes
 
@@ -65,7 +65,7 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
     try:
         system = compile_system(problem.constraint, index)
     except TooDeepError:
-        return Unknown("unsupported: conjunctions and disjunctions nested too deep")
+        return NoAnswer("unsupported: conjunctions and disjunctions nested too deep")
     return _Search(problem, system, index, precision).run(time.thread_time() + timeout_s)
 
 
@@ -81,7 +81,7 @@ class _Search:
         self._random = random.Random(0)
         self._best: Sat | None = None
         self._best_margin = -math.inf
-        atoms = [node for node in postorder(problem.constraint, terms=False) if isinstance(node, Atom)]
+        atoms = [node for node in postorder(problem.constraint, terms=False) if isinstance(node, TermComparison)]
         self._enough = -EXACT if any(atom.relation is Relation.EQ for atom in atoms) else 0.0
         self._scales: list[float] = []
         self._cookbook: dict[tuple[int, ...], tuple[Recipe, ...]] = {}
@@ -100,7 +100,7 @@ class _Search:
                 count += 1
                 patience -= self._best is not None
                 if time.thread_time() > deadline:
-                    return self._best or Unknown("timeout")
+                    return self._best or NoAnswer("timeout")
                 if not self._narrow(box):
                     continue
                 margin = self._sample(box)
@@ -111,14 +111,14 @@ class _Search:
             if self._best and patience < 0:
                 return self._best
             if count > BOXES:
-                return Unknown("budget")
+                return NoAnswer("budget")
             box = _next(queue, ages, count)
             if box is None:
                 break
             fresh = self._branch(box)
             undecided = undecided or not fresh
         if undecided:
-            return self._best or Unknown("budget")
+            return self._best or NoAnswer("budget")
         return Unsat()
 
     def _narrow(self, box: _Box) -> bool:

@@ -41,9 +41,9 @@ from scenicq.geometry.regions import (
 from scenicq.geometry.shapes import Bounds
 from scenicq.smt.formula import FALSE, TRUE, Formula, Operator, Term, apply, compare, conjunction, disjunction, negation
 
-__all__ = ["UnsupportedError", "Vector", "convex_cell", "disc", "inside_region", "picked"]
+__all__ = ["TermVector", "UnsupportedError", "convex_cell", "disc", "inside_region", "picked"]
 
-Vector: TypeAlias = tuple[Term, Term]
+TermVector: TypeAlias = tuple[Term, Term]
 
 
 class UnsupportedError(Exception):
@@ -66,7 +66,7 @@ def disc(dx: Term, dy: Term, radius: Term | float) -> Formula:
     return compare("<=", squares, apply(Operator.POW, radius, 2.0))
 
 
-def convex_cell(point: Vector, polygon: np.ndarray) -> Formula:
+def convex_cell(point: TermVector, polygon: np.ndarray) -> Formula:
     """A point in a convex polygon (k, 2) whose corners run counter-clockwise: left of every edge."""
     x, y = point
     sides: list[Formula] = []
@@ -79,7 +79,7 @@ def convex_cell(point: Vector, polygon: np.ndarray) -> Formula:
     return conjunction(sides)
 
 
-def _local(dx: Term, dy: Term, heading: Term | float) -> Vector:
+def _local(dx: Term, dy: Term, heading: Term | float) -> TermVector:
     """An offset in the frame of a heading: right and ahead."""
     c, s = apply(Operator.COS, heading), apply(Operator.SIN, heading)
     right = apply(Operator.ADD, apply(Operator.MUL, dx, c), apply(Operator.MUL, dy, s))
@@ -112,7 +112,7 @@ def _rectangle(dx: Term, dy: Term, heading: Term | float, width: Term | float, l
     )
 
 
-def _offset(point: Vector, center: tuple[Term | float, Term | float]) -> Vector:
+def _offset(point: TermVector, center: tuple[Term | float, Term | float]) -> TermVector:
     return apply(Operator.SUB, point[0], center[0]), apply(Operator.SUB, point[1], center[1])
 
 
@@ -123,7 +123,7 @@ def _near(edge: np.ndarray, limits: Bounds) -> bool:
     return min(x0, x1) <= east and max(x0, x1) >= west and min(y0, y1) <= north and max(y0, y1) >= south
 
 
-def _segment(point: Vector, edge: np.ndarray) -> Formula:
+def _segment(point: TermVector, edge: np.ndarray) -> Formula:
     """A point on an edge (x0, y0, x1, y1)."""
     x0, y0, x1, y1 = map(float, edge)
     length = math.hypot(x1 - x0, y1 - y0)
@@ -142,7 +142,7 @@ def _segment(point: Vector, edge: np.ndarray) -> Formula:
     )
 
 
-def _known_region(region: Region, point: Vector, around: Box) -> Formula:
+def _known_region(region: Region, point: TermVector, around: Box) -> Formula:
     match region:
         case Everywhere():
             return TRUE
@@ -182,7 +182,7 @@ def _known_region(region: Region, point: Vector, around: Box) -> Formula:
             return conjunction([_known_region(region.base, point, around), negation(removed)])
 
 
-def inside_region(region: Node, point: Vector, around: Box, code: Callable[[Node], object]) -> Formula:
+def inside_region(region: Node, point: TermVector, around: Box, code: Callable[[Node], object]) -> Formula:
     """A point in a region whose shape may depend on random variables.
 
     Args:
@@ -200,15 +200,15 @@ def inside_region(region: Node, point: Vector, around: Box, code: Callable[[Node
         case Constant():
             return _known_region(cast(Region, region.value), point, around)
         case DiscAt():
-            return disc(*_offset(point, cast(Vector, code(region.center))), cast(Term, code(region.radius)))
+            return disc(*_offset(point, cast(TermVector, code(region.center))), cast(Term, code(region.radius)))
         case SectorAt():
             if not isinstance(region.angle, Constant):
                 raise UnsupportedError("a view of random angle")
-            offset = _offset(point, cast(Vector, code(region.center)))
+            offset = _offset(point, cast(TermVector, code(region.center)))
             radius, heading = cast(Term, code(region.radius)), cast(Term, code(region.heading))
             return _sector(*offset, radius, heading, cast(float, region.angle.value))
         case RectangleAt():
-            offset = _offset(point, cast(Vector, code(region.center)))
+            offset = _offset(point, cast(TermVector, code(region.center)))
             sizes = [cast(Term, code(part)) for part in (region.heading, region.width, region.length)]
             return _rectangle(*offset, *sizes)
         case RegionUnion():

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from fractions import Fraction
 
-from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import Problem, Row, flatten
 
 __all__ = ["read_reply", "to_smtlib"]
@@ -233,16 +233,16 @@ def read_reply(text: str, problem: Problem) -> Answer:
     error = _ERROR.search(text)
     if error and (status is None or error.start() < status.start()):
         # a complaint about an assertion means that something else was decided
-        return Unknown(f"unsupported: {error.group(1)}")
+        return NoAnswer(f"unsupported: {error.group(1)}")
     if status is None:
-        return Unknown("garbage")
+        return NoAnswer("garbage")
     match status.group(1):
         case "unsat":
             return Unsat()
         case "unknown":
-            return Unknown("budget")
+            return NoAnswer("budget")
         case "timeout":
-            return Unknown("timeout")
+            return NoAnswer("timeout")
         case _:
             return _model(text[status.end() :], problem)
 
@@ -261,7 +261,7 @@ def _model(text: str, problem: Problem) -> Answer:
     for name, symbol in _symbols(variable.name for variable in problem.variables).items():
         value = values.get(symbol)
         if value is None and symbol in values:
-            return Unknown("unsupported: a value in the model is no number")
+            return NoAnswer("unsupported: a value in the model is no number")
         # a variable that the model leaves out is free
         witness[name] = 0.0 if value is None else value
     return Sat(witness)

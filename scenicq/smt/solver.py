@@ -5,18 +5,18 @@ from __future__ import annotations
 import sys
 
 from scenicq.errors import Diagnostic, SolverError
-from scenicq.smt.answer import Answer, Sat, Solver, SolverSession, SolverStatus, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Solver, SolverSession, SolverStatus, Unsat
 from scenicq.smt.command import SmtlibSolver
 from scenicq.smt.formula import TRUE, Problem
 from scenicq.smt.pool import DREAL, PORTABLE, WorkerSolver
 
 __all__ = [
     "Answer",
+    "NoAnswer",
     "Sat",
     "Solver",
     "SolverSession",
     "SolverStatus",
-    "Unknown",
     "Unsat",
     "available",
     "open_solver",

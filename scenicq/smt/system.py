@@ -13,7 +13,7 @@ from functools import cached_property
 
 from scenicq.smt.affine import EMPTY, ENTAILED, MAYBE, AffineAtom, Forms, affine_atoms, contract_affine
 from scenicq.smt.evaluation import Evaluator
-from scenicq.smt.formula import And, Atom, Formula, Or, Relation, free_variables, postorder
+from scenicq.smt.formula import Conjunction, Disjunction, Formula, Relation, TermComparison, free_variables, postorder
 from scenicq.smt.hc4 import Tape
 
 __all__ = ["Alternative", "System", "TooDeepError", "compile_system", "contract_choice"]
@@ -29,7 +29,7 @@ class System:
 
     def __init__(
         self,
-        atoms: tuple[Atom, ...],
+        atoms: tuple[TermComparison, ...],
         choices: tuple[tuple[System, ...], ...],
         index: Mapping[str, int],
         forms: Forms,
@@ -43,7 +43,7 @@ class System:
     @cached_property
     def _contractors(self) -> tuple[list[AffineAtom], Tape | None]:
         affine: list[AffineAtom] = []
-        other: list[Atom] = []
+        other: list[TermComparison] = []
         for atom in self.atoms:
             found = affine_atoms(atom, self._index, self._forms)
             if found is None:
@@ -55,7 +55,7 @@ class System:
     @cached_property
     def evaluator(self) -> Evaluator:
         """Margin of the atoms at a point."""
-        return Evaluator(And(self.atoms))
+        return Evaluator(Conjunction(self.atoms))
 
     @cached_property
     def variables(self) -> frozenset[int]:
@@ -65,7 +65,7 @@ class System:
         return frozenset((*own, *inner))
 
     @cached_property
-    def equalities(self) -> tuple[Atom, ...]:
+    def equalities(self) -> tuple[TermComparison, ...]:
         """The atoms that demand that two terms are equal."""
         return tuple(atom for atom in self.atoms if atom.relation is Relation.EQ)
 
@@ -143,16 +143,16 @@ def compile_system(constraint: Formula, index: Mapping[str, int]) -> System:
     order = postorder(constraint, terms=False)
     for node in order:
         match node:
-            case Atom():
+            case TermComparison():
                 systems[id(node)] = System((node,), (), index, forms)
                 nesting[id(node)] = 0
-            case And(args):
+            case Conjunction(args):
                 parts = [systems[id(arg)] for arg in args]
                 atoms = tuple(atom for part in parts for atom in part.atoms)
                 choices = tuple(choice for part in parts for choice in part.choices)
                 systems[id(node)] = System(atoms, choices, index, forms)
                 nesting[id(node)] = max((nesting[id(arg)] for arg in args), default=0)
-            case Or(args):
+            case Disjunction(args):
                 systems[id(node)] = System((), (tuple(systems[id(arg)] for arg in args),), index, forms)
                 nesting[id(node)] = 1 + max((nesting[id(arg)] for arg in args), default=0)
             case _:

@@ -1,7 +1,7 @@
 """Codes of values: what the encoder makes of a node's value, and how two of them compare.
 
 A number's code is a term, a vector's a pair of terms, a truth value's a formula. What is no number and not known is a
-`Choice`; everything else (a string, a region) stands for itself. `Undefined` spreads.
+`CodeChoice`; everything else (a string, a region) stands for itself. `Undefined` spreads.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from scenicq.smt.formula import (
     disjunction,
     negation,
 )
-from scenicq.smt.region_membership import UnsupportedError, Vector, picked
+from scenicq.smt.region_membership import TermVector, UnsupportedError, picked
 
 __all__ = [
-    "Choice",
+    "CodeChoice",
     "between",
     "cases",
     "compare_codes",
@@ -55,7 +55,7 @@ def constant_code(value: Value) -> object:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class CodeChoice:
     """A value that is no number: one of several, each under its condition."""
 
     options: tuple[tuple[Formula, object], ...]
@@ -63,7 +63,7 @@ class Choice:
 
 def same(code: object, observed: Value) -> Formula:
     """Whether a value that is no number is the one observed."""
-    if isinstance(code, Choice):
+    if isinstance(code, CodeChoice):
         return disjunction(conjunction([where, same(value, observed)]) for where, value in code.options)
     if isinstance(code, Formula):
         return FALSE if not isinstance(observed, bool) else code if observed else negation(code)
@@ -90,7 +90,7 @@ def truth(code: object) -> Formula:
     """A code as a condition: numbers other than 0 hold."""
     if isinstance(code, Formula):
         return code
-    if isinstance(code, Choice):
+    if isinstance(code, CodeChoice):
         return disjunction(conjunction([where, truth(value)]) for where, value in code.options)
     if isinstance(code, Undefined):
         return FALSE
@@ -114,7 +114,7 @@ def cases(index: Term | Formula, options: Sequence[Formula]) -> Formula:
     return disjunction(conjunction([picked(index, number), option]) for number, option in enumerate(options))
 
 
-def rotated(vector: Vector, angle: Term) -> Vector:
+def rotated(vector: TermVector, angle: Term) -> TermVector:
     """A vector turned counter-clockwise."""
     x, y = vector
     c, s = apply(Operator.COS, angle), apply(Operator.SIN, angle)
@@ -127,7 +127,7 @@ def rotated(vector: Vector, angle: Term) -> Vector:
 def compare_codes(op: CompareOp, left: object, right: object) -> Formula:
     """A comparison of two codes."""
     for choice, other, swapped in ((left, right, False), (right, left, True)):
-        if isinstance(choice, Choice):
+        if isinstance(choice, CodeChoice):
             pairs = [(where, (other, value) if swapped else (value, other)) for where, value in choice.options]
             return disjunction(conjunction([where, compare_codes(op, *sides)]) for where, sides in pairs)
     if isinstance(left, Undefined) or isinstance(right, Undefined):

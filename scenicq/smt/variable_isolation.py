@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from scenicq.smt.evaluation import Evaluator
-from scenicq.smt.formula import Atom, Op, Operator, Relation, Term, Var, free_variables, postorder
+from scenicq.smt.formula import Op, Operator, Relation, Term, TermComparison, Var, free_variables, postorder
 
 __all__ = ["Recipe", "recipes"]
 
@@ -24,7 +24,7 @@ class Recipe:
     value: Evaluator
 
 
-def recipes(atoms: Iterable[Atom]) -> tuple[Recipe, ...]:
+def recipes(atoms: Iterable[TermComparison]) -> tuple[Recipe, ...]:
     """Choose equalities and solve each for a variable, in an order in which they can be computed."""
     needs: dict[str, frozenset[str]] = {}
     found: dict[str, Evaluator] = {}
@@ -68,13 +68,13 @@ def _closure(names: frozenset[str], needs: dict[str, frozenset[str]]) -> set[str
     return closure
 
 
-def _candidates(atom: Atom) -> list[str]:
+def _candidates(atom: TermComparison) -> list[str]:
     """The variables of an atom, those first that are a whole side of it."""
     sides = [side.name for side in (atom.left, atom.right) if isinstance(side, Var)]
     return [*sides, *(name for name in free_variables(atom) if name not in sides)]
 
 
-def _solved(atom: Atom, name: str) -> Term | None:
+def _solved(atom: TermComparison, name: str) -> Term | None:
     """The term that a variable equals, if it occurs once and under invertible operators only."""
     holders = {id(node) for node in postorder(atom) if isinstance(node, Var) and node.name == name}
     for node in postorder(atom):

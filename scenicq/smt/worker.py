@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO, Any, TypeGuard, cast
 
-from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import Problem
 
 __all__ = ["Check", "Request", "Setup", "read_answer", "seconds_of", "serve", "write_answer"]
@@ -124,9 +124,9 @@ def _answer(check: Check, request: Request) -> Answer:
     try:
         return check(request.problem, precision=request.precision, timeout_s=request.timeout_s)
     except MemoryError:
-        return Unknown("memory")
+        return NoAnswer("memory")
     except Exception:  # noqa: BLE001 - a failing solver is an answer
-        return Unknown("crash")
+        return NoAnswer("crash")
 
 
 def _send(answers: IO[bytes], message: object) -> None:
@@ -145,7 +145,7 @@ def write_answer(answer: Answer) -> dict[str, object]:
             return {"sat": {name: float(value) for name, value in witness.items()}}
         case Unsat():
             return {"unsat": True}
-        case Unknown(reason):
+        case NoAnswer(reason):
             return {"unknown": reason}
 
 
@@ -154,16 +154,16 @@ def read_answer(line: bytes) -> Answer:
     try:
         message: dict[str, Any] = json.loads(line)
     except ValueError:
-        return Unknown("garbage")
+        return NoAnswer("garbage")
     match message:
         case {"sat": witness} if _is_witness(witness):
             return Sat(witness)
         case {"unsat": True}:
             return Unsat()
         case {"unknown": str() as reason}:
-            return Unknown(reason)
+            return NoAnswer(reason)
         case _:
-            return Unknown("garbage")
+            return NoAnswer("garbage")
 
 
 def seconds_of(line: bytes) -> float | None:

@@ -11,7 +11,7 @@ import duckdb
 from scenicq.store.dataset import Dataset
 from scenicq.store.motion import LONGEST_GAP_US
 
-__all__ = ["Gaps", "Known", "ObservedMotion", "Steps", "observed_motion"]
+__all__ = ["Gaps", "Known", "LabelIntervals", "ObservedMotion", "observed_motion"]
 
 _OWNERS = MappingProxyType({"ego": ("labels", "ego_"), "objects": ("objects", "")})
 """The table and the beginning of the columns of the ego and of label objects."""
@@ -38,7 +38,7 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
-class Steps:
+class LabelIntervals:
     """Seconds between two labels of a recording: the shortest, the median and the longest."""
 
     shortest: float
@@ -71,7 +71,7 @@ class ObservedMotion:
     """
 
     known: Mapping[str, Known]
-    steps: Steps | None
+    steps: LabelIntervals | None
     gaps: Gaps
     without_track: int
 
@@ -107,7 +107,7 @@ def observed_motion(dataset: Dataset) -> ObservedMotion:
             "(PARTITION BY recording, track ORDER BY timestamp_us) AS step FROM objects WHERE track IS NOT NULL)",
         )
         (without,) = _numbers(connection, "count(*) FILTER (track IS NULL) FROM objects")
-    steps = Steps(shortest / 1e6, median / 1e6, longest / 1e6) if longest else None
+    steps = LabelIntervals(shortest / 1e6, median / 1e6, longest / 1e6) if longest else None
     return ObservedMotion(known, steps, Gaps(gaps, in_tracks), without)
 
 

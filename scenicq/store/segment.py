@@ -32,9 +32,9 @@ if TYPE_CHECKING:  # slow to load, and not every source has maps
 __all__ = [
     "SEGMENT_OBJECTS",
     "MapIndexes",
-    "Problem",
     "Segment",
     "SegmentWriter",
+    "SourceProblem",
     "read_segments",
     "segments_of",
     "take_over",
@@ -47,7 +47,7 @@ _FOLDER = "segments"
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class SourceProblem:
     """Something of a source that could not be taken as it is, as the importer's report told it.
 
     Attributes:
@@ -88,7 +88,7 @@ class Segment:
     tracks: int
     span_us: tuple[int, int] | None
     counts: Sequence[tuple[str, str, str, bool, int]] = ()
-    told: Sequence[Problem] = ()
+    told: Sequence[SourceProblem] = ()
 
     @property
     def objects(self) -> int:
@@ -200,7 +200,7 @@ class SegmentWriter:
         self,
         fingerprint: str = "",
         counts: Sequence[tuple[str, str, str, bool, int]] = (),
-        told: Sequence[Problem] = (),
+        told: Sequence[SourceProblem] = (),
     ) -> Segment:
         """Complete the files, then say so.
 
@@ -294,6 +294,6 @@ def _from_json(fields: dict[str, Any]) -> Segment:
     )
 
 
-def _problem(fields: dict[str, Any]) -> Problem:
+def _problem(fields: dict[str, Any]) -> SourceProblem:
     what, code, name, kept, message = (fields[key] for key in ("what", "code", "name", "kept", "message"))
-    return Problem(what, code, name, kept, message, tuple(fields["hints"]))
+    return SourceProblem(what, code, name, kept, message, tuple(fields["hints"]))

@@ -194,14 +194,11 @@ class TrackBlock:
 
     def frame(self, label: int) -> str:
         """The name of a label's frame."""
-        if "frame" not in self._texts:
-            self._texts["frame"] = self._labels.read(["frame"], self.first_label, self._end)["frame"]
-        return self._texts["frame"][label].as_py()
+        return self._label_text("frame")[label].as_py()
 
     def name(self, recording: int) -> str:
         """The name of a recording."""
-        first = self.first_label + self.runs[recording][0]
-        return self._labels.read(["recording"], first, first + 1)["recording"][0].as_py()
+        return self._label_text("recording")[self.runs[recording][0]].as_py()
 
     def seconds(self, label: int) -> float:
         """The time of a label since the first of its recording."""
@@ -211,6 +208,11 @@ class TrackBlock:
     def _text(self, name: str) -> Any:
         if name not in self._texts:
             self._texts[name] = self._objects_column(name)
+        return self._texts[name]
+
+    def _label_text(self, name: str) -> Any:
+        if name not in self._texts:
+            self._texts[name] = self._labels.read([name], self.first_label, self._end)[name]
         return self._texts[name]
 
     def _objects_column(self, name: str) -> Any:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from scenicq.syntax.nodes.base import Node
+from scenicq.syntax.nodes.base import SyntaxNode
 from scenicq.syntax.nodes.expressions import (
     Argument,
     Attribute,
@@ -19,10 +19,9 @@ from scenicq.syntax.nodes.expressions import (
     BoolOp,
     Call,
     Clause,
-    Compare,
-    Comparison,
+    ComparisonChain,
+    ComparisonLink,
     Comprehension,
-    Constant,
     Dict,
     DictComprehension,
     DictItem,
@@ -30,13 +29,14 @@ from scenicq.syntax.nodes.expressions import (
     IfElse,
     Lambda,
     List,
+    LiteralValue,
     Name,
     Parameter,
     Replacement,
     Set,
-    Slice,
     Starred,
     Subscript,
+    SubscriptSlice,
     Tuple,
     UnaryOp,
     UnsupportedExpression,
@@ -48,13 +48,13 @@ from scenicq.syntax.nodes.operators import (
     ApparentHeading,
     CanSee,
     Deg,
-    Distance,
+    DistanceOperator,
     DistancePast,
     FieldAt,
     Follow,
     Implies,
     InitialScenario,
-    Intersects,
+    IntersectsOperator,
     New,
     OffsetAlong,
     OffsetBy,
@@ -63,8 +63,8 @@ from scenicq.syntax.nodes.operators import (
     RelativePosition,
     RelativeTo,
     Temporal,
-    Until,
-    Vector,
+    UntilOperator,
+    VectorOperator,
     Visible,
     VisibleFrom,
 )
@@ -73,10 +73,10 @@ from scenicq.syntax.nodes.program import (
     DynamicStatement,
     Evidence,
     Model,
-    Module,
     Mutate,
     Param,
     ParamItem,
+    Program,
     Require,
     RequireMonitor,
     Simulator,
@@ -132,20 +132,117 @@ from scenicq.syntax.nodes.statements import (
 )
 
 __all__ = [
-    "Altitude", "Angle", "AnnotatedAssign", "ApparentHeading", "ApparentlyFacingSpecifier", "Argument", "Assert",
-    "Assign", "AtSpecifier", "Attribute", "AugmentedAssign", "BeyondSpecifier", "BinaryOp", "BoolOp", "Branch", "Break",
-    "Call", "CanSee", "ClassDef", "Clause", "Compare", "Comparison", "Comprehension", "Constant",
-    "ContainedInSpecifier", "Continue", "Deg", "Delete", "Dict", "DictComprehension", "DictItem", "DirectionSpecifier",
-    "Distance", "DistancePast", "DynamicDefinition", "DynamicStatement", "Evidence", "ExceptHandler", "Expression",
-    "ExpressionStatement", "FacingAwayFromSpecifier", "FacingSpecifier", "FacingTowardSpecifier", "FieldAt", "Follow",
-    "FollowingSpecifier", "For", "FormattedString", "FunctionDef", "Global", "If", "IfElse", "Implies", "Import",
-    "ImportAlias", "ImportFrom", "InSpecifier", "InitialScenario", "Intersects", "Lambda", "List", "Model", "Module",
-    "Mutate", "Name", "New", "Node", "Nonlocal", "NotVisibleSpecifier", "OffsetAlong", "OffsetAlongSpecifier",
-    "OffsetBy", "OffsetBySpecifier", "OnSpecifier", "Param", "ParamItem", "Parameter", "PartOf", "Pass",
-    "PropertyDefault", "Raise", "RelativeHeading", "RelativePosition", "RelativeTo", "Replacement", "Require",
-    "RequireMonitor", "Return", "Set", "Simulator", "Slice", "Specifier", "Starred", "Statement", "Subscript",
-    "Temporal", "Try", "Tuple", "UnaryOp", "UnsupportedExpression", "UnsupportedStatement", "Until", "UsingSpecifier",
-    "Vector", "Visible", "VisibleFrom", "VisibleSpecifier", "Walrus", "While", "WithItem", "WithSpecifier",
+    "Altitude",
+    "Angle",
+    "AnnotatedAssign",
+    "ApparentHeading",
+    "ApparentlyFacingSpecifier",
+    "Argument",
+    "Assert",
+    "Assign",
+    "AtSpecifier",
+    "Attribute",
+    "AugmentedAssign",
+    "BeyondSpecifier",
+    "BinaryOp",
+    "BoolOp",
+    "Branch",
+    "Break",
+    "Call",
+    "CanSee",
+    "ClassDef",
+    "Clause",
+    "ComparisonChain",
+    "ComparisonLink",
+    "Comprehension",
+    "ContainedInSpecifier",
+    "Continue",
+    "Deg",
+    "Delete",
+    "Dict",
+    "DictComprehension",
+    "DictItem",
+    "DirectionSpecifier",
+    "DistanceOperator",
+    "DistancePast",
+    "DynamicDefinition",
+    "DynamicStatement",
+    "Evidence",
+    "ExceptHandler",
+    "Expression",
+    "ExpressionStatement",
+    "FacingAwayFromSpecifier",
+    "FacingSpecifier",
+    "FacingTowardSpecifier",
+    "FieldAt",
+    "Follow",
+    "FollowingSpecifier",
+    "For",
+    "FormattedString",
+    "FunctionDef",
+    "Global",
+    "If",
+    "IfElse",
+    "Implies",
+    "Import",
+    "ImportAlias",
+    "ImportFrom",
+    "InSpecifier",
+    "InitialScenario",
+    "IntersectsOperator",
+    "Lambda",
+    "List",
+    "LiteralValue",
+    "Model",
+    "Mutate",
+    "Name",
+    "New",
+    "Nonlocal",
+    "NotVisibleSpecifier",
+    "OffsetAlong",
+    "OffsetAlongSpecifier",
+    "OffsetBy",
+    "OffsetBySpecifier",
+    "OnSpecifier",
+    "Param",
+    "ParamItem",
+    "Parameter",
+    "PartOf",
+    "Pass",
+    "Program",
+    "PropertyDefault",
+    "Raise",
+    "RelativeHeading",
+    "RelativePosition",
+    "RelativeTo",
+    "Replacement",
+    "Require",
+    "RequireMonitor",
+    "Return",
+    "Set",
+    "Simulator",
+    "Specifier",
+    "Starred",
+    "Statement",
+    "Subscript",
+    "SubscriptSlice",
+    "SyntaxNode",
+    "Temporal",
+    "Try",
+    "Tuple",
+    "UnaryOp",
+    "UnsupportedExpression",
+    "UnsupportedStatement",
+    "UntilOperator",
+    "UsingSpecifier",
+    "VectorOperator",
+    "Visible",
+    "VisibleFrom",
+    "VisibleSpecifier",
+    "Walrus",
+    "While",
+    "WithItem",
+    "WithSpecifier",
     "WithStatement",
 ]  # fmt: skip
 
@@ -172,7 +269,7 @@ Specifier: TypeAlias = (
 
 Expression: TypeAlias = (
     Name
-    | Constant
+    | LiteralValue
     | FormattedString
     | Tuple
     | List
@@ -182,20 +279,20 @@ Expression: TypeAlias = (
     | UnaryOp
     | BinaryOp
     | BoolOp
-    | Compare
+    | ComparisonChain
     | IfElse
     | Lambda
     | Comprehension
     | DictComprehension
     | Call
     | Attribute
-    | Slice
+    | SubscriptSlice
     | Subscript
     | Walrus
     | UnsupportedExpression
     | New
     | Deg
-    | Vector
+    | VectorOperator
     | FieldAt
     | RelativeTo
     | OffsetBy
@@ -203,18 +300,18 @@ Expression: TypeAlias = (
     | RelativePosition
     | RelativeHeading
     | ApparentHeading
-    | Distance
+    | DistanceOperator
     | DistancePast
     | Angle
     | Altitude
     | CanSee
-    | Intersects
+    | IntersectsOperator
     | Follow
     | Visible
     | VisibleFrom
     | PartOf
     | Temporal
-    | Until
+    | UntilOperator
     | Implies
     | InitialScenario
 )

@@ -28,12 +28,12 @@ class AtomParser(BindingParser):
                 return ast.Name(self.token_span(token), token.text)
             case "number":
                 self.advance()
-                return ast.Constant(self.token_span(token), number_value(self.source, token))
+                return ast.LiteralValue(self.token_span(token), number_value(self.source, token))
             case "string":
                 return self.strings()
             case "keyword" if token.text in _VALUES:
                 self.advance()
-                return ast.Constant(self.token_span(token), _VALUES[token.text])
+                return ast.LiteralValue(self.token_span(token), _VALUES[token.text])
             case _:
                 pass
         match token.text:
@@ -45,7 +45,7 @@ class AtomParser(BindingParser):
                 return self.braces()
             case "...":
                 self.advance()
-                return ast.Constant(self.token_span(token), ...)
+                return ast.LiteralValue(self.token_span(token), ...)
             case "":
                 raise self.fail("an expression is missing", label=self.found())
             case "lambda":
@@ -146,7 +146,7 @@ class AtomParser(BindingParser):
         step = None
         if self.accept(":") and self.text not in ("]", ","):
             step = self.expression()
-        return ast.Slice(self.span(start), lower, upper, step)
+        return ast.SubscriptSlice(self.span(start), lower, upper, step)
 
     def group(self) -> ast.Expression:
         """Read `(...)`: a tuple, a generator, or just an expression."""

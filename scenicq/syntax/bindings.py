@@ -52,8 +52,8 @@ class BindingParser(TextParser):
             case ast.Tuple() | ast.List():
                 for item in node.items:
                     self.check_target(item)
-            case ast.Compare() | ast.Call():
-                hint = "`==` compares" if isinstance(node, ast.Compare) else ""
+            case ast.ComparisonChain() | ast.Call():
+                hint = "`==` compares" if isinstance(node, ast.ComparisonChain) else ""
                 raise self.fail("only a name, an attribute or an element can be assigned to", node.span, hint=hint)
             case _:
                 raise self.fail("only a name, an attribute or an element can be assigned to", node.span)

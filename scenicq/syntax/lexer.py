@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
-from scenicq.syntax.tokens import CLOSERS, KEYWORDS, Kind, Token
+from scenicq.syntax.tokens import CLOSERS, KEYWORDS, Token, TokenKind
 
 __all__ = ["MAX_NESTING", "tokenize", "tokenize_part"]
 
@@ -98,7 +98,7 @@ class _Lexer:
         self.finish()
         return tokens
 
-    def add(self, kind: Kind, start: int, end: int) -> None:
+    def add(self, kind: TokenKind, start: int, end: int) -> None:
         self.tokens.append(Token(kind, "", start, end))
 
     def fail(self, message: str, start: int, end: int, label: str = "", hint: str = "") -> ScenarioError:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from scenicq.errors import Diagnostic, ScenarioError, Source, Span
 from scenicq.syntax.tokens import CLOSERS, Token
 
-__all__ = ["Field", "Text", "decode", "number_value", "split_format", "string_parts"]
+__all__ = ["Field", "LiteralText", "decode", "number_value", "split_format", "string_parts"]
 
 _ESCAPE = re.compile(r"\\(N\{[^}\n]*\}|x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|[0-7]{1,3}|.)", re.DOTALL)
 _SIMPLE = {"a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v", "\\": "\\", "'": "'", '"': '"'}
@@ -91,7 +91,7 @@ def decode(source: Source, start: int, end: int, *, raw: bool, binary: bool) -> 
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class LiteralText:
     """Literal text of a formatted string, with doubled braces already single."""
 
     start: int
@@ -120,7 +120,7 @@ class Field:
     format: tuple[int, int] | None
 
 
-def split_format(source: Source, start: int, end: int, *, raw: bool) -> list[Text | Field]:
+def split_format(source: Source, start: int, end: int, *, raw: bool) -> list[LiteralText | Field]:
     """Split the text between the quotes of a formatted string (or a format in one) into text and fields.
 
     Raises:
@@ -128,17 +128,17 @@ def split_format(source: Source, start: int, end: int, *, raw: bool) -> list[Tex
     """
     text = source.text
     pieces = _RAW_TEXT if raw else _PLAIN_TEXT
-    parts: list[Text | Field] = []
+    parts: list[LiteralText | Field] = []
     position = start
     while position < end:
         found = pieces.match(text, position, end)
         stop = found.end() if found else position
         if stop > position:
-            parts.append(Text(position, stop, decode(source, position, stop, raw=raw, binary=False)))
+            parts.append(LiteralText(position, stop, decode(source, position, stop, raw=raw, binary=False)))
         if stop >= end:
             break
         if text[stop : stop + 2] in ("{{", "}}") and stop + 2 <= end:
-            parts.append(Text(stop, stop + 2, text[stop]))
+            parts.append(LiteralText(stop, stop + 2, text[stop]))
             position = stop + 2
         elif text[stop] == "}":
             hint = "write `}}` for a brace in the text"

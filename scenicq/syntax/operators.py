@@ -109,7 +109,7 @@ class OperatorParser(PrefixParser):
 
     def comparison(self, start: int, left: ast.Expression) -> ast.Expression:
         """Read the rest of a chain of comparisons."""
-        comparisons: list[ast.Comparison] = []
+        comparisons: list[ast.ComparisonLink] = []
         while self.level_here() == COMPARISON:
             place = self.token.start
             operator = self.advance().text
@@ -119,8 +119,8 @@ class OperatorParser(PrefixParser):
                 operator = "is not" if self.advance().text == "not" else "in"
             right = self.binary(UNION)
             words = cast('Literal["==", "!=", "<", "<=", ">", ">=", "in", "not in", "is", "is not"]', operator)
-            comparisons.append(ast.Comparison(self.span(place), words, right))
-        return ast.Compare(self.span(start), left, tuple(comparisons))
+            comparisons.append(ast.ComparisonLink(self.span(place), words, right))
+        return ast.ComparisonChain(self.span(start), left, tuple(comparisons))
 
     def infix(self, start: int, left: ast.Expression, level: int) -> ast.Expression:
         """Read one operator and its right operand."""
@@ -130,7 +130,7 @@ class OperatorParser(PrefixParser):
                 return ast.Deg(self.span(start), left)
             case "@":
                 right = self.binary(SIGN)
-                return ast.Vector(self.span(start), left, right)
+                return ast.VectorOperator(self.span(start), left, right)
             case "at":
                 right = self.binary(PREFIX)
                 return ast.FieldAt(self.span(start), left, right)
@@ -146,7 +146,7 @@ class OperatorParser(PrefixParser):
                 return ast.CanSee(self.span(start), left, right)
             case "intersects":
                 right = self.binary(ALONG)
-                return ast.Intersects(self.span(start), left, right)
+                return ast.IntersectsOperator(self.span(start), left, right)
             case "visible" | "not":
                 if word == "not":
                     self.advance()
@@ -155,7 +155,7 @@ class OperatorParser(PrefixParser):
                 return ast.VisibleFrom(self.span(start), left, right, word == "not")
             case "until":
                 right = self.binary(IMPLIES)
-                return ast.Until(self.span(start), left, right)
+                return ast.UntilOperator(self.span(start), left, right)
             case "implies":
                 right = self.binary(OR)
                 if self.text == "implies":

@@ -19,7 +19,7 @@ MAX_CHARACTERS = 200_000
 """How long a program may be."""
 
 
-def parse(source: Source, version: int | None = None) -> ast.Module:
+def parse(source: Source, version: int | None = None) -> ast.Program:
     """Read a Scenic program.
 
     Args:
@@ -51,7 +51,7 @@ def parse(source: Source, version: int | None = None) -> ast.Module:
     check_jumps(body)
     evidence = find_evidence(source, body, parser.classes | parser.variables)
     versions, chosen = choose_version(evidence, version)
-    return ast.Module(source, body, versions, chosen, evidence)
+    return ast.Program(source, body, versions, chosen, evidence)
 
 
 def _see_names(parser: ProgramParser, tokens: list[Token]) -> None:

@@ -153,7 +153,7 @@ class PrefixParser(InstanceParser):
             )
         span = self.span(start)
         if word == "distance":
-            return ast.Distance(span, target, origin)
+            return ast.DistanceOperator(span, target, origin)
         return ast.Altitude(span, target, origin) if word == "altitude" else ast.Angle(span, target, origin)
 
     def target_then(self, word: str) -> tuple[ast.Expression, ast.Expression | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from scenicq.syntax import ast
 from scenicq.syntax.grammar import Grammar
 from scenicq.syntax.lexer import tokenize_part
-from scenicq.syntax.literals import Field, Text, decode, split_format, string_parts
+from scenicq.syntax.literals import Field, LiteralText, decode, split_format, string_parts
 from scenicq.syntax.tokens import Token
 
 __all__ = ["TextParser"]
@@ -19,7 +19,7 @@ class TextParser(Grammar):
     def strings(self) -> ast.Expression:
         """Read adjacent string literals as one value."""
         start = self.token.start
-        parts: list[ast.Constant | ast.Replacement] = []
+        parts: list[ast.LiteralValue | ast.Replacement] = []
         formatted = False
         binary: bool | None = None
         while self.token.kind == "string":
@@ -34,35 +34,35 @@ class TextParser(Grammar):
                 parts += self.format_parts(begin, end, raw, _FORMAT_LEVELS)
             else:
                 value = decode(self.source, begin, end, raw=raw, binary=binary)
-                parts.append(ast.Constant(self.token_span(token), value))
+                parts.append(ast.LiteralValue(self.token_span(token), value))
         span = self.span(start)
         if formatted:
             return ast.FormattedString(span, tuple(parts))
         text = "".join(str(part.value) for part in parts)
         if not binary:
-            return ast.Constant(span, text)
+            return ast.LiteralValue(span, text)
         if any(ord(character) > 255 for character in text) or not span.text.isascii():
             raise self.fail("bytes hold ASCII characters only", span)
-        return ast.Constant(span, text.encode("latin-1"))
+        return ast.LiteralValue(span, text.encode("latin-1"))
 
-    def format_parts(self, start: int, end: int, raw: bool, levels: int) -> list[ast.Constant | ast.Replacement]:
+    def format_parts(self, start: int, end: int, raw: bool, levels: int) -> list[ast.LiteralValue | ast.Replacement]:
         """Read the text and the fields of a formatted string."""
         if not levels:
             place = Token("string", "", start, end)
             raise self.fail("fields are nested too deeply in the formatted string", self.token_span(place))
         self.enter()
-        parts: list[ast.Constant | ast.Replacement] = []
+        parts: list[ast.LiteralValue | ast.Replacement] = []
         for piece in split_format(self.source, start, end, raw=raw):
             match piece:
-                case Text():
+                case LiteralText():
                     whole = Token("string", "", piece.start, piece.end)
-                    parts.append(ast.Constant(self.token_span(whole), piece.value))
+                    parts.append(ast.LiteralValue(self.token_span(whole), piece.value))
                 case Field():
                     parts += self.field(piece, raw, levels)
         self.depth -= 1
         return parts
 
-    def field(self, field: Field, raw: bool, levels: int) -> list[ast.Constant | ast.Replacement]:
+    def field(self, field: Field, raw: bool, levels: int) -> list[ast.LiteralValue | ast.Replacement]:
         """Read one field of a formatted string."""
         begin, end = field.expression
         inner = self.part(tokenize_part(self.source, begin, end))
@@ -79,4 +79,4 @@ class TextParser(Grammar):
         if not field.shows_text:
             return [replacement]
         shown = self.source.text[begin:end] + "="
-        return [ast.Constant(self.token_span(Token("string", "", begin, end)), shown), replacement]
+        return [ast.LiteralValue(self.token_span(Token("string", "", begin, end)), shown), replacement]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple, TypeAlias
 
-__all__ = ["CLOSERS", "INFIX_NAMES", "INFIX_WORDS", "KEYWORDS", "Kind", "Token"]
+__all__ = ["CLOSERS", "INFIX_NAMES", "INFIX_WORDS", "KEYWORDS", "Token", "TokenKind"]
 
-Kind: TypeAlias = Literal["name", "keyword", "number", "string", "operator", "newline", "indent", "dedent", "end"]
+TokenKind: TypeAlias = Literal["name", "keyword", "number", "string", "operator", "newline", "indent", "dedent", "end"]
 
 
 class Token(NamedTuple):
@@ -19,7 +19,7 @@ class Token(NamedTuple):
         end: Offset after the last character.
     """
 
-    kind: Kind
+    kind: TokenKind
     text: str
     start: int
     end: int

@@ -28,7 +28,7 @@ def find_evidence(source: Source, body: tuple[ast.Statement, ...], defined: set[
     return tuple(sorted(found, key=lambda evidence: evidence.span.start))
 
 
-def _evidence(source: Source, node: ast.Node, defined: set[str]) -> ast.Evidence | None:
+def _evidence(source: Source, node: ast.SyntaxNode, defined: set[str]) -> ast.Evidence | None:
     match node:
         case ast.New(keyword=True):
             return ast.Evidence(Span(source, node.span.start, node.cls.span.end), "an instance with `new`", _NEW)
@@ -38,15 +38,15 @@ def _evidence(source: Source, node: ast.Node, defined: set[str]) -> ast.Evidence
             return ast.Evidence(node.function.span, f"`{name}`", _RECENT)
         case (
             ast.Deg(value=ast.Tuple(items=(_, _)))
-            | ast.Vector(x=ast.Tuple(items=(_, _)))
-            | ast.Vector(y=ast.Tuple(items=(_, _)))
+            | ast.VectorOperator(x=ast.Tuple(items=(_, _)))
+            | ast.VectorOperator(y=ast.Tuple(items=(_, _)))
         ):
             return ast.Evidence(node.span, "a pair of numbers as an interval", _FIRST)
         case ast.Model():
             return ast.Evidence(node.span, "`model`", _RECENT)
         case ast.DynamicStatement() | ast.DynamicDefinition():
             return ast.Evidence(node.span, f"`{node.kind}`", _RECENT)
-        case ast.Intersects():
+        case ast.IntersectsOperator():
             return ast.Evidence(node.span, "`intersects`", _NEW)
         case ast.Altitude():
             return ast.Evidence(node.span, "`altitude`", _NEW)
@@ -60,7 +60,7 @@ def _evidence(source: Source, node: ast.Node, defined: set[str]) -> ast.Evidence
             return ast.Evidence(node.span, f"`{node.part} of`", _NEW)
         case ast.RequireMonitor():
             return ast.Evidence(node.span, "`require monitor`", _NEW)
-        case ast.Temporal() | ast.Until() | ast.Implies():
+        case ast.Temporal() | ast.UntilOperator() | ast.Implies():
             return ast.Evidence(node.span, "a temporal operator", _RECENT)
         case ast.PropertyDefault() if node.modifiers:
             return ast.Evidence(node.name_span, "a property with modifiers", _RECENT)

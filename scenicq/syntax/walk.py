@@ -12,10 +12,10 @@ __all__ = ["MAX_HEIGHT", "check_height", "children", "walk"]
 MAX_HEIGHT = 256
 """How high the tree of one statement may be, so that a pass may call itself for each node."""
 
-_fields: dict[type[ast.Node], tuple[str, ...]] = {}
+_fields: dict[type[ast.SyntaxNode], tuple[str, ...]] = {}
 
 
-def children(node: ast.Node) -> Iterator[ast.Node]:
+def children(node: ast.SyntaxNode) -> Iterator[ast.SyntaxNode]:
     """The nodes that are fields of a node, in the order of the fields."""
     kind = type(node)
     names = _fields.get(kind)
@@ -24,15 +24,15 @@ def children(node: ast.Node) -> Iterator[ast.Node]:
         _fields[kind] = names
     for name in names:
         value: object = getattr(node, name)
-        if isinstance(value, ast.Node):
+        if isinstance(value, ast.SyntaxNode):
             yield value
         elif isinstance(value, tuple):
             for item in value:  # pyright: ignore[reportUnknownVariableType]
-                if isinstance(item, ast.Node):
+                if isinstance(item, ast.SyntaxNode):
                     yield item
 
 
-def walk(*roots: ast.Node) -> Iterator[ast.Node]:
+def walk(*roots: ast.SyntaxNode) -> Iterator[ast.SyntaxNode]:
     """All nodes from the roots down, a node before what it holds, in the order of the fields."""
     stack = list(reversed(roots))
     while stack:
@@ -41,13 +41,13 @@ def walk(*roots: ast.Node) -> Iterator[ast.Node]:
         stack.extend(reversed(tuple(children(node))))
 
 
-def check_height(roots: tuple[ast.Node, ...]) -> None:
+def check_height(roots: tuple[ast.SyntaxNode, ...]) -> None:
     """Refuse a tree that is too high, such as a sum of thousands of terms.
 
     Raises:
         ScenarioError: `budget-exceeded`, at the node that is too deep.
     """
-    level: list[ast.Node] = list(roots)
+    level: list[ast.SyntaxNode] = list(roots)
     height = 0
     while level:
         height += 1

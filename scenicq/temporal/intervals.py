@@ -35,11 +35,11 @@ from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Interval", "IntervalMatcher"]
+__all__ = ["IntervalMatcher", "IntervalVerdict"]
 
 
 @dataclass(frozen=True, slots=True)
-class Interval:
+class IntervalVerdict:
     """What became of a binding in an interval of a recording.
 
     Attributes:
@@ -109,7 +109,7 @@ class IntervalMatcher:
             return None
         return self.scenario.objects[feature.object].properties[feature.property].value
 
-    def intervals(self, table: StartTable, remember: Callable[[int], Remembered]) -> list[Interval]:
+    def intervals(self, table: StartTable, remember: Callable[[int], Remembered]) -> list[IntervalVerdict]:
         """What became of each binding: the intervals to report, or else the one that came furthest.
 
         Args:
@@ -166,7 +166,7 @@ class IntervalMatcher:
 
     def _reported(
         self, parts: Sequence[_Found], table: StartTable, bindings: NDArray[np.int64]
-    ) -> Iterator[list[Interval]]:
+    ) -> Iterator[list[IntervalVerdict]]:
         """What is reported of each binding."""
         if not parts:
             return
@@ -203,7 +203,7 @@ class IntervalMatcher:
     def _interval(
         self, table: StartTable, origin: int, span: tuple[int, int], truth: int,
         detail: tuple[str, Mapping[str, WitnessValue]], broken: Span | None, *, cut_off: bool,
-    ) -> Interval:  # fmt: skip
+    ) -> IntervalVerdict:  # fmt: skip
         block = table.block
         recording = int(block.recording_of[span[0]])
         first, _ = block.runs[recording]
@@ -211,7 +211,7 @@ class IntervalMatcher:
         reason, witness = detail
         if truth == UNKNOWN and table.sure[origin]:
             reason = reason or "unobserved"
-        return Interval(
+        return IntervalVerdict(
             span[0] - first, span[1] - first, truth, binding, recording, origin,
             witness if truth == TRUE else {}, reason, broken, cut_off,
         )  # fmt: skip

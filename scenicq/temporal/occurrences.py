@@ -21,13 +21,13 @@ from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next
 from scenicq.temporal.folding import folded
 from scenicq.temporal.truth import TRUE, Truth, negated
 
-__all__ = ["Clause", "Kind", "Part", "bounds", "clauses_of", "joined", "next_at", "present_value"]
+__all__ = ["Clause", "FormulaPart", "PartKind", "bounds", "clauses_of", "joined", "next_at", "present_value"]
 
 _MOST_CLAUSES = 16
 Places = NDArray[np.int64]
 
 
-class Kind(Enum):
+class PartKind(Enum):
     """What a part says of its formula."""
 
     NOW = auto()
@@ -40,7 +40,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class FormulaPart:
     """A formula without operators of time, and where it must hold.
 
     Attributes:
@@ -51,13 +51,13 @@ class Part:
         before: See there.
     """
 
-    kind: Kind
+    kind: PartKind
     formula: Formula
     positive: bool = True
     before: Formula | None = None
 
 
-Clause = tuple[Part, ...]
+Clause = tuple[FormulaPart, ...]
 """Parts that hold together."""
 
 
@@ -85,7 +85,7 @@ def _clauses(asked: tuple[Formula, bool], parts: list[list[Clause] | None]) -> l
     """The clauses of a formula, given those of its parts."""
     formula, positive = asked
     if _is_plain(formula):
-        return [(Part(Kind.NOW, formula, positive),)]
+        return [(FormulaPart(PartKind.NOW, formula, positive),)]
     match formula:
         case Not():
             return parts[0]
@@ -101,17 +101,17 @@ def _clauses(asked: tuple[Formula, bool], parts: list[list[Clause] | None]) -> l
             if not _is_plain(formula.operand):
                 return None
             kinds = {
-                Always: (Kind.ALWAYS, Kind.EVENTUALLY), Eventually: (Kind.EVENTUALLY, Kind.ALWAYS),
-                Next: (Kind.NEXT, Kind.IF_NEXT),
+                Always: (PartKind.ALWAYS, PartKind.EVENTUALLY), Eventually: (PartKind.EVENTUALLY, PartKind.ALWAYS),
+                Next: (PartKind.NEXT, PartKind.IF_NEXT),
             }  # fmt: skip
-            return [(Part(kinds[type(formula)][not positive], formula.operand, positive),)]
+            return [(FormulaPart(kinds[type(formula)][not positive], formula.operand, positive),)]
         case Until():
             if not (_is_plain(formula.left) and _is_plain(formula.right)):
                 return None
-            kind = Kind.UNTIL if positive else Kind.NOT_UNTIL
-            return [(Part(kind, formula.right, positive=True, before=formula.left),)]
+            kind = PartKind.UNTIL if positive else PartKind.NOT_UNTIL
+            return [(FormulaPart(kind, formula.right, positive=True, before=formula.left),)]
         case Atom():
-            return [(Part(Kind.NOW, formula, positive),)]
+            return [(FormulaPart(PartKind.NOW, formula, positive),)]
         case _:
             assert_never(formula)
 
@@ -162,7 +162,7 @@ def next_at(holds: NDArray[np.bool_]) -> Places:
     return np.minimum.accumulate(places[::-1])[::-1]
 
 
-def bounds(part: Part, atom: Callable[[Atom], Truth], at_least: int, starts: Places) -> tuple[Places, Places]:
+def bounds(part: FormulaPart, atom: Callable[[Atom], Truth], at_least: int, starts: Places) -> tuple[Places, Places]:
     """Between which last places of a run a part holds, both included; none if the first is behind the second.
 
     Places of several stretches may follow each other: what is found behind the end of a stretch is behind every last
@@ -179,28 +179,28 @@ def bounds(part: Part, atom: Callable[[Atom], Truth], at_least: int, starts: Pla
         value = present_value(formula, atom)
         return (value if positive else negated(value)) >= least
 
-    if part.kind in (Kind.UNTIL, Kind.NOT_UNTIL):
+    if part.kind in (PartKind.UNTIL, PartKind.NOT_UNTIL):
         assert part.before is not None
         # a negation holds at least as surely as what it negates fails
-        least = at_least if part.kind is Kind.UNTIL else int(TRUE) + 1 - at_least
+        least = at_least if part.kind is PartKind.UNTIL else int(TRUE) + 1 - at_least
         right = holds(part.formula, positive=True, least=least)
         n, first = len(right), next_at(right)[starts]
         met = next_at(~holds(part.before, positive=True, least=least))[starts] >= first
         first = np.where(met, first, n)
         none = np.full(len(starts), n)
-        return (first, none) if part.kind is Kind.UNTIL else (starts, first - 1)
+        return (first, none) if part.kind is PartKind.UNTIL else (starts, first - 1)
     held = holds(part.formula, positive=part.positive)
     n = len(held)
     always, never = np.full(len(starts), n), np.full(len(starts), n + 1)
     match part.kind:
-        case Kind.NOW:
+        case PartKind.NOW:
             return np.where(held[starts], starts, never), always
-        case Kind.ALWAYS:
+        case PartKind.ALWAYS:
             return starts, next_at(~held)[starts] - 1
-        case Kind.EVENTUALLY:
+        case PartKind.EVENTUALLY:
             return next_at(held)[starts], always
-        case Kind.NEXT | Kind.IF_NEXT:
+        case PartKind.NEXT | PartKind.IF_NEXT:
             following = np.append(held, False)[starts + 1]
-            if part.kind is Kind.NEXT:
+            if part.kind is PartKind.NEXT:
                 return np.where(following, starts + 1, never), always
             return starts, np.where(following, always, starts)

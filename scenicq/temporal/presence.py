@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Node
 from scenicq.forest.walk import features
-from scenicq.temporal.samples import MOVING, Places
+from scenicq.temporal.samples import MOVING, BoundSamples
 
 __all__ = ["by_presence", "observes"]
 
 Chosen = NDArray[np.int64]
 
 
-def by_presence(places: Places, *conditions: Node, stretches: NDArray[np.int64] | None = None) -> Iterator[Chosen]:
+def by_presence(
+    places: BoundSamples, *conditions: Node, stretches: NDArray[np.int64] | None = None
+) -> Iterator[Chosen]:
     """Numbers of places, those together at which the same features of conditions are observed.
 
     Features that change from sample to sample do not count.
@@ -36,7 +38,9 @@ def by_presence(places: Places, *conditions: Node, stretches: NDArray[np.int64] 
     yield from (chosen for _, chosen in _together(seen, len(places)))
 
 
-def observes(places: Places, relevant: Sequence[frozenset[str]]) -> Iterator[tuple[tuple[frozenset[str], ...], Chosen]]:
+def observes(
+    places: BoundSamples, relevant: Sequence[frozenset[str]]
+) -> Iterator[tuple[tuple[frozenset[str], ...], Chosen]]:
     """What is observed of each object of a scenario, with the places at which it is just that.
 
     Args:
@@ -50,7 +54,7 @@ def observes(places: Places, relevant: Sequence[frozenset[str]]) -> Iterator[tup
         yield tuple(frozenset(name for mine, name in found if mine == index) for index in range(len(relevant))), chosen
 
 
-def _present(places: Places, index: int, name: str) -> NDArray[np.bool_]:
+def _present(places: BoundSamples, index: int, name: str) -> NDArray[np.bool_]:
     found = places.observed(index, name)
     if found is None:
         return np.zeros(len(places), np.bool_)

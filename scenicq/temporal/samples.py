@@ -13,7 +13,7 @@ from scenicq.forest.nodes import Value
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
-__all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "Observed", "Places", "Samples"]
+__all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples"]
 
 MOVING = frozenset({"position", "heading", "velocity", "speed", "angularSpeed", "acceleration"})
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
@@ -51,7 +51,7 @@ class Observed(Protocol):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Places:
+class BoundSamples:
     """Samples of any recordings of a block, under any bindings.
 
     Attributes:
@@ -79,11 +79,11 @@ class Places:
 
         return _observed(name, lambda column: self.block.numbers(column)[mine], said)
 
-    def at(self, chosen: NDArray[Any]) -> Places:
+    def at(self, chosen: NDArray[Any]) -> BoundSamples:
         """Some of the places, by their numbers or a truth value for each."""
         members = {index: mine[chosen] for index, mine in self.members.items()}
         size = int(chosen.sum()) if chosen.dtype == np.bool_ else len(chosen)
-        return Places(self.block, members, size)
+        return BoundSamples(self.block, members, size)
 
 
 @dataclass(eq=False, slots=True)

@@ -19,7 +19,7 @@ from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import features, leaves
 from scenicq.match.decide.closed_form import ClosedForm
-from scenicq.match.decide.compiled_expressions import Column, Columns, Get, UnclearError
+from scenicq.match.decide.compiled_expressions import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint
 from scenicq.match.problem.map_lookups import MapLookups
@@ -28,10 +28,10 @@ from scenicq.match.search.plan_cache import PlanCache
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.presence import by_presence, observes
-from scenicq.temporal.samples import WITH_COLUMNS, Places
+from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Cast", "StartSearch", "Starts", "classes_of_twins"]
+__all__ = ["RoleCandidates", "StartSearch", "Starts", "classes_of_twins"]
 
 Members = NDArray[np.int64]
 _MOST_TUPLES = 64
@@ -41,7 +41,7 @@ _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 
 @dataclass(frozen=True, slots=True)
-class Cast:
+class RoleCandidates:
     """Who may play whom in the labels of a block.
 
     Attributes:
@@ -61,13 +61,13 @@ class Starts:
 
     Attributes:
         members: Starts: by object of the scenario who plays it.
-        left: The cast of the labels that the matcher must decide.
+        left: The labels that the matcher must decide.
         sure: Of these labels, whether the plain requirements on what is observed are known to hold.
         failed: What the labels that are excluded failed at.
     """
 
     members: Mapping[int, Members]
-    left: Cast
+    left: RoleCandidates
     sure: NDArray[np.bool_]
     failed: Counter[str]
 
@@ -132,34 +132,34 @@ class StartSearch:
         self._arrays = self._arrays and not compared - options.ignore_params
         self._relevant = relevant_properties(scenario, options)
 
-    def decide(self, block: TrackBlock, cast: Cast) -> Starts:
+    def decide(self, block: TrackBlock, candidates: RoleCandidates) -> Starts:
         """Find the labels that are starts.
 
         Args:
             block: The recordings.
-            cast: The labels, each with an ego, and who may play whom.
+            candidates: The labels, each with an ego, and who may play whom.
         """
         scenario = self.matcher.scenario
-        label_of = block.label_of[cast.members]
-        place = np.searchsorted(cast.labels, label_of)
-        n = len(cast.labels)
+        label_of = block.label_of[candidates.members]
+        place = np.searchsorted(candidates.labels, label_of)
+        n = len(candidates.labels)
         failed: Counter[str] = Counter()
         out, sure = np.zeros(n, np.bool_), np.ones(n, np.bool_)
-        may = dict(cast.may)
+        may = dict(candidates.may)
         for role, requirements in self.plain.items():
             chosen = np.empty(0, np.int64)
             if role == scenario.ego:
-                members, where = {role: block.ego(cast.labels)}, np.arange(n)
+                members, where = {role: block.ego(candidates.labels)}, np.arange(n)
             else:
                 chosen = np.flatnonzero(may[role] & ~out[place])
                 where = place[chosen]
-                members = {scenario.ego: block.ego(label_of[chosen]), role: cast.members[chosen]}
-            holds, first_broken = self._plain(Places(block, members, len(where)), requirements)
+                members = {scenario.ego: block.ego(label_of[chosen]), role: candidates.members[chosen]}
+            holds, first_broken = self._plain(BoundSamples(block, members, len(where)), requirements)
             kept = np.zeros(n, np.bool_)
             kept[where[holds > FALSE]] = True
             sure[where[holds == UNKNOWN]] = False
             if role != scenario.ego:
-                narrowed = np.zeros(len(cast.members), np.bool_)
+                narrowed = np.zeros(len(candidates.members), np.bool_)
                 narrowed[chosen[holds > FALSE]] = True
                 may[role] = narrowed
             # what a label is excluded by is what its first candidate fails at
@@ -172,38 +172,41 @@ class StartSearch:
                     condition = Condition(requirement, requirement.condition)
                     failed[describe_constraint(scenario, condition)] += len(mine)
                     out[mine] = True
-        cast = Cast(cast.labels, cast.members, may)
-        starts, decided = self._correspondences(block, cast, np.flatnonzero(sure & ~out))
+        candidates = RoleCandidates(candidates.labels, candidates.members, may)
+        starts, decided = self._correspondences(block, candidates, np.flatnonzero(sure & ~out))
         left = ~out
         left[decided] = False
-        return Starts(starts, _narrowed(cast, left, place), sure[left], failed)
+        return Starts(starts, _narrowed(candidates, left, place), sure[left], failed)
 
-    def _plain(self, places: Places, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
+    def _plain(self, places: BoundSamples, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
         """Whether all requirements hold at each place, and the number of the first that does not, -1 if none."""
         holds = np.full(len(places), TRUE)
         broken = np.full(len(places), -1)
         for number, requirement in enumerate(requirements):
-            truth = np.full(len(places), UNKNOWN)
-            for chosen in by_presence(places, requirement.condition):
-                columns = AtomColumns(self.matcher.scenario, places.at(chosen))
+            # what one requirement excludes is not asked about the next
+            left = np.flatnonzero(holds > FALSE)
+            asked = places if len(left) == len(places) else places.at(left)
+            truth = np.full(len(left), UNKNOWN)
+            for chosen in by_presence(asked, requirement.condition):
+                columns = AtomColumns(self.matcher.scenario, asked.at(chosen))
                 expanded = columns.expanded(requirement.condition)
                 # what is random where the label does not tell is the matcher's
                 if not leaves(expanded):
                     truth[chosen] = columns.truth_of(expanded)
-            broken[(truth == FALSE) & (broken < 0)] = number
-            holds = np.minimum(holds, truth)
+            broken[left[truth == FALSE]] = number
+            holds[left] = np.minimum(holds[left], truth)
         return holds, broken
 
     # --- what is left, in closed form
 
     def _correspondences(
-        self, block: TrackBlock, cast: Cast, labels: NDArray[np.int64]
+        self, block: TrackBlock, candidates: RoleCandidates, labels: NDArray[np.int64]
     ) -> tuple[dict[int, Members], NDArray[np.int64]]:
-        """The starts that some labels make, and the labels that are decided; labels by their place in the cast."""
-        none = {thing.index: np.empty(0, np.int64) for thing in self.matcher.scenario.objects}
+        """The starts that some labels make, and the labels that are decided; labels by their place among them."""
+        none = {owner.index: np.empty(0, np.int64) for owner in self.matcher.scenario.objects}
         if not self._arrays or not len(labels) or self._odd(block):
             return none, np.empty(0, np.int64)
-        where, members = self._tuples(block, cast, labels)
+        where, members = self._tuples(block, candidates, labels)
         holds, fails, members = self._in_closed_form(block, members, len(where))
         unclear = np.unique(where[~holds & ~fails])
         clear = np.flatnonzero(holds & ~np.isin(where, unclear))
@@ -220,35 +223,35 @@ class StartSearch:
         return any(name in WITH_COLUMNS for answer in block.said()[1] for name in answer)
 
     def _tuples(
-        self, block: TrackBlock, cast: Cast, labels: NDArray[np.int64]
+        self, block: TrackBlock, candidates: RoleCandidates, labels: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], dict[int, Members]]:
         """Every choice of label objects of some labels that are not too many."""
         scenario, options = self.matcher.scenario, self.matcher.options
-        of_label = np.searchsorted(cast.labels, block.label_of[cast.members])
-        wanted = np.zeros(len(cast.labels), np.bool_)
+        of_label = np.searchsorted(candidates.labels, block.label_of[candidates.members])
+        wanted = np.zeros(len(candidates.labels), np.bool_)
         wanted[labels] = True
         x, y = block.numbers("x"), block.numbers("y")
-        egos = block.ego(cast.labels)
+        egos = block.ego(candidates.labels)
         roles: dict[int, NDArray[np.int64]] = {}
-        count = np.ones(len(cast.labels))
-        for index, may in cast.may.items():
+        count = np.ones(len(candidates.labels))
+        for index, may in candidates.may.items():
             chosen = np.flatnonzero(may & wanted[of_label])
             if options.radius is not None:
-                mine, ego = cast.members[chosen], egos[of_label[chosen]]
+                mine, ego = candidates.members[chosen], egos[of_label[chosen]]
                 near = (x[mine] - x[ego]) ** 2 + (y[mine] - y[ego]) ** 2 <= options.radius * options.radius
                 chosen = chosen[near]
             roles[index] = chosen
-            count *= np.bincount(of_label[chosen], minlength=len(cast.labels))
+            count *= np.bincount(of_label[chosen], minlength=len(candidates.labels))
         where = labels[(count[labels] <= _MOST_TUPLES) & (count[labels] > 0)]
         members: dict[int, Members] = {}
         for index, chosen in roles.items():
             # each choice so far with each label object of its label
-            sizes = np.bincount(of_label[chosen], minlength=len(cast.labels))
+            sizes = np.bincount(of_label[chosen], minlength=len(candidates.labels))
             firsts = np.cumsum(sizes) - sizes
             repeats = sizes[where]
             ends = np.cumsum(repeats)
             inside = np.arange(int(repeats.sum())) - np.repeat(ends - repeats, repeats)
-            picked = cast.members[chosen[np.repeat(firsts[where], repeats) + inside]]
+            picked = candidates.members[chosen[np.repeat(firsts[where], repeats) + inside]]
             members = {other: np.repeat(mine, repeats) for other, mine in members.items()}
             where = np.repeat(where, repeats)
             distinct = np.ones(len(where), np.bool_)
@@ -266,7 +269,7 @@ class StartSearch:
         Interchangeable objects are given back in the order of their tracks.
         """
         holds, fails = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
-        places, ordered = Places(block, members, size), {index: mine.copy() for index, mine in members.items()}
+        places, ordered = BoundSamples(block, members, size), {index: mine.copy() for index, mine in members.items()}
         for signature, chosen in observes(places, self._relevant):
             plan = self.rest.plans.plan((*signature, frozenset()))
             forms = [group.closed_form for group in plan.groups if group.closed_form is not None]
@@ -277,7 +280,9 @@ class StartSearch:
                 holds[some], fails[some] = self._decided(places.at(some), forms)
         return holds, fails, ordered
 
-    def _decided(self, places: Places, forms: Iterable[ClosedForm]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def _decided(
+        self, places: BoundSamples, forms: Iterable[ClosedForm]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         size = len(places)
         holds, fails = np.ones(size, np.bool_), np.zeros(size, np.bool_)
         columns = Columns(size, lambda index, name: _column(places, index, name))
@@ -306,13 +311,15 @@ def _in_order(block: TrackBlock, plan: MatchPlan, members: dict[int, Members], c
     return True
 
 
-def _narrowed(cast: Cast, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> Cast:
-    """The cast of some of its labels; `place` is the label of each of its members."""
+def _narrowed(candidates: RoleCandidates, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> RoleCandidates:
+    """The candidates of some of its labels; `place` is the label of each of its members."""
     mine = kept[place]
-    return Cast(cast.labels[kept], cast.members[mine], {index: may[mine] for index, may in cast.may.items()})
+    return RoleCandidates(
+        candidates.labels[kept], candidates.members[mine], {index: may[mine] for index, may in candidates.may.items()}
+    )
 
 
-def _column(places: Places, index: int, name: str) -> Column | tuple[Column, Column]:
+def _column(places: BoundSamples, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
     """The values of a property as closed forms read them."""
     if name != "position" and name not in _SCALARS:
         raise UnclearError
@@ -322,7 +329,7 @@ def _column(places: Places, index: int, name: str) -> Column | tuple[Column, Col
     return (found[0], found[1]) if len(found) == 2 else found[0]
 
 
-def _getter(places: Places, number: int) -> Get:
+def _getter(places: BoundSamples, number: int) -> Get:
     """The observed values of one choice of label objects."""
 
     def get(index: int, name: str) -> Value:

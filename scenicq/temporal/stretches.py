@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.store.track_block import TrackBlock
-from scenicq.temporal.samples import Places
+from scenicq.temporal.samples import BoundSamples
 
 __all__ = ["StartTable", "Stretches", "stretches_of"]
 
@@ -63,7 +63,7 @@ class Stretches:
         numbers: The number of each start in its table.
     """
 
-    places: Places
+    places: BoundSamples
     bounds: Members
     labels: Members
     seconds: NDArray[np.float64]
@@ -138,7 +138,7 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[St
         starts = bounds[mine] + labels[low:high] - labels[heads[first + mine]]
         recordings = np.array([run[0] for run in block.runs], dtype=np.int64)[block.recording_of[at]]
         seconds = (block.times_us[at] - block.times_us[recordings]) / 1e6
-        yield Stretches(Places(block, members, len(at)), bounds, at, seconds, starts, np.arange(low, high))
+        yield Stretches(BoundSamples(block, members, len(at)), bounds, at, seconds, starts, np.arange(low, high))
         first = last
 
 

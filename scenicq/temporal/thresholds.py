@@ -22,7 +22,7 @@ from scenicq.forest.walk import leaves
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.folding import folded
 from scenicq.temporal.hidden import UnclearVariable, affine_sides, inside, support
-from scenicq.temporal.occurrences import Clause, Kind, Part, bounds
+from scenicq.temporal.occurrences import Clause, FormulaPart, PartKind, bounds
 from scenicq.temporal.run_columns import RunColumns, Runs, ends_of
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -181,27 +181,27 @@ class _Reader:
             found = found.both(self._part(part, level, starts, ends))
         return found
 
-    def _part(self, part: Part, level: int, starts: Places, ends: Places) -> _Sets:
+    def _part(self, part: FormulaPart, level: int, starts: Places, ends: Places) -> _Sets:
         formulas = [part.formula, *([] if part.before is None else [part.before])]
         if not leaves(*(self.expanded[atom.number] for each in formulas for atom in _atoms(each))):
             low, high = bounds(part, self.truth, level, starts)
             return _Sets.where((low <= ends) & (ends <= high))
         sets = self._formula(part.formula, level, positive=part.positive)
         match part.kind:
-            case Kind.NOW:
+            case PartKind.NOW:
                 return sets.at(starts)
-            case Kind.ALWAYS:
+            case PartKind.ALWAYS:
                 low, high = _between(np.maximum, sets.low, starts, ends), _between(np.minimum, sets.high, starts, ends)
                 return _Sets(low, high, sets.side)
-            case Kind.EVENTUALLY:
+            case PartKind.EVENTUALLY:
                 if sets.side is _Side.BETWEEN:
                     raise _NoInterval
                 low, high = _between(np.minimum, sets.low, starts, ends), _between(np.maximum, sets.high, starts, ends)
                 return _Sets(low, high, sets.side)
-            case Kind.NEXT | Kind.IF_NEXT:
+            case PartKind.NEXT | PartKind.IF_NEXT:
                 last = starts == ends
                 following = sets.at(np.where(last, starts, starts + 1))
-                beyond = _Sets.where(np.full(len(starts), part.kind is Kind.IF_NEXT))
+                beyond = _Sets.where(np.full(len(starts), part.kind is PartKind.IF_NEXT))
                 return _Sets(
                     np.where(last, beyond.low, following.low), np.where(last, beyond.high, following.high), sets.side
                 )

@@ -1,4 +1,5 @@
-"""A model evaluated over a fleet: every label object detected, somewhat off, but for some that are missed.
+"""A model evaluated over a fleet: every label object detected, somewhat off, but for some that are missed; and false
+boxes, so that 100,000 frames have more than 3 million predictions.
 
 `python tests/bench/evaluation.py [--frames N] [--stores DIR]`. The store is that of `scale.py`. Prints the seconds of
 the whole command `scenicq evaluate`, its processor seconds and its memory, and whether they keep to the bars.
@@ -29,7 +30,11 @@ DETECTED = """
         SELECT frame, class, x + 0.3 * sin(hash(id) % 1000) AS x, y + 0.3 * cos(hash(frame) % 1000) AS y,
             heading + 0.02 AS heading, coalesce(width, 1.0) AS width, coalesce(length, 1.0) AS length,
             (hash(frame || id) % 997) / 1000.0 + 0.001 AS score
-        FROM read_parquet(?) WHERE hash(id || frame) % 10 > 0 AND heading IS NOT NULL
+        FROM read_parquet($objects) WHERE hash(id || frame) % 10 > 0 AND heading IS NOT NULL
+        UNION ALL
+        SELECT frame, class, x + 7.0, y - 5.0, heading, coalesce(width, 1.0), coalesce(length, 1.0),
+            (hash(id || frame) % 499) / 1000.0 + 0.001
+        FROM read_parquet($objects) WHERE hash(frame || id) % 8 = 0 AND heading IS NOT NULL
     ) TO '{}' (FORMAT parquet)
 """
 
@@ -47,7 +52,7 @@ def main() -> None:
             write_store(Fleet(given.frames, 0, needle=True), store, CORES)
         predictions, results = (Path(temporary) / name for name in ("detected.parquet", "found.jsonl"))
         with duckdb.connect() as connection:
-            connection.execute(DETECTED.format(predictions), [str(store / "objects" / "*.parquet")])
+            connection.execute(DETECTED.format(predictions), {"objects": str(store / "objects" / "*.parquet")})
             counted = connection.execute("SELECT count(*) FROM read_parquet(?)", [str(predictions)]).fetchone()
         run([COMMAND, "match", str(SCENARIO), str(store), *SETTING, "-o", str(results), "-q"])
         used = run(

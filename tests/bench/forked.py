@@ -11,7 +11,7 @@ import pickle
 from collections.abc import Callable
 
 from scenicq.smt import portable
-from scenicq.smt.answer import Answer, Unknown
+from scenicq.smt.answer import Answer, NoAnswer
 from scenicq.smt.formula import Problem
 
 __all__ = ["alone", "by_portable"]
@@ -30,7 +30,7 @@ def alone(check: Callable[..., Answer], problem: Problem, precision: float, time
     with os.fdopen(reading, "rb") as pipe:
         told = pipe.read()
     os.waitpid(child, 0)
-    return pickle.loads(told) if told else Unknown("crash")
+    return pickle.loads(told) if told else NoAnswer("crash")
 
 
 def by_portable(problem: Problem, *, precision: float, timeout_s: float) -> Answer:

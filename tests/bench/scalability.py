@@ -38,7 +38,7 @@ from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
 from scenicq.match.verdict import Match  # noqa: E402
-from scenicq.smt.answer import Answer, SolverSession, Unknown  # noqa: E402
+from scenicq.smt.answer import Answer, NoAnswer, SolverSession  # noqa: E402
 from scenicq.smt.formula import Problem  # noqa: E402
 from scenicq.smt.pool import WorkerSolver  # noqa: E402
 from scenicq.smt.solver import open_solver  # noqa: E402
@@ -104,7 +104,7 @@ class Patient:
         if cpu_s() > self.deadline:
             raise OutOfTime
         answer = (self.apart or self._session).check(problem, precision=precision, timeout_s=timeout_s)
-        if answer == Unknown("timeout"):
+        if answer == NoAnswer("timeout"):
             raise OutOfTime
         return answer
 

@@ -9,7 +9,7 @@ import pytest
 from scenicq.errors import DataError
 from scenicq.store.dataset import open_dataset
 from scenicq_cli.report import moment
-from scenicq_cli.table import Table, Text, fitted
+from scenicq_cli.table import Table, TextStream, fitted
 
 UUIDS = ("7fab2350-7eaf-3b7e-a39d-6937a4c1bede", "7fab9911-0510-35b0-a2fa-b4cea13a6d76")
 
@@ -57,7 +57,7 @@ def test_a_date_that_all_share_stands_in_the_head():
 def test_in_a_pipe_nothing_is_cut(monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
     sink = io.BytesIO()
-    table = Table(Text(sink), lambda: str.upper)
+    table = Table(TextStream(sink), lambda: str.upper)
     record = {
         "frame": "f" * 100, "recording": "r" * 100, "timestamp_us": 0, "verdict": "match",
         "correspondence": {"ego": "ego"}, "sensors": {},
@@ -78,7 +78,7 @@ def test_on_a_terminal_it_fits_and_names_frames_as_other_commands_take_them(cros
     monkeypatch.setenv("COLUMNS", "70")
     dataset = open_dataset(crossroads)
     sink = Terminal()
-    table = Table(Text(sink), dataset.short_frames)
+    table = Table(TextStream(sink), dataset.short_frames)
     labels = list(itertools.islice(dataset.labels(), 120))
     for label in labels:
         table.write({

@@ -22,7 +22,7 @@ from original import Original, environment
 from published_scenes import maps_of
 from run_conformance import SCENIC, read_map
 
-from scenicq.compiler.element_lookups import LOOKUPS, Table
+from scenicq.compiler.element_lookups import LOOKUPS, LookupTable
 from scenicq.compiler.elements import of_element
 from scenicq.errors import Source, Span
 from scenicq.geometry.angles import difference
@@ -61,7 +61,7 @@ class Tally:
 def compare_points(network: Network, answers: list[dict[str, Any]], tally: Tally) -> None:
     """Directions and look-ups at points."""
     directions = network.roadDirection.values_many(np.array([(each["x"], each["y"]) for each in answers]))
-    tables = {name: Table(name, *_layers(network, name)) for name in LOOKED_UP}
+    tables = {name: LookupTable(name, *_layers(network, name)) for name in LOOKED_UP}
     for each, allowed in zip(answers, directions, strict=True):
         place = f"({each['x']:.3f}, {each['y']:.3f})"
         own = each["direction"]

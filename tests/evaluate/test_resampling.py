@@ -9,7 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenicq.evaluate.resampling import Counts, effective_number, holm, rate_interval, rates, resamples, sign_flip_test
+from scenicq.evaluate.resampling import (
+    StratumCounts,
+    effective_number,
+    holm,
+    rate_interval,
+    rates,
+    resamples,
+    sign_flip_test,
+)
 
 sys.path.insert(0, str(Path(__file__).parent))
 from worlds import planted, world
@@ -38,7 +46,7 @@ def test_planted_truth_in_short() -> None:
 
 def test_others_are_spread_as_the_group_is() -> None:
     """Far objects are missed more often; a group that is far is compared with others that are."""
-    counts = Counts(
+    counts = StratumCounts(
         np.array([[1.0, 8.0]]), np.array([[10.0, 10.0]]), np.array([[10.0, 8.0]]), np.array([[100.0, 10.0]])
     )
     mine, others = rates(counts, np.ones((1, 1)))
@@ -47,7 +55,9 @@ def test_others_are_spread_as_the_group_is() -> None:
 
 
 def test_strata_without_others_do_not_count() -> None:
-    counts = Counts(np.array([[5.0, 1.0]]), np.array([[5.0, 4.0]]), np.array([[0.0, 1.0]]), np.array([[0.0, 4.0]]))
+    counts = StratumCounts(
+        np.array([[5.0, 1.0]]), np.array([[5.0, 4.0]]), np.array([[0.0, 1.0]]), np.array([[0.0, 4.0]])
+    )
     assert rates(counts, np.ones((1, 1)))[1][0] == pytest.approx(0.25)
     assert counts.comparable.tolist() == [False, True]
 

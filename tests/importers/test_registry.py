@@ -14,7 +14,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.importers import registry
-from scenicq.importers.base import Options, Source
+from scenicq.importers.base import OpenedSource, Options
 from scenicq.importers.report import Report
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
@@ -34,7 +34,7 @@ class Greedy:
     def recognises(self, path: Path) -> bool:
         return True
 
-    def read(self, path: Path, options: Options, report: Report) -> Source:
+    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
         raise NotImplementedError
 
 

@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 
-from scenicq.smt.answer import Unknown, Unsat
+from scenicq.smt.answer import NoAnswer, Unsat
 
 
 def hang(problem, *, precision, timeout_s):
@@ -27,7 +27,7 @@ def garble(problem, *, precision, timeout_s):
 
 def eat(problem, *, precision, timeout_s):
     """Ask for more memory than there is."""
-    return Unknown(str(len(bytearray(2**50))))
+    return NoAnswer(str(len(bytearray(2**50))))
 
 
 def die(problem, *, precision, timeout_s):

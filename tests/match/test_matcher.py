@@ -22,8 +22,7 @@ from scenicq.match.search.arc_consistency import thinned
 from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
-from scenicq.smt.answer import Sat, Unsat
-from scenicq.smt.answer import Unknown as NoAnswer
+from scenicq.smt.answer import NoAnswer, Sat, Unsat
 from scenicq.smt.pool import WorkerSolver
 from scenicq.store.labels import Label, LabelObject
 

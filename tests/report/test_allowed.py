@@ -79,7 +79,7 @@ def test_the_drawn_area_holds_every_object(world, name):
         other = next(role for role in shot.roles if role.name == "other")
         for role in shot.roles:
             for path in drawn.with_class("place", role.colour):
-                assert drawn.area(path).distance(shapely.Point(role.thing.x, role.thing.y)) < PIXEL_M, role.name
+                assert drawn.area(path).distance(shapely.Point(role.member.x, role.member.y)) < PIXEL_M, role.name
         assert drawn.with_class("place", other.colour)
 
 
@@ -92,7 +92,7 @@ def test_the_drawn_wedges_hold_the_heading(world, name):
         for role in shot.roles:
             found = drawn.with_class("facing", role.colour)
             if found:
-                thing = role.thing
+                thing = role.member
                 tip = shapely.Point(thing.x - math.sin(thing.heading), thing.y + math.cos(thing.heading))
                 lines = (shapely.union_all([*map(shapely.LineString, drawn.pieces(path))]) for path in found)
                 reach = shapely.union_all([*map(drawn.area, found), *lines])
@@ -136,7 +136,7 @@ def test_hidden_points_of_a_witness_are_crosses(world):
     crosses = 0
     for label in labels:
         shot, drawn = _drawn(world, matcher, label)
-        own = [(role.thing.x, role.thing.y) for role in shot.roles]
+        own = [(role.member.x, role.member.y) for role in shot.roles]
         hidden = [
             value
             for value in shot.verdict.witness.values()

@@ -83,14 +83,14 @@ def test_allowed_places_and_headings_hold_what_matches(shoot, pattern, scenario)
         drawn = Drawn(draw(shot, backdrop))
         for role in shot.roles:
             for path in drawn.with_class("place", role.colour):
-                here = shapely.Point(role.thing.x, role.thing.y)
+                here = shapely.Point(role.member.x, role.member.y)
                 assert drawn.area(path).distance(here) < PIXEL_M, drawn.title(path)
                 places += 1
             allowed = allowed_headings(shot.scenario, role.index, observed_by(shot.roles))
             if allowed is not None:
-                turns = [(role.thing.heading - low) % math.tau <= high - low + 0.01 for low, high in allowed]
+                turns = [(role.member.heading - low) % math.tau <= high - low + 0.01 for low, high in allowed]
                 assert any(turns) or any(
-                    abs(math.remainder(role.thing.heading - low, math.tau)) < 0.01 for low, _ in allowed
+                    abs(math.remainder(role.member.heading - low, math.tau)) < 0.01 for low, _ in allowed
                 )
                 headings += 1
     assert places >= len(shots)
@@ -114,7 +114,7 @@ def test_what_excludes_a_frame_is_red_and_told(shoot):
     drawn = Drawn(draw(shot, backdrop))
     (place,) = drawn.with_class("place", "blamed")
     assert drawn.title(place) == "where oncoming may be"
-    oncoming = next(role.thing for role in shot.roles if role.name == "oncoming")
+    oncoming = next(role.member for role in shot.roles if role.name == "oncoming")
     assert drawn.area(place).distance(shapely.Point(oncoming.x, oncoming.y)) > 1
     (box,) = drawn.with_class("box", "blamed")
     assert "oncoming" in drawn.title(box)
@@ -239,7 +239,7 @@ def test_distances_of_requirements_are_drawn(crossroads, tmp_path):
     scenario, network = query.compile(label.map)
     shot = Shot(label, scenario, found.verdict)
     ways = measured_distances(scenario, observed_by(shot.roles), LARGE)
-    other = shot.roles[1].thing
+    other = shot.roles[1].member
     assert len(ways) == 2, "each distance once"
     assert ways[0] == ((label.ego.x, label.ego.y), (other.x, other.y))
     intersection = shapely.union_all(outline(network.region("intersection"), LARGE))
@@ -278,6 +278,6 @@ def test_small_roles_have_a_ring(shoot):
     pedestrian = shot.roles[1]
     assert "c1" in ring.get("class").split()
     x, y = Plane((math.floor(shot.label.ego.x), math.floor(shot.label.ego.y))).at(
-        pedestrian.thing.x, pedestrian.thing.y
+        pedestrian.member.x, pedestrian.member.y
     )
     assert (ring.get("cx"), ring.get("cy")) == (str(x), str(y))

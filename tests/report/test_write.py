@@ -22,7 +22,7 @@ from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.report import write
 from scenicq.report.cards import best_frame
 from scenicq.report.picture import Shot
-from scenicq.report.runs import Run, find_runs, frame_numbers
+from scenicq.report.runs import FrameRun, find_runs, frame_numbers
 from scenicq.report.shares import program_lines
 from scenicq.report.sheet import TILES, timelines_section, to_picture
 from scenicq.report.write import check_target, write_report
@@ -153,7 +153,7 @@ def test_more_frames_than_fit_have_pictures_beside(query, tmp_path, monkeypatch)
 
 def test_small_pictures_are_of_every_recording_first():
     def run(recording, first):
-        return Run(recording, (Result(f"{recording}/{first}", recording, 0, Match({}, {})),), first, 99)
+        return FrameRun(recording, (Result(f"{recording}/{first}", recording, 0, Match({}, {})),), first, 99)
 
     runs = [run("a", number) for number in range(1, 2 * TILES, 2)] + [run("b", 1), run("c", 1)]
     found = to_picture(runs)
@@ -171,7 +171,7 @@ def test_the_best_frame_has_its_roles_nearest(query):
 
     def farthest(shot):
         ego = shot.label.ego
-        return max(math.dist((role.thing.x, role.thing.y), (ego.x, ego.y)) for role in shot.roles)
+        return max(math.dist((role.member.x, role.member.y), (ego.x, ego.y)) for role in shot.roles)
 
     best = best_frame(run, shots)
     assert farthest(shots[best]) < min(map(farthest, shots)) + 0.1
@@ -182,7 +182,7 @@ def test_the_best_frame_has_its_roles_nearest(query):
 def test_a_recording_has_one_timeline():
     def run(recording, first, count, verdict):
         results = tuple(Result(f"{recording}/{n}", recording, n, verdict) for n in range(count))
-        return Run(recording, results, first, 40)
+        return FrameRun(recording, results, first, 40)
 
     no = NoMatch(Cause("tolerance", ""), {})
     runs = [run("<b>", 3, 5, Match({}, {})), run("a", 1, 1, Match({}, {})), run("<b>", 20, 1, no)]

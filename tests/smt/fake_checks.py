@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import Problem
 
 VERSION = "7.0"
@@ -31,9 +31,9 @@ def behave(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
                 pass
         case "polite":
             time.sleep(timeout_s)
-            return Unknown("timeout")
+            return NoAnswer("timeout")
         case "eat":
-            return Unknown(str(len(bytearray(2**40))))
+            return NoAnswer(str(len(bytearray(2**40))))
         case "print":
             print("sat\n" * 10_000)
             os.write(1, b'{"sat": {"x": 1}}\n')

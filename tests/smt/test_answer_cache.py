@@ -2,7 +2,7 @@
 
 import pytest
 
-from scenicq.smt.answer import Sat, Unknown, Unsat
+from scenicq.smt.answer import NoAnswer, Sat, Unsat
 from scenicq.smt.answer_cache import RememberingSolver
 from scenicq.smt.formula import Problem, Var, Variable, compare
 from scenicq.smt.solver import open_solver
@@ -41,8 +41,8 @@ def test_another_precision_is_another_question():
 
 
 def test_what_was_unknown_is_tried_again():
-    solver = RememberingSolver(Teller(Unknown("crash"), Unsat()))
-    assert [ask(solver, question(2.0)) for _ in range(3)] == [Unknown("crash"), Unsat(), Unsat()]
+    solver = RememberingSolver(Teller(NoAnswer("crash"), Unsat()))
+    assert [ask(solver, question(2.0)) for _ in range(3)] == [NoAnswer("crash"), Unsat(), Unsat()]
 
 
 def test_the_oldest_answers_go(monkeypatch):

@@ -6,9 +6,10 @@ import time
 
 import pytest
 
-from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.case_split import cases, check_by_cases
 from scenicq.smt.formula import (
+    Disjunction,
     Formula,
     Problem,
     Var,
@@ -18,7 +19,6 @@ from scenicq.smt.formula import (
     disjunction,
     postorder,
 )
-from scenicq.smt.formula import Or as Disjunction
 from scenicq.smt.portable import check
 
 X, Y = Var("x"), Var("y")
@@ -54,7 +54,7 @@ class Lost:
             (len(node.args) for node in postorder(problem.constraint) if isinstance(node, Disjunction)), default=0
         )
         if widest > self.most:
-            return Unknown(self.reason)
+            return NoAnswer(self.reason)
         return check(problem, precision=precision, timeout_s=timeout_s)
 
 
@@ -78,17 +78,17 @@ def test_the_second_look_decides(reason: str, heights: tuple[float, ...], expect
 
 def test_one_case_that_stays_open_leaves_the_whole_open() -> None:
     solver = Lost(0)
-    assert check_by_cases(solver, problem(55.0, 66.0), precision=1e-3, timeout_s=5.0) == Unknown("timeout")
+    assert check_by_cases(solver, problem(55.0, 66.0), precision=1e-3, timeout_s=5.0) == NoAnswer("timeout")
     assert len(solver.asked) == 11
 
 
 def test_other_reasons_are_not_looked_at_again() -> None:
     solver = Lost(5, "crash")
-    assert check_by_cases(solver, problem(55.0), precision=1e-3, timeout_s=5.0) == Unknown("crash")
+    assert check_by_cases(solver, problem(55.0), precision=1e-3, timeout_s=5.0) == NoAnswer("crash")
     assert len(solver.asked) == 1
 
 
 def test_the_second_look_takes_no_longer_than_the_first() -> None:
     solver = Lost(0, nap_s=0.1)
-    assert check_by_cases(solver, problem(55.0), precision=1e-3, timeout_s=0.25) == Unknown("timeout")
+    assert check_by_cases(solver, problem(55.0), precision=1e-3, timeout_s=0.25) == NoAnswer("timeout")
     assert len(solver.asked) <= 5

@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from scenicq.errors import SolverError
-from scenicq.smt.answer import Answer, Sat, SolverSession, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, SolverSession, Unsat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import (
     FALSE,
@@ -329,7 +329,7 @@ def test_answers(solver: SolverSession, example: Example) -> None:
             assert holds(example.problem, witness, PRECISION)
         case Unsat():
             assert "unsat" in example.answers.split()
-        case Unknown(reason):
+        case NoAnswer(reason):
             assert "unknown" in example.answers.split(), reason
 
 
@@ -337,7 +337,7 @@ def test_timeouts_end_the_search(solver: SolverSession) -> None:
     answer = solver.check(KANGAROO, precision=1e-9, timeout_s=1.0)
     if "z3" not in solver.name:
         # z3 may give up at once
-        assert answer == Unknown("timeout")
+        assert answer == NoAnswer("timeout")
     assert isinstance(solver.check(Problem((), TRUE), precision=1e-3, timeout_s=10.0), Sat)
 
 
@@ -365,5 +365,5 @@ def test_a_killed_process_costs_one_problem(solver: SolverSession) -> None:
     assert not work.is_alive()
     if "z3" not in solver.name:
         # z3 may have given up before
-        assert answers == [Unknown("crash")]
+        assert answers == [NoAnswer("crash")]
     assert isinstance(solver.check(Problem((), TRUE), precision=1e-3, timeout_s=10.0), Sat)

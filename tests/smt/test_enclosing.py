@@ -24,7 +24,7 @@ from scenicq.geometry.regions import (
     UnionOf,
 )
 from scenicq.smt.answer import Sat, Unsat
-from scenicq.smt.distance_terms import Frame
+from scenicq.smt.distance_terms import BoxTerms
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.evaluation import evaluate
 from scenicq.smt.formula import Num, Problem, Var, Variable, negation
@@ -47,8 +47,8 @@ REGIONS: dict[str, Region] = {
 PLANE = ((-math.inf, math.inf), (-math.inf, math.inf))
 
 
-def frame(x: float, y: float, heading: float, width: float, length: float) -> Frame:
-    return Frame.of((Num(x), Num(y)), Num(heading), Num(width), Num(length))
+def frame(x: float, y: float, heading: float, width: float, length: float) -> BoxTerms:
+    return BoxTerms.of((Num(x), Num(y)), Num(heading), Num(width), Num(length))
 
 
 def decided(x: float, y: float, heading: float, width: float, length: float, region: Region) -> bool:
@@ -83,7 +83,7 @@ def test_a_solver_finds_the_place_in_a_bend_and_that_there_is_none() -> None:
         ((4.0, 4.0), (6.0, 12.0), Unsat),
         ((8.0, 8.0), (0.0, 12.0), Unsat),
     ):
-        box = Frame.of((x, y), Num(math.pi / 4), Num(sizes[0]), Num(sizes[1]))
+        box = BoxTerms.of((x, y), Num(math.pi / 4), Num(sizes[0]), Num(sizes[1]))
         problem = Problem((Variable("x", *ranges), Variable("y", 0.0, 12.0)), box_holds(box, region, PLANE))
         answer = check(problem, precision=1e-4, timeout_s=20.0)
         assert isinstance(answer, expected), (sizes, answer)

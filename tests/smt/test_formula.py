@@ -14,16 +14,16 @@ from scenicq.smt.evaluation import evaluate, evaluate_term, holds
 from scenicq.smt.formula import (
     FALSE,
     TRUE,
-    And,
-    Atom,
+    Conjunction,
+    Disjunction,
     Formula,
     Num,
     Op,
     Operator,
-    Or,
     Problem,
     Relation,
     Term,
+    TermComparison,
     Var,
     Variable,
     apply,
@@ -127,7 +127,7 @@ def test_ground_atoms_fold_unless_rounding_decides() -> None:
     assert compare(">", 1.0, 2.0) is FALSE
     assert compare("==", 1.0, 1.0) is TRUE
     near = compare("==", 0.1 + 0.2, 0.3)
-    assert isinstance(near, Atom)
+    assert isinstance(near, TermComparison)
     assert evaluate(near, {}, slack=1e-9)
     assert not evaluate(near, {})
 
@@ -142,16 +142,16 @@ def test_connectives_fold() -> None:
     assert disjunction([atom, FALSE, atom]) is atom
     other = compare("<", Y, 0.0)
     merged = conjunction([conjunction([atom, other]), atom])
-    assert isinstance(merged, And)
+    assert isinstance(merged, Conjunction)
     assert merged.args == (atom, other)
 
 
 def test_comparisons_turn_round() -> None:
     atom = compare(">=", X, 1.0)
-    assert isinstance(atom, Atom)
+    assert isinstance(atom, TermComparison)
     assert (atom.relation, atom.left, atom.right) == (Relation.LE, Num(1.0), X)
     unequal = negation(compare("==", X, 1.0))
-    assert isinstance(unequal, Or)
+    assert isinstance(unequal, Disjunction)
     assert evaluate(unequal, {"x": 1.5})
     assert not evaluate(unequal, {"x": 1.0})
 

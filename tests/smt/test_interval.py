@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scenicq.smt.affine import EMPTY, ENTAILED, affine_atoms, contract_affine
 from scenicq.smt.backward import BACKWARD, root
 from scenicq.smt.evaluation import evaluate
-from scenicq.smt.formula import Atom, Num, Op, Operator, Term, Var, apply, compare
+from scenicq.smt.formula import Num, Op, Operator, Term, TermComparison, Var, apply, compare
 from scenicq.smt.hc4 import Tape
 from scenicq.smt.interval import FORWARD, EmptyError, Interval, power
 from scenicq.smt.operators import operate
@@ -111,7 +111,7 @@ def test_affine_atoms_lose_nothing(
     term = apply(Operator.SUB, apply(Operator.MUL, a, apply(Operator.ADD, X, b)), apply(Operator.MUL, Y, b))
     bound = a * (point[0] + b) - b * point[1] + (0.0 if touch else shift)
     atom = compare(relation, term, bound)
-    if not isinstance(atom, Atom):
+    if not isinstance(atom, TermComparison):
         return
     found = affine_atoms(atom, INDEX, {})
     assert found is not None
@@ -133,9 +133,9 @@ def test_affine_contraction_is_tight() -> None:
     assert contract_affine(atom, [3.0, 1.0], [4.0, 2.0]) == EMPTY
 
 
-def _atom(relation: str, left: Term, right: float) -> Atom:
+def _atom(relation: str, left: Term, right: float) -> TermComparison:
     atom = compare(relation, left, right)
-    assert isinstance(atom, Atom)
+    assert isinstance(atom, TermComparison)
     return atom
 
 
@@ -161,12 +161,12 @@ def test_tape_narrows_and_excludes() -> None:
     assert tape.contract(low, high)
     assert (low, high) == ([pytest.approx(-math.sqrt(3.0)), 1.0], pytest.approx([math.sqrt(3.0), 2.0]))
     assert not tape.contract([3.0, 0.0], [4.0, 0.0])
-    assert not Tape([_atom("<", X, 0.0), Atom(compare("<", Num(1.0), Y).relation, Num(0.0), X)], INDEX).contract(
-        [-1.0, 0.0], [1.0, 0.0]
-    )
+    assert not Tape(
+        [_atom("<", X, 0.0), TermComparison(compare("<", Num(1.0), Y).relation, Num(0.0), X)], INDEX
+    ).contract([-1.0, 0.0], [1.0, 0.0])
 
 
 def test_tape_of_undefined_constants() -> None:
-    assert not Tape([Atom(_atom("<=", X, 0.0).relation, Op(Operator.SQRT, (Num(-1.0),)), X)], INDEX).contract(
+    assert not Tape([TermComparison(_atom("<=", X, 0.0).relation, Op(Operator.SQRT, (Num(-1.0),)), X)], INDEX).contract(
         [0.0, 0.0], [1.0, 0.0]
     )

@@ -16,7 +16,7 @@ import pytest
 
 from scenicq.budget import limited, waiting
 from scenicq.errors import SolverError
-from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import TRUE, Problem, Variable
 from scenicq.smt.pool import WorkerSolver, _Worker
 from scenicq.smt.worker import read_answer, write_answer
@@ -43,19 +43,19 @@ def _check(solver: WorkerSolver, name: str, timeout_s: float = 20.0) -> Answer:
     ("name", "reason"), [("crash", "crash"), ("exit", "crash"), ("raise", "crash"), ("odd", "garbage")]
 )
 def test_failures_are_answers(solver: WorkerSolver, name: str, reason: str) -> None:
-    assert _check(solver, name) == Unknown(reason)
+    assert _check(solver, name) == NoAnswer(reason)
     assert _check(solver, "fine") == Unsat()
 
 
 @pytest.mark.parametrize("name", ["hang", "spin"])
 def test_hanging_workers_are_killed_and_replaced(solver: WorkerSolver, name: str) -> None:
-    assert _check(solver, name, timeout_s=0.2) == Unknown("timeout")
+    assert _check(solver, name, timeout_s=0.2) == NoAnswer("timeout")
     assert _check(solver, "fine") == Unsat()
 
 
 def test_polite_timeouts_keep_the_worker(solver: WorkerSolver) -> None:
     before = _pid(solver)
-    assert _check(solver, "polite", timeout_s=0.1) == Unknown("timeout")
+    assert _check(solver, "polite", timeout_s=0.1) == NoAnswer("timeout")
     assert _pid(solver) == before
 
 
@@ -67,14 +67,14 @@ def test_output_of_a_library_goes_nowhere(solver: WorkerSolver, capfd: pytest.Ca
 def test_garbage(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(HERE)
     with WorkerSolver("fake_checks:garble") as solver:
-        assert _check(solver, "x") == Unknown("garbage")
-        assert _check(solver, "x") == Unknown("garbage")
+        assert _check(solver, "x") == NoAnswer("garbage")
+        assert _check(solver, "x") == NoAnswer("garbage")
 
 
 @pytest.mark.parametrize("name", ["lie", "forget"])
 def test_witnesses_are_replayed(solver: WorkerSolver, name: str) -> None:
     problem = Problem((Variable(name, 0.0, 1.0),), TRUE)
-    assert solver.check(problem, precision=1e-3, timeout_s=5.0) == Unknown("precision")
+    assert solver.check(problem, precision=1e-3, timeout_s=5.0) == NoAnswer("precision")
 
 
 def _pid(solver: WorkerSolver) -> int:
@@ -93,14 +93,14 @@ def test_a_worker_killed_between_problems_is_replaced(solver: WorkerSolver) -> N
 def test_a_worker_killed_at_work_costs_one_problem(solver: WorkerSolver) -> None:
     pid = _pid(solver)
     threading.Timer(0.3, os.kill, (pid, signal.SIGKILL)).start()
-    assert _check(solver, "hang") == Unknown("crash")
+    assert _check(solver, "hang") == NoAnswer("crash")
     assert _check(solver, "fine") == Unsat()
 
 
 def test_answers_come_in_order(solver: WorkerSolver) -> None:
     names = ["fine", "crash", "slow", "hang", "fine", "raise", "slow"]
     answers = solver.check_many([_asked(name) for name in names], precision=1e-3, timeout_s=2.0)
-    reasons = [answer.reason if isinstance(answer, Unknown) else "" for answer in answers]
+    reasons = [answer.reason if isinstance(answer, NoAnswer) else "" for answer in answers]
     assert reasons == ["", "crash", "", "timeout", "", "crash", ""]
 
 
@@ -121,7 +121,7 @@ def test_memory_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(HERE)
     with WorkerSolver("fake_checks:behave", memory_mb=600) as solver:
         assert _check(solver, "fine") == Unsat()
-        assert _check(solver, "eat") == Unknown("memory")
+        assert _check(solver, "eat") == NoAnswer("memory")
         assert _check(solver, "fine") == Unsat()
 
 
@@ -195,14 +195,14 @@ def test_a_worker_loads_little() -> None:
     assert done.stdout.split() == []
 
 
-@pytest.mark.parametrize("answer", [Sat({"x": 0.1}), Sat({}), Unsat(), Unknown("budget")])
+@pytest.mark.parametrize("answer", [Sat({"x": 0.1}), Sat({}), Unsat(), NoAnswer("budget")])
 def test_answers_cross_the_pipe(answer: Answer) -> None:
     assert read_answer(json.dumps(write_answer(answer)).encode()) == answer
 
 
 @pytest.mark.parametrize("line", [b"", b"[]", b"7", b'{"sat": 3}', b'{"sat": {"x": "1"}}', b'{"unknown": 3}', b"\xff"])
 def test_garbage_is_recognised(line: bytes) -> None:
-    assert read_answer(line) == Unknown("garbage")
+    assert read_answer(line) == NoAnswer("garbage")
 
 
 def test_a_worker_killed_at_its_start_is_started_anew(solver: WorkerSolver, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,11 +220,11 @@ def test_a_worker_killed_at_its_start_is_started_anew(solver: WorkerSolver, monk
     monkeypatch.setattr(_Worker, "_spawn", unlucky)
     assert _check(solver, "fine") == Unsat()
     assert len(spawned) == 2
-    assert _check(solver, "exit") == Unknown("crash")
+    assert _check(solver, "exit") == NoAnswer("crash")
     assert _check(solver, "fine") == Unsat()
-    assert _check(solver, "exit") == Unknown("crash")
+    assert _check(solver, "exit") == NoAnswer("crash")
     # it has loaded before: what keeps it from starting is no fault of the solver's installation
-    assert _check(solver, "fine") == Unknown("crash")
+    assert _check(solver, "fine") == NoAnswer("crash")
     assert _check(solver, "fine") == Unsat()
 
 
@@ -242,6 +242,6 @@ def test_only_the_work_of_a_worker_counts(solver: WorkerSolver) -> None:
             # it slept for 0.3 s
             assert left_s > 4.8
         with waiting(5.0):
-            assert _check(solver, "spin", timeout_s=0.3) == Unknown("timeout")
+            assert _check(solver, "spin", timeout_s=0.3) == NoAnswer("timeout")
         with waiting(5.0) as left_s:
             assert left_s < 4.75

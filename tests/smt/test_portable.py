@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from scenicq.smt.answer import Sat, Unknown, Unsat
+from scenicq.smt.answer import NoAnswer, Sat, Unsat
 from scenicq.smt.evaluation import evaluate, evaluate_term, holds
 from scenicq.smt.formula import (
     Formula,
@@ -121,7 +121,7 @@ def test_choices_nested_too_deep_are_said_so() -> None:
         formula = conjunction([disjunction([formula, compare("<=", Y, -float(level))]), compare("<=", Y, float(level))])
     problem = Problem((Variable("x", -1, 1), Variable("y", -1, 1)), formula)
     answer = check(problem, precision=1e-3, timeout_s=5.0)
-    assert isinstance(answer, Unknown)
+    assert isinstance(answer, NoAnswer)
     assert answer.reason.startswith("unsupported")
 
 
@@ -133,7 +133,7 @@ def test_the_budget_is_said_so() -> None:
     ]
     problem = Problem((Variable("x", 0, 9), Variable("y", 0, 9)), conjunction(parts))
     answer = check(problem, precision=0.0, timeout_s=1.0)
-    assert answer in (Unsat(), Unknown("timeout"), Unknown("budget"))
+    assert answer in (Unsat(), NoAnswer("timeout"), NoAnswer("budget"))
 
 
 def test_many_choices_are_quick() -> None:

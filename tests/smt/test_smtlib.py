@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenicq.errors import SolverError
-from scenicq.smt.answer import Answer, Sat, Unknown, Unsat
+from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.command import SmtlibSolver
 from scenicq.smt.evaluation import evaluate
 from scenicq.smt.formula import (
@@ -97,17 +97,17 @@ def test_shared_and_deep_parts_are_defined_once() -> None:
         ("delta-sat with delta = 0.001\n(model\n  (define-fun x () Real [0.5, 1.5])\n)", Sat({"x": 1.0})),
         ("delta-sat\nx : [ -inf, 7 ]\n", Sat({"x": 7.0})),
         ("sat\n(\n)\n", Sat({"x": 0.0})),
-        ("success\nunknown\n", Unknown("budget")),
-        ("timeout\n", Unknown("timeout")),
-        ('(error "unknown constant sin")\nsat\n((x 0.0))', Unknown("unsupported: unknown constant sin")),
+        ("success\nunknown\n", NoAnswer("budget")),
+        ("timeout\n", NoAnswer("timeout")),
+        ('(error "unknown constant sin")\nsat\n((x 0.0))', NoAnswer("unsupported: unknown constant sin")),
         (
             "sat\n((define-fun x () Real (root-obj (+ (^ x 2) (- 2)) 2)))",
-            Unknown("unsupported: a value in the model is no number"),
+            NoAnswer("unsupported: a value in the model is no number"),
         ),
-        ("", Unknown("garbage")),
-        ("Segmentation fault\n", Unknown("garbage")),
-        ("saturday\n", Unknown("garbage")),
-        ("\x00\ufffd)))((", Unknown("garbage")),
+        ("", NoAnswer("garbage")),
+        ("Segmentation fault\n", NoAnswer("garbage")),
+        ("saturday\n", NoAnswer("garbage")),
+        ("\x00\ufffd)))((", NoAnswer("garbage")),
         ("sat\n" + "(" * 5000, Sat({"x": 0.0})),
     ],
 )
@@ -117,7 +117,7 @@ def test_replies(reply: str, answer: Answer) -> None:
 
 @given(st.text())
 def test_any_reply_is_an_answer(text: str) -> None:
-    assert isinstance(read_reply("sat\n" + text, ONE), (Sat, Unknown))
+    assert isinstance(read_reply("sat\n" + text, ONE), (Sat, NoAnswer))
 
 
 def _stub(tmp_path: Path, body: str) -> str:
@@ -129,14 +129,14 @@ def _stub(tmp_path: Path, body: str) -> str:
 STUBS = {
     "import sys; sys.stdin.read(); print('sat'); print('((x 0.5))')": Sat({"x": 0.5}),
     "print('unsat')": Unsat(),
-    "print('sat'); print('((x 7.0))')": Unknown("precision"),
-    "import os; os._exit(3)": Unknown("crash"),
-    "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)": Unknown("crash"),
-    "print('hello')": Unknown("garbage"),
-    "while True: print('sat' * 1000)": Unknown("garbage"),
-    "import time; time.sleep(600)": Unknown("timeout"),
-    "import os, time; os.close(1); time.sleep(600)": Unknown("timeout"),
-    "import subprocess, time; subprocess.Popen(['sleep', '600']); time.sleep(600)": Unknown("timeout"),
+    "print('sat'); print('((x 7.0))')": NoAnswer("precision"),
+    "import os; os._exit(3)": NoAnswer("crash"),
+    "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)": NoAnswer("crash"),
+    "print('hello')": NoAnswer("garbage"),
+    "while True: print('sat' * 1000)": NoAnswer("garbage"),
+    "import time; time.sleep(600)": NoAnswer("timeout"),
+    "import os, time; os.close(1); time.sleep(600)": NoAnswer("timeout"),
+    "import subprocess, time; subprocess.Popen(['sleep', '600']); time.sleep(600)": NoAnswer("timeout"),
 }
 
 
@@ -144,7 +144,7 @@ STUBS = {
 def test_commands(tmp_path: Path, body: str, answer: Answer) -> None:
     problem = Problem((Variable("x", 0.0, 1.0),), TRUE)
     with SmtlibSolver(_stub(tmp_path, body)) as solver:
-        assert solver.check(problem, precision=1e-3, timeout_s=1.0 if answer == Unknown("timeout") else 20.0) == answer
+        assert solver.check(problem, precision=1e-3, timeout_s=1.0 if answer == NoAnswer("timeout") else 20.0) == answer
 
 
 def test_commands_run_side_by_side(tmp_path: Path) -> None:
@@ -209,6 +209,6 @@ def _is_close(formula: Formula, point: dict[str, float]) -> bool:
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit exists on Linux")
 def test_commands_have_a_memory_limit(tmp_path: Path) -> None:
     body = "import time; time.sleep(0.2); x = bytearray(900 * 2**20); print('unsat')"
-    for memory_mb, answer in ((400, Unknown("crash")), (4000, Unsat())):
+    for memory_mb, answer in ((400, NoAnswer("crash")), (4000, Unsat())):
         with SmtlibSolver(_stub(tmp_path, body), memory_mb=memory_mb) as solver:
             assert solver.check(ONE, precision=1e-3, timeout_s=20.0) == answer

@@ -10,7 +10,7 @@ from scenicq.syntax.parser import parse
 from scenicq.syntax.walk import walk
 
 
-def module(text: str, version: int | None = None) -> ast.Module:
+def module(text: str, version: int | None = None) -> ast.Program:
     return parse(Source("test.scenic", text), version)
 
 
@@ -39,7 +39,7 @@ def shape(value: object) -> str:
     match value:
         case ast.Name():
             return value.id
-        case ast.Constant():
+        case ast.LiteralValue():
             return repr(value.value)
         case ast.BinaryOp():
             return f"({value.operator} {shape(value.left)} {shape(value.right)})"
@@ -47,7 +47,7 @@ def shape(value: object) -> str:
             return f"({value.operator} {shape(value.operand)})"
         case ast.BoolOp():
             return f"({value.operator} {' '.join(shape(item) for item in value.values)})"
-        case ast.Compare():
+        case ast.ComparisonChain():
             rest = " ".join(f"{item.operator} {shape(item.right)}" for item in value.comparisons)
             return f"({shape(value.left)} {rest})"
         case ast.Attribute():
@@ -59,7 +59,7 @@ def shape(value: object) -> str:
             return f"{shape(value.function)}({', '.join(shape(item) for item in value.arguments)})"
         case ast.ExpressionStatement():
             return shape(value.value)
-        case ast.Node():
+        case ast.SyntaxNode():
             names = [name for name in value.__dataclass_fields__ if name != "span" and not name.endswith("_span")]
             fields = [getattr(value, name) for name in names]
             shown = ", ".join(shape(field) for field in fields if field not in (None, (), ""))
@@ -70,6 +70,6 @@ def shape(value: object) -> str:
             return str(value)
 
 
-def spans(text: str, kind: type[ast.Node], version: int | None = None) -> list[str]:
+def spans(text: str, kind: type[ast.SyntaxNode], version: int | None = None) -> list[str]:
     """The texts of all nodes of a kind, in the order of the walk."""
     return [node.span.text for node in walk(*module(text, version).body) if isinstance(node, kind)]

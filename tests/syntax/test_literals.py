@@ -18,7 +18,7 @@ NUMBERS = ["0", "00", "12", "1_000", "0x_fF", "0o17", "0b101", "1.", ".5", "1.5e
 @pytest.mark.parametrize("text", NUMBERS)
 def test_number(text: str) -> None:
     node = expression(text)
-    assert isinstance(node, ast.Constant)
+    assert isinstance(node, ast.LiteralValue)
     expected = python_ast.literal_eval(text)
     assert (type(node.value), node.value) == (type(expected), expected)
 
@@ -34,7 +34,7 @@ STRINGS = [
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
 def test_string(text: str) -> None:
     node = expression(text)
-    assert isinstance(node, ast.Constant)
+    assert isinstance(node, ast.LiteralValue)
     assert node.value == python_ast.literal_eval(text)
     assert node.span.text == text
 
@@ -42,7 +42,7 @@ def test_string(text: str) -> None:
 @given(st.text() | st.binary())
 def test_any_string_that_python_writes(value: str | bytes) -> None:
     node = expression(repr(value))
-    assert isinstance(node, ast.Constant)
+    assert isinstance(node, ast.LiteralValue)
     assert node.value == value
 
 

@@ -13,13 +13,13 @@ SPECIFIERS = {
     "with behavior Follow(speed=3)": "With(behavior, Follow(speed=3))",
     "with at 3": "With(at, 3)",
     "at (1, 2)": "At(Tuple([1, 2]))",
-    "at (front of c) offset by (x @ y)": "At(OffsetBy(PartOf(front, c), Vector(x, y)))",
+    "at (front of c) offset by (x @ y)": "At(OffsetBy(PartOf(front, c), VectorOperator(x, y)))",
     "in road": "In(road)",
     "on visible curb": "On(Visible(curb, False))",
     "contained in road": "ContainedIn(road)",
-    "offset by -1 @ 2": "OffsetBy(Vector((- 1), 2))",
+    "offset by -1 @ 2": "OffsetBy(VectorOperator((- 1), 2))",
     "offset along 30 deg by (1, 2)": "OffsetAlong(Deg(30), Tuple([1, 2]))",
-    "beyond c by 1 @ 2": "Beyond(c, Vector(1, 2))",
+    "beyond c by 1 @ 2": "Beyond(c, VectorOperator(1, 2))",
     "beyond c by 3 from ego": "Beyond(c, 3, ego)",
     "visible": "Visible()",
     "visible from x": "Visible(x)",
@@ -128,7 +128,9 @@ def test_the_span_of_an_instance_ends_before_a_trailing_comma() -> None:
 
 
 def test_an_instance_in_a_tuple_or_an_argument_leaves_the_comma() -> None:
-    assert shape(expression("Car at 1 @ 2, Car at 3 @ 4")).startswith("Tuple([New(Car, [At(Vector(1, 2))], False), New")
+    assert shape(expression("Car at 1 @ 2, Car at 3 @ 4")).startswith(
+        "Tuple([New(Car, [At(VectorOperator(1, 2))], False), New"
+    )
     assert shape(expression("f(new Car at x, y)")) == "f(New(Car, [At(x)], True), y)"
     assert shape(expression("f(new Car at x, behind=3)")) == "f(New(Car, [At(x)], True), behind=3)"
 

@@ -41,7 +41,7 @@ __all__ = ["decide"]
 
 _MOST_BRANCHES = 4096
 _MOST_CHOSEN = 100
-"""Discrete variables that are chosen one below the other."""
+"""Discrete variables and truth values that are chosen one below the other."""
 _MOST_PROGRAMS = 20_000
 """Linear programs for one decision: some seconds, after which a solver does no worse."""
 
@@ -49,7 +49,7 @@ _MOST_PROGRAMS = 20_000
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
     """Decide a group without a solver; `Undecided` with reason "nonlinear" where one is needed."""
     try:
-        return _Cascade(tolerance).decide(items, {})
+        return _Cascade(tolerance).decide(items, {}, 0)
     except _Exhausted:
         return Undecided(items[0][0], "nonlinear")
 
@@ -66,12 +66,13 @@ class _Cascade:
         self.branches = 0
         self.programs = 0
 
-    def decide(self, items: list[Item], given: dict[Identity, Value]) -> Outcome:
+    def decide(self, items: list[Item], given: dict[Identity, Value], depth: int) -> Outcome:
         """Decide constraints, given values of discrete variables.
 
         Args:
             items: The constraints.
-            given: Values chosen so far.
+            given: Values of discrete variables chosen so far.
+            depth: How many of these and of truth values there are.
         """
         look()
         open_items: list[Item] = []
@@ -82,12 +83,12 @@ class _Cascade:
                 return Refuted(item[0], ground_cause(item))
         if not open_items:
             return Satisfied(given)
-        if len(given) > _MOST_CHOSEN:
+        if depth > _MOST_CHOSEN:
             raise _Exhausted
         for leaf in deciding_first([node for _, node, _ in open_items]):
             options = _options(leaf)
             if options is not None:
-                return self._try_each(items, leaf, options, given)
+                return self._try_each(items, leaf, options, given, depth + 1)
         if len(open_items) == 1 and isinstance(open_items[0][0], Comparison):
             reached = self._invert(open_items[0])
             if reached.possible and all(leaf.identity in reached.values for leaf in leaves(open_items[0][1])):
@@ -96,7 +97,7 @@ class _Cascade:
                 return Refuted(open_items[0][0])
         truth = _free_truth(open_items)
         if truth is not None:
-            return self._try_both(items, truth, given)
+            return self._try_both(items, truth, given, depth + 1)
         return self._linear(open_items, given)
 
     def _branch(self, constraint: Constraint, outcomes: Iterator[Outcome]) -> Outcome:
@@ -117,21 +118,22 @@ class _Cascade:
         leaf: Leaf,
         options: range,
         given: dict[Identity, Value],
+        depth: int,
     ) -> Outcome:
         def outcomes() -> Iterator[Outcome]:
             for option in options:
                 chosen: dict[Identity, Value] = {leaf.identity: float(option)}
-                yield self.decide(conditioned(items, chosen), given | chosen)
+                yield self.decide(conditioned(items, chosen), given | chosen, depth)
 
         return self._branch(items[0][0], outcomes())
 
-    def _try_both(self, items: list[Item], truth: Node, given: dict[Identity, Value]) -> Outcome:
+    def _try_both(self, items: list[Item], truth: Node, given: dict[Identity, Value], depth: int) -> Outcome:
         """A truth value that makes up another value: one branch in which it holds, one in which it does not."""
 
         def outcomes() -> Iterator[Outcome]:
             for value in (True, False):
                 fixed = conditioned(items, memo={id(truth): Constant(value, span=truth.span)})
-                yield self.decide([*fixed, fact(truth if value else build.opposite(truth))], given)
+                yield self.decide([*fixed, fact(truth if value else build.opposite(truth))], given, depth)
 
         return self._branch(items[0][0], outcomes())
 

@@ -34,12 +34,13 @@ from scenicq.forest.walk import postorder
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.decide.compiled_expressions import (
-    Column,
     Columns,
     CompiledExpressions,
-    Exact,
+    CompiledVector,
+    FloatColumn,
     Form,
     Get,
+    Scalar,
     UnclearError,
     clipped,
     spread,
@@ -70,7 +71,7 @@ class Evaluated(NamedTuple):
 
     holds: bool | Sequence[bool]
     fails: bool | Sequence[bool]
-    values: Mapping[Identity, Value | Column | list[Value]]
+    values: Mapping[Identity, Value | FloatColumn | list[Value]]
 
 
 _UNCLEAR = Evaluated(False, False, {})
@@ -232,7 +233,7 @@ def _apart(middle: XY, half: XY, turn: XY, margin: Margin) -> bool:
 def _length(x: float, y: float) -> float:
     """The length of a vector; of columns, a column of the same numbers to the last bit."""
     if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
-        pairs = zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True)
+        pairs = zip(cast(FloatColumn, x).tolist(), cast(FloatColumn, y).tolist(), strict=True)
         return cast(float, np.array([math.hypot(*pair) for pair in pairs]))
     return math.hypot(x, y)
 
@@ -260,13 +261,13 @@ def _each(position: Value) -> list[XY]:
     """The positions that a pair of columns has; of one position, it alone."""
     x, y = cast(XY, position)
     if isinstance(x, np.ndarray):
-        return list(zip(cast(Column, x).tolist(), cast(Column, y).tolist(), strict=True))
+        return list(zip(cast(FloatColumn, x).tolist(), cast(FloatColumn, y).tolist(), strict=True))
     return [(x, y)]
 
 
 def _offset(item: Comparison) -> ClosedForm | None:
     formulas = CompiledExpressions({})
-    steps: list[tuple[bool, Exact]] = []
+    steps: list[tuple[CompiledVector | None, Scalar | None]] = []
     node = item.expression
     while not isinstance(node, VectorOf):
         match node:
@@ -275,10 +276,10 @@ def _offset(item: Comparison) -> ClosedForm | None:
                 known = next(((one, rest) for part, rest in sides if (one := formulas.exact(part))), None)
                 if known is None:
                     return None
-                steps.append((True, known[0]))
+                steps.append((cast(CompiledVector, known[0]), None))
                 node = known[1]
             case Rotate() if (angle := formulas.exact(node.angle)) is not None:
-                steps.append((False, angle))
+                steps.append((None, cast(Scalar, angle)))
                 node = node.vector
             case _:
                 return None
@@ -291,12 +292,12 @@ def _offset(item: Comparison) -> ClosedForm | None:
         px, py = cast(XY, get(index, "position"))
         margin, turn = options.tolerance.of(index, "position"), (1.0, 0.0)
         # into the frame of the offset
-        for shift, exact in steps:
-            if shift:
-                qx, qy = cast(XY, exact(get))
+        for shift, angle in steps:
+            if shift is not None:
+                qx, qy = shift(get)
                 px, py = px - qx, py - qy
-            else:
-                c, s = turned(cast(float, exact(get)))
+            elif angle is not None:
+                c, s = turned(angle(get))
                 px, py = px * c + py * s, py * c - px * s
                 turn = turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s
         a, b = x.known(get), y.known(get)
@@ -346,7 +347,7 @@ def _heading(item: Comparison) -> ClosedForm | None:
         for chosen, form, middle, half in choices:
             rest = seen - form.known(get) - middle
             if isinstance(rest, np.ndarray):
-                rests: list[float] = cast(Column, rest).tolist()
+                rests: list[float] = cast(FloatColumn, rest).tolist()
                 each = [_STRAIGHT] * len(rests) if allowed is None else allowed
                 offs = [_turn(*pair, half, margin.sure) for pair in zip(rests, each, strict=True)]
                 off = cast(float, np.array(offs))

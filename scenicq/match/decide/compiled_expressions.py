@@ -41,10 +41,10 @@ from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.match.linear.affine_reach import ends
 
 __all__ = [
-    "Column",
     "Columns",
     "CompiledExpressions",
     "Exact",
+    "FloatColumn",
     "Form",
     "Get",
     "UnclearError",
@@ -56,11 +56,11 @@ __all__ = [
 
 Get: TypeAlias = Callable[[int, str], Value]
 """The observed value of an object's property."""
-Column: TypeAlias = NDArray[np.float64]
+FloatColumn: TypeAlias = NDArray[np.float64]
 """A number of each of many labels; a vector is a pair of columns."""
 Exact: TypeAlias = Callable[[Get], "float | tuple[float, float]"]
 Scalar: TypeAlias = Callable[[Get], float]
-Vector: TypeAlias = Callable[[Get], "tuple[float, float]"]
+CompiledVector: TypeAlias = Callable[[Get], "tuple[float, float]"]
 
 _MOST_STEPS = 400
 """Operations that a formula may take: what is shared in an expression is worked out anew for each use of it."""
@@ -81,7 +81,7 @@ class Columns:
     that it computes in a way of its own are applied one by one.
     """
 
-    def __init__(self, size: int, column: Callable[[int, str], Column | tuple[Column, Column]]) -> None:
+    def __init__(self, size: int, column: Callable[[int, str], FloatColumn | tuple[FloatColumn, FloatColumn]]) -> None:
         """Take what makes the columns.
 
         Args:
@@ -109,7 +109,8 @@ def clipped(value: float, low: float, high: float) -> float:
     if isinstance(value, np.ndarray):
         raised = np.where(np.greater(low, value), low, value)
         return cast(float, np.where(np.less(high, raised), high, raised))
-    return min(max(value, low), high)
+    raised = low if low > value else value
+    return high if high < raised else raised
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -347,7 +348,7 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
             x, y = cast("list[Scalar]", args)
             return lambda get: (x(get), y(get))
         case VectorSum():
-            one, other = cast("list[Vector]", args)
+            one, other = cast("list[CompiledVector]", args)
 
             def added(get: Get) -> tuple[float, float]:
                 (a, b), (c, d) = one(get), other(get)
@@ -355,7 +356,7 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
 
             return added
         case Scale():
-            vector, by = cast(Vector, args[0]), cast(Scalar, args[1])
+            vector, by = cast(CompiledVector, args[0]), cast(Scalar, args[1])
 
             def scaled(get: Get) -> tuple[float, float]:
                 (a, b), factor = vector(get), by(get)
@@ -363,7 +364,7 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
 
             return scaled
         case Rotate():
-            whole, angle = cast(Vector, args[0]), cast(Scalar, args[1])
+            whole, angle = cast(CompiledVector, args[0]), cast(Scalar, args[1])
 
             def rotated(get: Get) -> tuple[float, float]:
                 (a, b), (c, s) = whole(get), turned(angle(get))
@@ -371,7 +372,7 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
 
             return rotated
         case Coordinate():
-            vector, axis = cast(Vector, args[0]), node.axis
+            vector, axis = cast(CompiledVector, args[0]), node.axis
             return lambda get: vector(get)[axis]
         case Norm() | Bearing():
             return cast(Exact, _computed(node, cast("list[Callable[[Get], Value]]", args)))

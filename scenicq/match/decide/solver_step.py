@@ -48,7 +48,7 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
         solver: The solver, if there is one.
     """
     from scenicq.match.fields.field_solver import repaired  # noqa: PLC0415 - these take long to load
-    from scenicq.smt.answer import Sat, Unknown, Unsat  # noqa: PLC0415
+    from scenicq.smt.answer import NoAnswer, Sat, Unsat  # noqa: PLC0415
     from scenicq.smt.case_split import check_by_cases  # noqa: PLC0415
     from scenicq.smt.encode import UnsupportedError  # noqa: PLC0415
 
@@ -70,7 +70,7 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
         match answer:
             case Unsat():
                 return Refuted(blame)
-            case Unknown():
+            case NoAnswer():
                 return Undecided(blame, answer.reason)
             case Sat():
                 values = encoding.values(answer.witness)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
-from scenicq.forest.bounds import Interval, scalar_bounds, vector_bounds
+from scenicq.forest.bounds import FloatInterval, scalar_bounds, vector_bounds
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -90,7 +90,7 @@ class BoxSet:
     _forms: dict[int, Multiples] = field(default_factory=dict[int, Multiples])
 
     @classmethod
-    def start(cls, network: ConstraintNetwork, ranges: Mapping[Identity, Sequence[Interval]]) -> BoxSet:
+    def start(cls, network: ConstraintNetwork, ranges: Mapping[Identity, Sequence[FloatInterval]]) -> BoxSet:
         """One case for each of the intervals that some numbers are kept in, in order; else a single one."""
         size = len(next(iter(ranges.values()))) if ranges else 1
         known: dict[Identity, Enclosure] = {}

@@ -15,7 +15,7 @@ from typing import cast
 
 import numpy as np
 
-from scenicq.forest.bounds import Interval
+from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import leaves, postorder
@@ -54,7 +54,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     first = parts[0][0][0]
     networks = [ConstraintNetwork(part, tolerance) for part in parts]
     chosen: list[list[BoxSet]] = []
-    limits: list[Interval] = []
+    limits: list[FloatInterval] = []
     try:
         for network in networks:
             known = {shared: limits} if limits and shared in network.leaves else {}
@@ -74,7 +74,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     choices = [id(node) for network in networks for node in network.choices]
     if isinstance(found, Undecided) and len(set(choices)) < len(choices):
         # fields that several parts ask for at one point have one direction there
-        return decide_directions([[item for part in parts for item in part]], None, tolerance)
+        return _whole([item for part in parts for item in part], tolerance)
     return found
 
 
@@ -179,13 +179,13 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
     return Satisfied({**given, **found.values}) if isinstance(found, Satisfied) else None
 
 
-def _joined(found: Sequence[BoxSet], shared: Identity) -> list[Interval]:
+def _joined(found: Sequence[BoxSet], shared: Identity) -> list[FloatInterval]:
     """Where the shared number can be, intervals that meet as one."""
     ends = np.concatenate([cases.ranges[shared] for cases in found], axis=1).T.tolist()
     return joined([(low, high) for low, high in ends])
 
 
-def _within(found: Sequence[BoxSet], shared: Identity, limits: Sequence[Interval]) -> list[BoxSet]:
+def _within(found: Sequence[BoxSet], shared: Identity, limits: Sequence[FloatInterval]) -> list[BoxSet]:
     """The cases in which the shared number can be within some limits."""
     kept: list[BoxSet] = []
     for cases in found:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from scenicq.forest.bounds import Interval
+from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.nodes import Identity, Value
 from scenicq.match.fields.cell_assignment import HeadingAssignment, extent, solved
 from scenicq.match.problem.evaluation import replay
@@ -85,9 +85,9 @@ def find_shared_value(
     return Undecided(first, "nonlinear")
 
 
-def joined(ends: Sequence[Interval]) -> list[Interval]:
+def joined(ends: Sequence[FloatInterval]) -> list[FloatInterval]:
     """Intervals in order, those that meet as one."""
-    found: list[Interval] = []
+    found: list[FloatInterval] = []
     for low, high in sorted(ends):
         if found and low <= found[-1][1]:
             found[-1] = (found[-1][0], max(found[-1][1], high))
@@ -96,9 +96,9 @@ def joined(ends: Sequence[Interval]) -> list[Interval]:
     return found
 
 
-def _common(parts: Sequence[Sequence[_Stretch]]) -> list[Interval]:
+def _common(parts: Sequence[Sequence[_Stretch]]) -> list[FloatInterval]:
     """Where every part has a stretch."""
-    common: list[Interval] | None = None
+    common: list[FloatInterval] | None = None
     for stretches in parts:
         own = joined([(stretch.low, stretch.high) for stretch in stretches])
         if common is not None:

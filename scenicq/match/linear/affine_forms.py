@@ -26,9 +26,9 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.angles import rotate
 
-__all__ = ["Affine", "AffineVector", "Variable", "affine_scalar", "affine_vector"]
+__all__ = ["Affine", "AffineVector", "VariableAxis", "affine_scalar", "affine_vector"]
 
-Variable: TypeAlias = tuple[Identity, int]
+VariableAxis: TypeAlias = tuple[Identity, int]
 """A scalar random variable (axis 0), or the x (0) or y (1) of a random point."""
 
 
@@ -37,7 +37,7 @@ class Affine:
     """A constant plus coefficients times variables; zero coefficients are left out."""
 
     constant: float
-    terms: dict[Variable, float]
+    terms: dict[VariableAxis, float]
 
     def plus(self, other: Affine, factor: float = 1.0) -> Affine:
         """The sum with a multiple of another form."""

@@ -21,13 +21,15 @@ import shapely
 from scenicq.forest.nodes import Constant, Identity, Leaf, Normal, PointIn, Range, TruncatedNormal, Value
 from scenicq.geometry.proximity import meets, witness_point
 from scenicq.geometry.regions import Region
-from scenicq.match.linear.affine_forms import Affine, AffineVector, Variable
+from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis
 from scenicq.match.tolerance import ROUNDING, Margin
 
 __all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position"]
 
 _MOST_CORNERS = 6
 """Random offsets of one position whose box is taken corner by corner."""
+_SIMILAR = 1e-12
+"""How far a matrix may be from a similarity, relative to its scale."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +163,7 @@ def reach_position(
 
 def _cut(
     form: AffineVector,
-    scalars: list[Variable],
+    scalars: list[VariableAxis],
     limits: list[tuple[float, float] | None],
     observed: tuple[float, float],
     margin: Margin,
@@ -180,7 +182,7 @@ def _cut(
     return [*limits[: free[0]], (max(low, -size), min(high, size)), *limits[free[0] + 1 :]]
 
 
-def _offset(form: AffineVector, variables: list[Variable], values: tuple[float, ...]) -> tuple[float, float]:
+def _offset(form: AffineVector, variables: list[VariableAxis], values: tuple[float, ...]) -> tuple[float, float]:
     given = dict(zip(variables, values, strict=True))
     x, y = (part.constant + sum(part.terms.get(v, 0.0) * value for v, value in given.items()) for part in form)
     return x, y
@@ -189,7 +191,7 @@ def _offset(form: AffineVector, variables: list[Variable], values: tuple[float, 
 def _from_region(
     form: AffineVector,
     leaf: PointIn,
-    scalars: list[Variable],
+    scalars: list[VariableAxis],
     corners: list[tuple[float, ...]],
     observed: tuple[float, float],
     margin: Margin,
@@ -198,17 +200,19 @@ def _from_region(
     if not isinstance(leaf.region, Constant):
         return _OPEN
     x, y = (leaf.identity, 0), (leaf.identity, 1)
-    matrix = np.array([[part.terms.get(v, 0.0) for v in (x, y)] for part in form])
-    size = math.sqrt(abs(float(np.linalg.det(matrix))))
-    if size == 0 or not np.allclose(matrix @ matrix.T, size * size * np.eye(2), rtol=1e-12, atol=1e-12):
+    (a, b), (c, d) = rows = [(part.terms.get(x, 0.0), part.terms.get(y, 0.0)) for part in form]
+    area = abs(a * d - b * c)
+    # the rows are orthogonal and of one length
+    residues = abs(a * a + b * b - area), abs(c * c + d * d - area), abs(a * c + b * d)
+    if area == 0 or max(residues) > _SIMILAR * (1 + area):
         return _OPEN
+    matrix, size = np.array(rows), math.sqrt(area)
     shape, radius = margin.around(observed)
     around = np.array(shapely.get_coordinates(shape))
     back = np.linalg.inv(matrix)
     offsets = np.array([_offset(form, scalars, corner) for corner in corners])
     places = ((around[:, None, :] - offsets[None, :, :]).reshape(-1, 2)) @ back.T
-    exact = len(places) == 1 and np.allclose(matrix, np.eye(2)) and not scalars
-    wanted = shapely.Point(places[0]) if exact else shapely.MultiPoint(places).convex_hull
+    wanted = shapely.Point(places[0]) if len(places) == 1 else shapely.MultiPoint(places).convex_hull
     region = cast(Region, leaf.region.value)
     answer = meets(region, wanted, radius / size)
     if not answer:
@@ -229,7 +233,7 @@ def _from_region(
 
 def _solve(
     form: AffineVector,
-    scalars: list[Variable],
+    scalars: list[VariableAxis],
     limits: list[tuple[float, float]],
     target: tuple[float, ...],
     point: tuple[Identity, tuple[float, float]] | None = None,
@@ -252,6 +256,6 @@ def _solve(
             if weight:
                 rest = wanted - columns @ values + column * values[i]
                 values[i] = min(max(float(column @ rest) / weight, low[i]), high[i])
-        if np.allclose(columns @ values, wanted, atol=1e-10):
+        if (abs(columns @ values - wanted) <= 1e-10 + 1e-5 * abs(wanted)).all():
             break
     return fixed | {identity: float(value) for (identity, _), value in zip(scalars, values, strict=True)}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any
 
-from scenicq.match.linear.affine_forms import Affine, Variable
+from scenicq.match.linear.affine_forms import Affine, VariableAxis
 
 __all__ = ["LinearSystem", "NotSolved", "Row"]
 
@@ -37,7 +37,7 @@ class LinearSystem:
 
     rows: list[Row] = field(default_factory=list[Row])
 
-    def solve(self, more: list[Row]) -> Mapping[Variable, float] | None:
+    def solve(self, more: list[Row]) -> Mapping[VariableAxis, float] | None:
         """Values of the variables that satisfy all rows and `more`, or None if there are none.
 
         Strict rows are satisfied with the largest margin there is; none at all means no solution. Exact up to the
@@ -55,7 +55,7 @@ class LinearSystem:
             return {}
         return _solve(rows, list(variables))
 
-    def extent(self, more: list[Row], variable: Variable) -> tuple[float, float] | None:
+    def extent(self, more: list[Row], variable: VariableAxis) -> tuple[float, float] | None:
         """The least and the greatest value of a variable where all rows and `more` hold, or None if nowhere.
 
         Strict rows may hold with equality.
@@ -88,8 +88,8 @@ _MARGIN = 1e-7
 
 
 def _solve(
-    rows: list[Row], variables: list[Variable], least: tuple[Variable, float] | None = None
-) -> Mapping[Variable, float] | None:
+    rows: list[Row], variables: list[VariableAxis], least: tuple[VariableAxis, float] | None = None
+) -> Mapping[VariableAxis, float] | None:
     """A solution, the one in which a variable times a factor is least if one is given."""
     highs: Any = import_module("highspy")  # 0.3 s, and most runs never get here
     column = {variable: number for number, variable in enumerate(variables)}
@@ -97,8 +97,11 @@ def _solve(
     margin = len(variables)
     count = margin + strict
     model = highs.HighsLp()
-    starts, indices = [0], list[int]()
-    values, lows, highs_ = list[float](), list[float](), list[float]()
+    starts: list[int] = [0]
+    indices: list[int] = []
+    values: list[float] = []
+    lows: list[float] = []
+    highs_: list[float] = []
     for row in rows:
         sides = [(row.low, row.high, 0.0)]
         if row.strict:

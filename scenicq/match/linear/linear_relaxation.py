@@ -35,7 +35,7 @@ from scenicq.forest.walk import conjuncts, leaves
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
-from scenicq.match.linear.affine_forms import Affine, AffineVector, Variable, affine_scalar, affine_vector
+from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.linear.linear_program import LinearSystem, NotSolved, Row
 from scenicq.match.problem.conditioned import Item
@@ -288,7 +288,7 @@ class _Problem:
             raise NotLinear from None
         return found
 
-    def extent(self, variable: Variable) -> tuple[float, float] | None:
+    def extent(self, variable: VariableAxis) -> tuple[float, float] | None:
         """The ends of a variable over all solutions, discs taken too large."""
         around = [*_polygons(self.discs, outer=True)]
         if math.prod(map(len, self.alternatives)) > _MOST_EXTENTS:
@@ -364,12 +364,14 @@ def _search(
     system: LinearSystem, alternatives: list[Alternative], rows: list[Row]
 ) -> Mapping[tuple[Identity, int], float] | None:
     """A solution under one choice of each alternative, depth first with early failure."""
-    if not alternatives:
-        return system.solve(rows)
-    if len(alternatives) > 1 and system.solve(rows) is None:
-        return None
-    for choice in alternatives[0]:
-        found = _search(system, alternatives[1:], [*rows, *choice])
-        if found is not None:
+    opened = [(0, rows)]
+    while opened:
+        chosen, rows = opened.pop()
+        left = len(alternatives) - chosen
+        # with one alternative left, each of its choices fails as soon as this would
+        found = None if left == 1 else system.solve(rows)
+        if left == 0 and found is not None:
             return found
+        if left == 1 or (left and found is not None):
+            opened += [(chosen + 1, [*rows, *choice]) for choice in reversed(alternatives[chosen])]
     return None

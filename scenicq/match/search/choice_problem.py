@@ -25,9 +25,9 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import leaves
 from scenicq.match.problem.conditioned import Item
-from scenicq.match.search.outcome_tables import ChoiceTree, Outcomes, Variable, above_choices, tree_of
+from scenicq.match.search.outcome_tables import ChoiceTree, ChoiceVariable, Outcomes, above_choices, tree_of
 
-__all__ = ["ChoiceProblem", "Component", "Domain", "Lookup", "Part", "conjuncts"]
+__all__ = ["ChoiceProblem", "Component", "ConstraintChoices", "Domain", "Lookup", "conjuncts"]
 
 
 def conjuncts(item: Item) -> list[Item]:
@@ -53,7 +53,7 @@ def conjuncts(item: Item) -> list[Item]:
     return found
 
 
-class Part:
+class ConstraintChoices:
     """A constraint with the choices in it.
 
     Attributes:
@@ -67,8 +67,8 @@ class Part:
     def __init__(self, item: Item) -> None:
         self.item = item
         self.trees: dict[int, ChoiceTree] = {}
-        self.inner: set[Variable] = set()
-        self.others: set[Variable] = set()
+        self.inner: set[ChoiceVariable] = set()
+        self.others: set[ChoiceVariable] = set()
         self.slots: frozenset[int] = frozenset()
         for node, _ in above_choices(item[1]):
             if isinstance(node, Select):
@@ -105,10 +105,10 @@ class Lookup:
 class Component:
     """Constraints that share random variables, and the slots on which they hang."""
 
-    parts: list[Part] = field(default_factory=list[Part])
+    parts: list[ConstraintChoices] = field(default_factory=list[ConstraintChoices])
     lookups: list[Lookup] = field(default_factory=list[Lookup])
     slots: set[int] = field(default_factory=set[int])
-    others: set[Variable] = field(default_factory=set["Variable"])
+    others: set[ChoiceVariable] = field(default_factory=set["ChoiceVariable"])
 
 
 class ChoiceProblem:
@@ -122,7 +122,7 @@ class ChoiceProblem:
         components: The constraints that share random variables.
     """
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(self, parts: Sequence[ConstraintChoices]) -> None:
         """Find the slots and what hangs together."""
         self.parts = parts
         self.domains: list[Domain] = []
@@ -139,7 +139,7 @@ class ChoiceProblem:
                     self.domains.append(Domain(tree.outcomes, np.arange(count), first))
                 own.add(numbers[key])
             part.slots = frozenset(own)
-        self.columns: dict[Variable, list[tuple[int, int]]] = {}
+        self.columns: dict[ChoiceVariable, list[tuple[int, int]]] = {}
         for slot, domain in enumerate(self.domains):
             for column, variable in enumerate(domain.outcomes.variables):
                 self.columns.setdefault(variable, []).append((slot, column))
@@ -155,7 +155,7 @@ class ChoiceProblem:
         for variable, places in self.columns.items():
             if not isinstance(variable, Identity):
                 used = leaves(variable)
-                below: set[Variable] = {leaf.identity for leaf in used if not isinstance(leaf, Index)}
+                below: set[ChoiceVariable] = {leaf.identity for leaf in used if not isinstance(leaf, Index)}
                 above = [self.columns.get(leaf.identity, ()) for leaf in used if isinstance(leaf, Index)]
                 slots = {slot for each in (places, *above) for slot, _ in each}
                 pieces.append(Component([], [Lookup(variable)], slots, below))

@@ -32,7 +32,7 @@ from scenicq.match.problem.conditioned import Item, conditioned, fact
 from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
-from scenicq.match.search.choice_problem import ChoiceProblem, Lookup, Part, conjuncts
+from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices, Lookup, conjuncts
 from scenicq.match.search.outcome_bounds import possible_outcomes
 from scenicq.match.search.outcome_tables import TooManyOutcomesError
 from scenicq.match.tolerance import Tolerance
@@ -69,7 +69,7 @@ def decide_with_choices(
     """
     parts = [part for item in items for part in conjuncts(item)]
     try:
-        found = [Part(item) for item in parts]
+        found = [ConstraintChoices(item) for item in parts]
     except TooManyOutcomesError:
         return Undecided(items[0][0], "budget")
     if not any(part.trees for part in found):
@@ -89,7 +89,7 @@ class _ChoiceSearch:
     def __init__(
         self,
         items: list[Item],
-        parts: list[Part],
+        parts: list[ConstraintChoices],
         tolerance: Tolerance,
         decide: Decide,
         ask: Ask | None,
@@ -243,7 +243,7 @@ class _ChoiceSearch:
     def _of(
         self,
         number: int,
-        parts: Sequence[Part],
+        parts: Sequence[ConstraintChoices],
         lookups: Sequence[Lookup],
         slots: frozenset[int] | set[int],
         assignment: Mapping[int, int],
@@ -271,7 +271,7 @@ class _ChoiceSearch:
 
     def _decided(
         self,
-        parts: Sequence[Part],
+        parts: Sequence[ConstraintChoices],
         lookups: Sequence[Lookup],
         slots: frozenset[int] | set[int],
         assignment: Mapping[int, int],

@@ -16,18 +16,18 @@ import numpy as np
 from scenicq.forest.groups import Comparison, Group
 from scenicq.forest.interpret import Steps, interpret
 from scenicq.forest.interval_ends import ARRAYS
-from scenicq.forest.interval_values import Array, Bounds, Interval, IntervalVector, can_hold
+from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue, IntervalVector, can_hold
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import Feature, Node, Rotate, VectorSum
 from scenicq.match.tolerance import SLACK, Margin, Tolerance
 
 __all__ = ["Observed", "possible", "within_margin"]
 
-Observed = Callable[[int, str], Array | tuple[Array, Array] | None]
+Observed = Callable[[int, str], FloatOrArray | tuple[FloatOrArray, FloatOrArray] | None]
 """What is observed of an object: numbers or a pair of them for all its candidates; None where it is no number."""
 
 
-def possible(group: Group, steps: Steps, observed: Observed, tolerance: Tolerance) -> Array:
+def possible(group: Group, steps: Steps, observed: Observed, tolerance: Tolerance) -> FloatOrArray:
     """For which candidates of its roles a group may be satisfiable.
 
     Args:
@@ -40,12 +40,12 @@ def possible(group: Group, steps: Steps, observed: Observed, tolerance: Toleranc
         A boolean or a boolean array of the broadcast shape; False only where no solution exists.
     """
 
-    def seen(node: Feature) -> Bounds[Array]:
+    def seen(node: Feature) -> IntervalValue[FloatOrArray]:
         return _bounds(observed(node.object, node.property))
 
     with np.errstate(all="ignore"):
         known = interpret(steps, IntervalDomain(ARRAYS, seen, slack=SLACK, boxed=False))
-        result: Array = True
+        result: FloatOrArray = True
         for item in group.constraints:
             if isinstance(item, Comparison):
                 answer = _reachable(item, observed(item.object, item.property), known, tolerance)
@@ -55,27 +55,32 @@ def possible(group: Group, steps: Steps, observed: Observed, tolerance: Toleranc
     return result
 
 
-def _bounds(seen: Array | tuple[Array, Array] | None) -> Bounds[Array]:
+def _bounds(seen: FloatOrArray | tuple[FloatOrArray, FloatOrArray] | None) -> IntervalValue[FloatOrArray]:
     if seen is None:
         return None
     if isinstance(seen, tuple):
-        x, y = cast("tuple[Array, Array]", seen)
+        x, y = cast("tuple[FloatOrArray, FloatOrArray]", seen)
         return IntervalVector(Interval(x, x, True), Interval(y, y, True))
     return Interval(seen, seen, True)
 
 
 def _reachable(
-    item: Comparison, seen: Array | tuple[Array, Array] | None, known: dict[int, Bounds[Array]], tolerance: Tolerance
-) -> Array:
+    item: Comparison,
+    seen: FloatOrArray | tuple[FloatOrArray, FloatOrArray] | None,
+    known: dict[int, IntervalValue[FloatOrArray]],
+    tolerance: Tolerance,
+) -> FloatOrArray:
     value, margin = known[id(item.expression)], tolerance.of(item.object, item.property)
     if isinstance(seen, tuple) and isinstance(value, IntervalVector):
         if item.property != "position":
             return True
-        return _meets(item.expression, cast("tuple[Array, Array]", seen), margin.reach + SLACK, known)
-    return within_margin(value, cast(Array, seen), margin)
+        return _meets(item.expression, cast("tuple[FloatOrArray, FloatOrArray]", seen), margin.reach + SLACK, known)
+    return within_margin(value, cast(FloatOrArray, seen), margin)
 
 
-def within_margin(value: Bounds[Array], seen: Array | tuple[Array, Array] | None, margin: Margin) -> Array:
+def within_margin(
+    value: IntervalValue[FloatOrArray], seen: FloatOrArray | tuple[FloatOrArray, FloatOrArray] | None, margin: Margin
+) -> FloatOrArray:
     """Whether a value between bounds can be within tolerance of what a label observes.
 
     Args:
@@ -84,7 +89,7 @@ def within_margin(value: Bounds[Array], seen: Array | tuple[Array, Array] | None
         margin: The tolerance.
     """
     if isinstance(seen, tuple) and isinstance(value, IntervalVector):
-        return _in_box(cast("tuple[Array, Array]", seen), value, margin.reach + SLACK)
+        return _in_box(cast("tuple[FloatOrArray, FloatOrArray]", seen), value, margin.reach + SLACK)
     if seen is None or isinstance(seen, tuple) or not isinstance(value, Interval):
         return True
     low, high = value.low, value.high
@@ -95,14 +100,16 @@ def within_margin(value: Bounds[Array], seen: Array | tuple[Array, Array] | None
     return ~np.isfinite(width) | (np.mod(seen - low + allowed, math.tau) <= width)
 
 
-def _in_box(target: tuple[Array, Array], box: IntervalVector[Array], reach: float) -> Array:
+def _in_box(target: tuple[FloatOrArray, FloatOrArray], box: IntervalVector[FloatOrArray], reach: float) -> FloatOrArray:
     """Whether a point is in a box or within a reach of it."""
     x, y = target
     across = (box.x.low - reach <= x) & (x <= box.x.high + reach)
     return across & (box.y.low - reach <= y) & (y <= box.y.high + reach)
 
 
-def _meets(root: Node, target: tuple[Array, Array], radius: float, known: dict[int, Bounds[Array]]) -> Array:
+def _meets(
+    root: Node, target: tuple[FloatOrArray, FloatOrArray], radius: float, known: dict[int, IntervalValue[FloatOrArray]]
+) -> FloatOrArray:
     """Whether a vector can come within a radius of a target, in the frames that the expression goes through."""
     node = root
     x, y = target
@@ -113,7 +120,7 @@ def _meets(root: Node, target: tuple[Array, Array], radius: float, known: dict[i
                 exact = next(((one, other) for one, other in sides if _is_point(known[id(one)])), None)
                 if exact is None:
                     break
-                at = cast("IntervalVector[Array]", known[id(exact[0])])
+                at = cast("IntervalVector[FloatOrArray]", known[id(exact[0])])
                 x, y, node = x - at.x.low, y - at.y.low, exact[1]
             case Rotate() if isinstance(angle := known[id(node.angle)], Interval) and angle.exact:
                 c, s = np.cos(angle.low), np.sin(angle.low)
@@ -124,6 +131,6 @@ def _meets(root: Node, target: tuple[Array, Array], radius: float, known: dict[i
     return _in_box((x, y), box, radius) if isinstance(box, IntervalVector) else True
 
 
-def _is_point(value: Bounds[Array]) -> bool:
+def _is_point(value: IntervalValue[FloatOrArray]) -> bool:
     """Whether a vector is known for each candidate."""
     return isinstance(value, IntervalVector) and value.x.exact and value.y.exact

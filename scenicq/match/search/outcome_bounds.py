@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scenicq.forest.groups import Comparison
 from scenicq.forest.interpret import interpret
 from scenicq.forest.interval_ends import ARRAYS
-from scenicq.forest.interval_values import Array, Bounds, Interval, IntervalVector, Truth, can_hold
+from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue, IntervalVector, Truth, can_hold
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.search.interval_relaxation import within_margin
@@ -46,7 +46,7 @@ def possible_outcomes(
     chosen = {key: _chosen(*tree) for key, tree in trees.items()}
     with np.errstate(all="ignore"):
         value = interpret(tuple(above_choices(root)), _DOMAIN, chosen)[id(root)]
-        near: Array = can_hold(value)
+        near: FloatOrArray = can_hold(value)
         if isinstance(constraint, Comparison):
             margin = tolerance.of(constraint.object, constraint.property)
             known = isinstance(seen, float) or (isinstance(seen, tuple) and constraint.property == "position")
@@ -54,7 +54,7 @@ def possible_outcomes(
         return np.broadcast_to(np.array(near, dtype=np.bool_), (count,))
 
 
-def _chosen(tree: ChoiceTree, rows: NDArray[np.intp], each: bool) -> Bounds[Array]:
+def _chosen(tree: ChoiceTree, rows: NDArray[np.intp], each: bool) -> IntervalValue[FloatOrArray]:
     """Bounds of what is chosen, for each outcome or for all together."""
     match tree.kind:
         case "scalar":
@@ -69,5 +69,5 @@ def _chosen(tree: ChoiceTree, rows: NDArray[np.intp], each: bool) -> Bounds[Arra
             return None
 
 
-def _span(low: Array, high: Array, each: bool) -> Interval[Array]:
+def _span(low: FloatOrArray, high: FloatOrArray, each: bool) -> Interval[FloatOrArray]:
     return Interval(low, high) if each else Interval(cast(float, low.min()), cast(float, high.max()))

@@ -22,9 +22,9 @@ from scenicq.forest.walk import children, leaves, postorder
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
 
-__all__ = ["ChoiceTree", "Outcomes", "TooManyOutcomesError", "Variable", "above_choices", "tree_of"]
+__all__ = ["ChoiceTree", "ChoiceVariable", "Outcomes", "TooManyOutcomesError", "above_choices", "tree_of"]
 
-Variable: TypeAlias = Identity | Node
+ChoiceVariable: TypeAlias = Identity | Node
 """A random index by its identity; else the expression that says which option is taken."""
 
 MOST_OUTCOMES = 50_000
@@ -43,10 +43,10 @@ class Outcomes:
         picks: Which option each of them takes, shape (outcomes, variables); -1 where it does not matter.
     """
 
-    variables: tuple[Variable, ...]
+    variables: tuple[ChoiceVariable, ...]
     picks: NDArray[np.intp]
 
-    def given(self, outcome: int) -> Iterator[tuple[Variable, int]]:
+    def given(self, outcome: int) -> Iterator[tuple[ChoiceVariable, int]]:
         """The choices that matter to an outcome, with their options."""
         for variable, pick in zip(self.variables, self.picks[outcome].tolist(), strict=True):
             if pick >= 0:
@@ -73,9 +73,9 @@ class ChoiceTree:
         return frozenset(leaf.identity for leaf in leaves(*roots) if not isinstance(leaf, Index))
 
     @cached_property
-    def inner(self) -> frozenset[Variable]:
+    def inner(self) -> frozenset[ChoiceVariable]:
         """Further choices inside of the results, which come out when it is known which result is chosen."""
-        found: set[Variable] = set()
+        found: set[ChoiceVariable] = set()
         for node in postorder([result for result in self.results if not isinstance(result, Constant)]):
             if isinstance(node, Index):
                 found.add(node.identity)
@@ -122,7 +122,7 @@ class ChoiceTree:
 
 
 @lru_cache(maxsize=4096)
-def _shared(variables: tuple[Variable, ...], picks: bytes, count: int) -> Outcomes:
+def _shared(variables: tuple[ChoiceVariable, ...], picks: bytes, count: int) -> Outcomes:
     """The one table with this content."""
     table = np.frombuffer(picks, dtype=np.intp).reshape(count, len(variables))
     return Outcomes(variables, table)
@@ -135,10 +135,10 @@ def tree_of(root: Select) -> ChoiceTree:
     Raises:
         TooManyOutcomesError: There are more than can be listed.
     """
-    columns: dict[Variable, int] = {}
-    rows: list[dict[Variable, int]] = []
+    columns: dict[ChoiceVariable, int] = {}
+    rows: list[dict[ChoiceVariable, int]] = []
     results: list[Node] = []
-    todo: list[tuple[Node, dict[Variable, int]]] = [(root, {})]
+    todo: list[tuple[Node, dict[ChoiceVariable, int]]] = [(root, {})]
     while todo:
         node, path = todo.pop()
         if not isinstance(node, Select):
@@ -157,9 +157,9 @@ def tree_of(root: Select) -> ChoiceTree:
     return ChoiceTree(_shared(tuple(columns), picks.tobytes(), len(rows)), tuple(results))
 
 
-def _options(node: Select, path: dict[Variable, int]) -> Iterator[tuple[Node, dict[Variable, int]]]:
+def _options(node: Select, path: dict[ChoiceVariable, int]) -> Iterator[tuple[Node, dict[ChoiceVariable, int]]]:
     """What a choice may lead to, with what is then known of all choices."""
-    todo: list[tuple[Node, dict[Variable, int]]] = [(node.index, path)]
+    todo: list[tuple[Node, dict[ChoiceVariable, int]]] = [(node.index, path)]
     while todo:
         index, known = todo.pop()
         if isinstance(index, Constant):
@@ -168,7 +168,7 @@ def _options(node: Select, path: dict[Variable, int]) -> Iterator[tuple[Node, di
             continue
         # of an index that is chosen itself, such as which of several elements that overlap is meant, that comes first
         asked = index.index if isinstance(index, Select) else index
-        variable: Variable = asked.identity if isinstance(asked, Index) else asked
+        variable: ChoiceVariable = asked.identity if isinstance(asked, Index) else asked
         options = index.options if isinstance(index, Select) else node.options
         numbers = [known[variable]] if variable in known else range(len(options))
         found = [(options[number], {**known, variable: number}) for number in numbers]

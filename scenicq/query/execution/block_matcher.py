@@ -18,10 +18,11 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.search.group_plan import relevant_properties
-from scenicq.match.verdict import Verdict
+from scenicq.match.verdict import Match, Verdict
 from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
+from scenicq.query.prefilter.decision import decided_frames
 from scenicq.query.prefilter.executor import (
     Block,
     Candidate,
@@ -31,7 +32,7 @@ from scenicq.query.prefilter.executor import (
     names,
     run_prefilter,
 )
-from scenicq.query.prefilter.plan import Plan, make_plan
+from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.temporal.interval_options import IntervalOptions
@@ -64,9 +65,12 @@ class CompiledMap:
     motion: bool = True
 
     @classmethod
-    def of(cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool) -> CompiledMap:
-        """With its prefilter, or one that excludes nothing."""
-        plan = make_plan(scenario, network, options) if prefilter else Plan(network.name, (), (), ())
+    def of(
+        cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool, proofs: bool = True
+    ) -> CompiledMap:
+        """With its prefilter, which without proofs says what surely matches, too, or with one that excludes nothing."""
+        empty = Plan(network.name, (), (), ())
+        plan = make_plan(scenario, network, options, deciding=not proofs) if prefilter else empty
         motion = any(_MOTION & names for names in relevant_properties(scenario, options))
         return cls(scenario, network, plan, motion)
 
@@ -149,8 +153,25 @@ class Decider:
             return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
         missed = run_prefilter(self.dataset, self._connection, world.plan, block)
         named = names(self.dataset, self._connection, block) if self.every else []
-        left = candidates(self._connection, world.plan, motion=world.motion) if (missed < 0).any() else iter(())
-        return Decided(missed, self._matched(matcher, left), named)
+        if not (missed < 0).any():
+            return Decided(missed, [], named)
+        if world.plan.decision and not self.all_matches:
+            return Decided(missed, self._partly_decided(world, matcher), named)
+        return Decided(
+            missed, self._matched(matcher, candidates(self._connection, world.plan, motion=world.motion)), named
+        )
+
+    def _partly_decided(self, world: CompiledMap, matcher: Matcher) -> Iterator[list[Result]]:
+        """The results of the frames that the prefilter has left, where SQL says that some surely match."""
+        assert self._connection is not None
+        rows = decided_frames(self._connection, world.plan.decision, LABELS, world.plan.left)
+        open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
+        left = candidates(self._connection, world.plan, motion=world.motion, among=open_) if len(open_) else iter(())
+        asked = self._matched(matcher, left)
+        proved = Match({}, {})
+        for _, sure, frame, recording, time in rows:
+            check_deadline(self.until)
+            yield [Result(frame, recording, time, proved)] if sure else next(asked)
 
     def _recordings(self, world: CompiledMap, matcher: Matcher, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""

@@ -82,35 +82,35 @@ def _settings(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
     for name, given in scenario.params.items():
         if given.explicit and name not in options.ignore_params:
             yield _Setting(f"param {name}", name, "", ego=True, span=given.span)
-    roots = [given.value for thing in scenario.objects for given in thing.properties.values()]
+    roots = [given.value for owner in scenario.objects for given in owner.properties.values()]
     roots += [requirement.condition for requirement in scenario.requirements]
     used = set(features(*roots))
-    for thing in scenario.objects:
-        ego = thing.index == scenario.ego and options.ego == "label"
-        for name, given in thing.properties.items():
-            own = given.explicit and name not in _NOT_SEEN and name not in thing.mutated
+    for owner in scenario.objects:
+        ego = owner.index == scenario.ego and options.ego == "label"
+        for name, given in owner.properties.items():
+            own = given.explicit and name not in _NOT_SEEN and name not in owner.mutated
             # a property that the program has for its own use is no claim about labels
-            if own and (name in _COLUMNS or (thing.index, name) not in used):
-                yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, given.span)
-        for name, span in thing.uncomparable.items():
+            if own and (name in _COLUMNS or (owner.index, name) not in used):
+                yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, given.span)
+        for name, span in owner.uncomparable.items():
             if name not in _NOT_SEEN:
-                yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, span, comparable=False)
+                yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, span, comparable=False)
     for requirement in scenario.requirements:
         for index, name in features(requirement.condition):
             if index == PARAMS or name not in _READ:
                 continue
-            thing = scenario.objects[index]
-            if not thing.properties[name].explicit:
+            owner = scenario.objects[index]
+            if not owner.properties[name].explicit:
                 ego = index == scenario.ego and options.ego == "label"
                 told = f"read here: the library's default for `{name}` stands in"
-                yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, requirement.span, told)
+                yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, requirement.span, told)
     for condition in scenario.dynamics.conditions if scenario.dynamics is not None else ():
         for index, name in features(condition):
             if index != PARAMS and name in _READ:
-                thing = scenario.objects[index]
+                owner = scenario.objects[index]
                 ego = index == scenario.ego and options.ego == "label"
                 told = "read here: an interval that hangs on it is unknown"
-                yield _Setting(f"{thing.name}.{name}", name, thing.category, ego, condition.span, told)
+                yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, condition.span, told)
 
 
 def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOptions) -> Coverage:

@@ -122,7 +122,7 @@ def write_partition(
     return target
 
 
-_COUNTS = ("frames", "candidates", "cast", "matches", "unknowns", "excluded", "reasons", "over_time", "broken")
+_COUNTS = ("frames", "candidates", "with_roles", "matches", "unknowns", "excluded", "reasons", "over_time", "broken")
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,8 @@ from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.hidden_runs import Remembered
-from scenicq.temporal.intervals import Interval, IntervalMatcher
-from scenicq.temporal.starts import Cast, StartSearch
+from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
+from scenicq.temporal.starts import RoleCandidates, StartSearch
 from scenicq.temporal.truth import TRUE, UNKNOWN
 
 __all__ = ["DecidedRecordings", "RecordingMatcher", "Survivors", "lost_recording"]
@@ -120,19 +120,19 @@ class RecordingMatcher:
         """Starts that arrays have, those that the matcher has decided, and the labels that stay undecided."""
         labels = left.labels - block.first_label
         arrays: Mapping[int, NDArray[np.int64]] = {}
-        cast = self._cast(block, labels, left)
+        candidates = self._candidates(block, labels, left)
         sure = np.ones(len(labels), np.bool_)
         codes, classes = block.categories()
         own: list[int] = np.unique(codes[block.ego(labels)]).tolist()
-        if cast is not None and all(classes[code] for code in own):
-            starts = self._search.decide(block, cast)
-            arrays, cast, sure = starts.members, starts.left, starts.sure
-            labels = cast.labels
+        if candidates is not None and all(classes[code] for code in own):
+            starts = self._search.decide(block, candidates)
+            arrays, candidates, sure = starts.members, starts.left, starts.sure
+            labels = candidates.labels
             found.failed.update(starts.failed)
         decided: list[DecidedStart] = []
         undecided: list[tuple[int, Unknown]] = []
         read = left.read(labels + block.first_label) if len(labels) else iter(())
-        for at, candidate, members, among, known in self._asked(block, left, labels, cast, sure, read):
+        for at, candidate, members, among, known in self._asked(block, left, labels, candidates, sure, read):
             matcher = self._search.rest if known else self.matcher
             label = candidate.label
             findings = list(matcher.findings(label, among=among))
@@ -146,45 +146,47 @@ class RecordingMatcher:
                     decided.append(start)
         return arrays, decided, undecided
 
-    def _cast(self, block: TrackBlock, labels: NDArray[np.int64], left: Survivors) -> Cast | None:
+    def _candidates(self, block: TrackBlock, labels: NDArray[np.int64], left: Survivors) -> RoleCandidates | None:
         """Who may play whom, if that is a matter of the label's own ego."""
         scenario, options = self.matcher.scenario, self.matcher.options
         if options.ego != "label" or options.exact:
             return None
         if left.rows is not None:
             may = {index: left.rows.may[:, place] for place, index in enumerate(left.roles)}
-            return Cast(labels, block.members(left.rows.rows), may)
+            return RoleCandidates(labels, block.members(left.rows.rows), may)
         members = _objects_of(block, labels)
         codes, classes = block.categories()
         fits: dict[str, NDArray[np.bool_]] = {}
         may: dict[int, NDArray[np.bool_]] = {}
-        for thing in scenario.objects:
-            if thing.index != scenario.ego:
-                if thing.category not in fits:
-                    own = [bool(each) and class_matches(thing.category, each, options.classes) for each in classes]
-                    fits[thing.category] = np.array(own, dtype=np.bool_)[codes[members]]
-                may[thing.index] = fits[thing.category]
-        return Cast(labels, members, may)
+        for owner in scenario.objects:
+            if owner.index != scenario.ego:
+                if owner.category not in fits:
+                    own = [bool(each) and class_matches(owner.category, each, options.classes) for each in classes]
+                    fits[owner.category] = np.array(own, dtype=np.bool_)[codes[members]]
+                may[owner.index] = fits[owner.category]
+        return RoleCandidates(labels, members, may)
 
     def _asked(
-        self, block: TrackBlock, left: Survivors, labels: NDArray[np.int64], cast: Cast | None,
+        self, block: TrackBlock, left: Survivors, labels: NDArray[np.int64], candidates: RoleCandidates | None,
         sure: NDArray[np.bool_], read: Iterator[Candidate],
     ) -> Iterator[tuple[int, Candidate, list[int], Mapping[int, tuple[int, ...]] | None, bool]]:  # fmt: skip
         """Labels for the matcher, with their members, who may play whom, and whether plain requirements hold."""
-        members = _objects_of(block, labels) if cast is None else cast.members
+        members = _objects_of(block, labels) if candidates is None else candidates.members
         ends = np.searchsorted(block.label_of[members], np.append(labels, len(block))).tolist()
         for place, (at, candidate) in enumerate(zip(labels.tolist(), read, strict=True)):
             mine = slice(ends[place], ends[place + 1])
             among: Mapping[int, tuple[int, ...]] | None = candidate.among
-            if cast is not None:
-                among = {index: tuple((np.flatnonzero(may[mine]) + 1).tolist()) for index, may in cast.may.items()}
+            if candidates is not None:
+                among = {
+                    index: tuple((np.flatnonzero(may[mine]) + 1).tolist()) for index, may in candidates.may.items()
+                }
             own = [int(block.ego(np.array([at]))[0]), *members[mine].tolist()]
             yield at, candidate, own, among, bool(sure[place])
 
     # --- results
 
     def _results(
-        self, block: TrackBlock, intervals: Sequence[Interval], decided: Mapping[int, DecidedStart],
+        self, block: TrackBlock, intervals: Sequence[IntervalVerdict], decided: Mapping[int, DecidedStart],
         remember: Callable[[int], Remembered],
     ) -> Iterator[tuple[int, Result]]:  # fmt: skip
         """Intervals as results, with the recordings that they are of."""
@@ -195,7 +197,7 @@ class RecordingMatcher:
             yield each.recording, self._result(block, each, witnesses.get(each.origin, {}), each.reason or reason)
 
     def _witnesses(
-        self, intervals: Sequence[Interval], decided: Mapping[int, DecidedStart],
+        self, intervals: Sequence[IntervalVerdict], decided: Mapping[int, DecidedStart],
         remember: Callable[[int], Remembered],
     ) -> Mapping[int, Mapping[str, WitnessValue]]:  # fmt: skip
         """The witnesses of the initial scenes of intervals that match, by the numbers of their starts."""
@@ -203,14 +205,14 @@ class RecordingMatcher:
         verdicts: dict[int, Verdict] = {each: decided[each].verdict for each in wanted if each in decided}
         rest = [each for each in wanted if each not in decided]
         scenario = self.matcher.scenario
-        others = [thing.index for thing in scenario.objects if thing.index != scenario.ego]
+        others = [owner.index for owner in scenario.objects if owner.index != scenario.ego]
         among = {index: (number,) for number, index in enumerate(others, 1)}
         labels: list[tuple[Label, Mapping[int, tuple[int, ...]] | None]] = [(remember(each)[0], among) for each in rest]
         verdicts.update(zip(rest, self._search.rest.match_all(labels), strict=True))
         return {number: each.witness for number, each in verdicts.items() if isinstance(each, Match)}
 
     def _result(
-        self, block: TrackBlock, interval: Interval, witness: Mapping[str, WitnessValue], reason: str
+        self, block: TrackBlock, interval: IntervalVerdict, witness: Mapping[str, WitnessValue], reason: str
     ) -> Result:
         """An interval as a result."""
         scenario = self.matcher.scenario
@@ -244,7 +246,7 @@ def _named(track: TrackKey) -> str:
     return "ego" if kind == "ego" else name.rpartition("\n")[2]
 
 
-def _cause(seconds: float, interval: Interval) -> Cause:
+def _cause(seconds: float, interval: IntervalVerdict) -> Cause:
     """Why an interval that ends after some seconds of its recording does not match."""
     if interval.cut_off:
         return Cause(CUT_OFF, f"at {seconds:.1f} s, before the program ends")

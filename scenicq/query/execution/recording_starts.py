@@ -64,7 +64,7 @@ def starts_of(
                 chosen.update(zip(sorted(twins), ordered, strict=True))
         else:
             numbers_by_id = {each.id: number for number, each in enumerate(label.objects, 1)} | {"ego": 0}
-            names = {thing.name: thing.index for thing in scenario.objects}
+            names = {owner.name: owner.index for owner in scenario.objects}
             whole = verdict.correspondence
             if len(whole) < len(scenario.objects):
                 if isinstance(verdict, Unknown):
@@ -78,7 +78,7 @@ def start_table(
     scenario: Scenario, block: TrackBlock, arrays: Mapping[int, NDArray[np.int64]], decided: Sequence[DecidedStart]
 ) -> StartTable:
     """All starts of a block: first those that arrays have, then those that the matcher has decided."""
-    indices = sorted(thing.index for thing in scenario.objects)
+    indices = sorted(owner.index for owner in scenario.objects)
     members = {
         index: np.concatenate(
             (arrays.get(index, np.empty(0, np.int64)), np.array([each.members[index] for each in decided], np.int64))
@@ -105,12 +105,12 @@ def label_of(
     at = int(block.label_of[members[scenario.ego]])
     objects: list[LabelObject] = []
     names: dict[str, str] = {}
-    for thing in scenario.objects:
-        if thing.index == scenario.ego:
-            names[thing.name] = "ego"
+    for owner in scenario.objects:
+        if owner.index == scenario.ego:
+            names[owner.name] = "ego"
         else:
-            names[thing.name] = f"{len(objects)}"
-            objects.append(_object(block, members[thing.index], names[thing.name], relevant[thing.index]))
+            names[owner.name] = f"{len(objects)}"
+            objects.append(_object(block, members[owner.index], names[owner.name], relevant[owner.index]))
     ego = _object(block, members[scenario.ego], "ego", relevant[scenario.ego])
     recording = int(block.recording_of[at])
     return Label(f"{at}", f"{recording}", int(block.times_us[at]), map_name, ego, tuple(objects)), names

@@ -130,7 +130,7 @@ class Funnel:
     Attributes:
         frames: Frames looked at.
         candidates: Left after the prefilter.
-        cast: Of those, frames with a label object of the right class for every role.
+        with_roles: Of those, frames with a label object of the right class for every role.
         matches, unknowns: Verdicts.
         excluded: How many frames failed first at which feature or requirement.
         reasons: Why frames are unknown.
@@ -145,7 +145,7 @@ class Funnel:
 
     frames: int = 0
     candidates: int = 0
-    cast: int = 0
+    with_roles: int = 0
     matches: int = 0
     unknowns: int = 0
     excluded: Counter[str] = field(default_factory=Counter[str])
@@ -160,7 +160,7 @@ class Funnel:
         """Count in what was found elsewhere."""
         self.frames += other.frames
         self.candidates += other.candidates
-        self.cast += other.cast
+        self.with_roles += other.with_roles
         self.matches += other.matches
         self.unknowns += other.unknowns
         self.excluded.update(other.excluded)
@@ -184,7 +184,7 @@ class Funnel:
         """Count a verdict of the matcher."""
         self.frames += 1
         self.candidates += 1
-        self.cast += not (isinstance(verdict, NoMatch) and verdict.cause.what.endswith(".class"))
+        self.with_roles += not (isinstance(verdict, NoMatch) and verdict.cause.what.endswith(".class"))
         self._tally(verdict, self.excluded)
 
     def _tally(self, verdict: Verdict, failed: Counter[str]) -> None:

@@ -53,6 +53,7 @@ class QueryOptions:
         time: Options of intervals.
         model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
+        proofs: Whether somebody reads how frames match; if not, a match that SQL decides names nobody and nothing.
         until: When the time is over, in seconds since 1970; None for never. What is decided by then are the results.
     """
 
@@ -69,6 +70,7 @@ class QueryOptions:
     time: IntervalOptions = field(default_factory=IntervalOptions)
     model: str | None = None
     strict: bool = False
+    proofs: bool = True
     until: float | None = None
 
 
@@ -153,16 +155,15 @@ class Query:
             ScenarioError: The program is wrong, or does not fit the map.
         """
         network = self.dataset.network(map_name)
-        options = self.options
         try:
             scenario = compile_scenario(
                 self.source,
                 network,
-                version=options.version,
-                initial=options.initial,
-                behaviors=options.behaviors,
+                version=self.options.version,
+                initial=self.options.initial,
+                behaviors=self.options.behaviors,
                 loader=beside(self.file or Path(self.source.name)),
-                model=options.model,
+                model=self.options.model,
             )
         except ScenarioError as error:
             raise about_dataset(error, self.dataset, map_name) from None
@@ -171,8 +172,7 @@ class Query:
     def _check_ego(self) -> None:
         """Refuse to take a stand-in for an ego that the source does not have."""
         facts = cast("dict[str, object]", self.dataset.manifest.provenance.get("facts") or {})
-        said = str(facts.get("ego", ""))
-        if said.startswith("none") and self.options.match.ego == "label":
+        if str(facts.get("ego", "")).startswith("none") and self.options.match.ego == "label":
             raise DataError(
                 Diagnostic(
                     "option-invalid",
@@ -190,7 +190,8 @@ class Query:
         worlds = self._known.worlds
         if map_name not in worlds:
             options = self.options
-            worlds[map_name] = CompiledMap.of(*self.compile(map_name), options.match, prefilter=options.prefilter)
+            how = {"prefilter": options.prefilter, "proofs": options.proofs}
+            worlds[map_name] = CompiledMap.of(*self.compile(map_name), options.match, **how)
         return worlds[map_name]
 
     def _worlds(self) -> dict[str, CompiledMap | Diagnostic]:
@@ -276,7 +277,7 @@ class Query:
     def roles(self) -> tuple[str, ...]:
         """Names of the scenario's objects, of all maps that it fits."""
         worlds = [each.scenario for each in self._worlds().values() if isinstance(each, CompiledMap)]
-        return tuple(dict.fromkeys(thing.name for scenario in worlds for thing in scenario.objects))
+        return tuple(dict.fromkeys(owner.name for scenario in worlds for owner in scenario.objects))
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
@@ -347,9 +348,8 @@ class Query:
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
             setup = (self.dataset.address, self.source, self.options, self.file)
-            hands = stack.enter_context(
-                BlockExecutor(self.dataset, self.options.jobs, self.decider(), _start_worker, setup)
-            )
+            executor = BlockExecutor(self.dataset, self.options.jobs, self.decider(), _start_worker, setup)
+            hands = stack.enter_context(executor)
             for name, world in worlds.items():
                 if not self._frames(name):
                     continue

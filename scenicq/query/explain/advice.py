@@ -33,7 +33,7 @@ from scenicq.query.explain.prefilter_counts import spots
 from scenicq.query.prefilter.executor import candidates, hold, run_plan
 from scenicq.store.classes import ancestors, is_class
 
-__all__ = ["Advice", "Change", "Outlook", "advice"]
+__all__ = ["Advice", "Outlook", "ProgramChange", "advice"]
 
 _MOST_FRAMES = 5_000
 """Frames of a dataset beyond which a sample is looked at."""
@@ -56,7 +56,7 @@ _PATIENCE = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ProgramChange:
     """A change of the program or the options.
 
     Attributes:
@@ -91,7 +91,7 @@ class Outlook:
         sampled: Whether the numbers were projected from a sample.
     """
 
-    change: Change
+    change: ProgramChange
     least: int
     most: int
     sampled: bool
@@ -196,7 +196,7 @@ def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, r
     return _Sample(chosen, held, frames, total)
 
 
-def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
+def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChange]:
     """The changes that a program and its options can make, those of its features and requirements in its order."""
     for number, requirement in enumerate(scenario.requirements):
         if requirement.built_in is None or requirement.built_in in options.enforce:
@@ -204,30 +204,30 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
             if requirement.built_in is not None:
                 names = " and ".join(scenario.objects[index].name for index in requirement.objects)
                 text = f"{requirement.built_in.value} of {names}"
-            yield Change(f"without `{text}`", text, requirement.span, requirement=number)
+            yield ProgramChange(f"without `{text}`", text, requirement.span, requirement=number)
     for name, given in scenario.params.items():
         if given.explicit and name not in options.ignore_params:
-            yield Change(f"--ignore-params {name}", f"param {name}", given.span, ignored=name)
+            yield ProgramChange(f"--ignore-params {name}", f"param {name}", given.span, ignored=name)
     numbers: dict[str, None] = {}
-    for thing in scenario.objects:
-        for name, given in thing.properties.items():
-            what = f"{thing.name}.{name}"
-            if name in _ANYWHERE and name not in thing.mutated:
-                rules = (*options.tolerance.rules, (thing.name, name, _ANYWHERE[name]))
+    for owner in scenario.objects:
+        for name, given in owner.properties.items():
+            what = f"{owner.name}.{name}"
+            if name in _ANYWHERE and name not in owner.mutated:
+                rules = (*options.tolerance.rules, (owner.name, name, _ANYWHERE[name]))
                 wide = replace(options.tolerance, rules=rules)
-                yield Change(f"`{what}` not compared", what, given.span, tolerance=wide)
+                yield ProgramChange(f"`{what}` not compared", what, given.span, tolerance=wide)
             elif given.explicit and name not in _ANYWHERE:
-                yield Change(f"`{what}` not compared", what, given.span, unset=(thing.index, name))
+                yield ProgramChange(f"`{what}` not compared", what, given.span, unset=(owner.index, name))
                 if kind_of(given.value) == "scalar":
                     numbers[name] = None
-        wider = ancestors(thing.category)[1:2] if is_class(thing.category) else ()
+        wider = ancestors(owner.category)[1:2] if is_class(owner.category) else ()
         for category in wider:
-            told = f"`{thing.name}` as `{category}`"
-            yield Change(told, f"{thing.name}.class", thing.span, category=(thing.index, category))
+            told = f"`{owner.name}` as `{category}`"
+            yield ProgramChange(told, f"{owner.name}.class", owner.span, category=(owner.index, category))
     for name in numbers:
         if options.tolerance.of(0, name).size < _WIDER_NUMBER:
             wide = replace(options.tolerance, rules=(*options.tolerance.rules, ("", name, _WIDER_NUMBER)))
-            yield Change(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
+            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
     for name, size in _WIDER:
         disc = name != "position" or options.tolerance.x is None
         if disc and getattr(options.tolerance, name) < size:
@@ -236,10 +236,10 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
                 if name == "position"
                 else replace(options.tolerance, heading=size)
             )
-            yield Change(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
+            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
 
 
-def _changed(scenario: Scenario, change: Change) -> Scenario:
+def _changed(scenario: Scenario, change: ProgramChange) -> Scenario:
     requirements, objects = list(scenario.requirements), list(scenario.objects)
     if change.requirement >= 0:
         del requirements[change.requirement]
@@ -255,7 +255,7 @@ def _changed(scenario: Scenario, change: Change) -> Scenario:
 
 
 def _outlook(
-    options: MatchOptions, sample: _Sample, change: Change, clock: _Clock, solver: LazySolver, most: int
+    options: MatchOptions, sample: _Sample, change: ProgramChange, clock: _Clock, solver: LazySolver, most: int
 ) -> Outlook:
     """Count the frames that a change leaves, and decide at most so many of them while there is time."""
     if change.tolerance is not None:

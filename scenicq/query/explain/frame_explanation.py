@@ -25,14 +25,14 @@ from scenicq.match.explanation import (
 )
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
-from scenicq.query.explain.margins import Margin, margins
+from scenicq.query.explain.margins import SatisfiedConstraint, margins
 from scenicq.query.explain.nearest_miss import Closest, closest, separated, show_tolerance
 from scenicq.query.explain.violations import Violation, violations
 from scenicq.smt.encode import UnsupportedError
 from scenicq.smt.smtlib import to_smtlib
 from scenicq.store.labels import Label
 
-__all__ = ["Explanation", "Formula", "Proof", "explain", "show_explanation"]
+__all__ = ["Explanation", "GroupScript", "Proof", "explain", "show_explanation"]
 
 _WIDEST = 60
 
@@ -46,7 +46,7 @@ class Proof:
 
 
 @dataclass(frozen=True, slots=True)
-class Formula:
+class GroupScript:
     """A group of constraints as SMT-LIB 2.
 
     Attributes:
@@ -77,10 +77,10 @@ class Explanation:
     verdict: Verdict
     correspondence: Mapping[str, str]
     proofs: tuple[Proof, ...] = ()
-    margins: tuple[Margin, ...] = ()
+    margins: tuple[SatisfiedConstraint, ...] = ()
     violations: tuple[Violation, ...] = ()
     closest: Closest | None = None
-    formulas: tuple[Formula, ...] = ()
+    formulas: tuple[GroupScript, ...] = ()
 
 
 def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explanation:
@@ -175,7 +175,7 @@ def _violations(matcher: Matcher, finding: Finding) -> tuple[Violation, ...]:
     return tuple(found)
 
 
-def _formulas(matcher: Matcher, finding: Finding) -> tuple[Formula, ...]:
+def _formulas(matcher: Matcher, finding: Finding) -> tuple[GroupScript, ...]:
     attempt, plan = finding.search, finding.plan
     assert attempt is not None
     assert plan is not None
@@ -186,7 +186,7 @@ def _formulas(matcher: Matcher, finding: Finding) -> tuple[Formula, ...]:
 
 def _formula(
     matcher: Matcher, attempt: LabelSearch, plan: MatchPlan, number: int, assignment: Mapping[int, int]
-) -> Formula:
+) -> GroupScript:
     group: Group = plan.groups[number - 1].group
     about = [describe_constraint(matcher.scenario, item) for item in group.constraints]
     first = "".join(c if c.isalnum() or c in "._-" else "-" for c in about[0])[:40].strip("-")
@@ -200,7 +200,7 @@ def _formula(
     except CannotEvaluate as error:
         text = f"; no formula: {error}\n"
     head = "".join(f"; {line}\n" for line in (*about, f"verdict: {verdict}"))
-    return Formula(f"{number:02}-{first}", head + text)
+    return GroupScript(f"{number:02}-{first}", head + text)
 
 
 def show_explanation(explanation: Explanation) -> str:
@@ -211,7 +211,7 @@ def show_explanation(explanation: Explanation) -> str:
     if isinstance(verdict, Unknown):
         lines[0] += f": {verdict.reason}"
     kind = "correspondence" if isinstance(verdict, Match) else "closest correspondence"
-    lines += [f"{kind}: {', '.join(f'{name} = {thing}' for name, thing in explanation.correspondence.items())}"]
+    lines += [f"{kind}: {', '.join(f'{name} = {played}' for name, played in explanation.correspondence.items())}"]
     if explanation.proofs:
         lines += ["", "it matches with these values:", *_show_proofs(explanation.proofs)]
     if explanation.margins:
@@ -246,7 +246,7 @@ def _show_proofs(proofs: Sequence[Proof]) -> list[str]:
     return _aligned(rows)
 
 
-def _show_margins(told: Sequence[Margin]) -> list[str]:
+def _show_margins(told: Sequence[SatisfiedConstraint]) -> list[str]:
     return _aligned([(_short(each.what), each.value, each.allowed, each.spare) for each in told])
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,12 +19,13 @@ from scenicq.match.verdict import Match
 from scenicq.query.execution.interval_frames import locate
 from scenicq.query.execution.recording_starts import DecidedStart, start_table, starts_of
 from scenicq.query.execution.run import Query
+from scenicq.query.explain.interval_changes import least_changes, may_still_hold
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
-from scenicq.store.tracks import RecordingTracks, TrackReader
+from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
-from scenicq.temporal.intervals import Interval, IntervalMatcher
+from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import FALSE, TRUE, Truth
@@ -32,6 +34,8 @@ __all__ = ["Band", "IntervalExplanation", "bands_of", "explain_recording", "show
 
 _WIDTH = 60
 """Characters of a band, at most."""
+_MOST_ROUNDS = 8
+"""How often starts whose runs are cut off are left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +66,18 @@ class IntervalExplanation:
         interval: The match, else what came furthest; None where no frame matches the initial scene.
         roles: The track of each object.
         bands: Over the interval.
+        changes: What one number of the program would have to be for the interval to match.
         failed: What frames failed at that do not match the initial scene.
+        example: One of the frames that failed at what the fewest did.
     """
 
     tracks: RecordingTracks
-    interval: Interval | None
+    interval: IntervalVerdict | None
     roles: tuple[tuple[str, str], ...] = ()
     bands: tuple[Band, ...] = ()
+    changes: tuple[str, ...] = ()
     failed: Counter[str] | None = None
+    example: str = ""
 
     @property
     def matches(self) -> bool:
@@ -82,7 +90,9 @@ class IntervalExplanation:
         if interval is None:
             counted = (self.failed or Counter()).most_common()
             rows = [f"  {count:>6,}  {what}" for what, count in counted]
-            return "\n".join([f"no frame of {tracks.name} matches the initial scene; they fail at", *rows])
+            hint = [f"  = hint: `scenicq explain` with the frame {self.example} says how far that one is"]
+            head = f"no frame of {tracks.name} matches the initial scene; they fail at"
+            return "\n".join([head, *rows, *(hint if self.example else ())])
         first, last = float(tracks.seconds[interval.start]), float(tracks.seconds[interval.end])
         said = "matches" if interval.truth == TRUE else "does not match" if interval.truth == FALSE else "is unknown"
         if interval.reason:
@@ -94,10 +104,11 @@ class IntervalExplanation:
         ]
         if interval.cut_off:
             lines.append(f"cut off: the recording or a track ends at {last:.1f} s, before the program does")
+            lines += [f"  = {each}" for each in self.changes if interval.broken is None]
         lines += ["", *self._broken(interval)]
         return "\n".join([*lines, *show_bands(self.bands)]).rstrip()
 
-    def _broken(self, interval: Interval) -> list[str]:
+    def _broken(self, interval: IntervalVerdict) -> list[str]:
         """The requirement that is broken, where, when, and by how much."""
         if interval.broken is None:
             return []
@@ -108,17 +119,17 @@ class IntervalExplanation:
             f"broken {self._when(interval)}",
             severity="excluded",
         )
-        hints = [f"  = {each}" for each in self._margins(interval)]
+        hints = [f"  = {each}" for each in (*self._margins(interval), *self.changes)]
         return [render(told), *hints, ""]
 
-    def _when(self, interval: Interval) -> str:
+    def _when(self, interval: IntervalVerdict) -> str:
         last = float(self.tracks.seconds[interval.end])
         mine = next((band for band in self.bands if band.is_requirement and band.span == interval.broken), None)
         wrong = [place for place, value in enumerate(mine.values) if value == FALSE] if mine is not None else []
         seconds = float(self.tracks.seconds[interval.start + wrong[-1]]) if wrong else last
         return f"at {seconds:.1f} s" if wrong else f"by {last:.1f} s"
 
-    def _margins(self, interval: Interval) -> list[str]:
+    def _margins(self, interval: IntervalVerdict) -> list[str]:
         """For each comparison inside the broken requirement how close it comes to the other outcome."""
         broken = interval.broken
         assert broken is not None
@@ -161,6 +172,7 @@ def explain_recording(query: Query, solver: Solver, name: str, time_us: int | No
         hint = f"its frames are at {times} ..."
         raise DataError(Diagnostic("option-invalid", f"{name} has no frame at {time_us}", hints=(hint,)))
     failed: Counter[str] = Counter()
+    examples: dict[str, str] = {}
     with TrackBlock(query.dataset, part, [(first, end)]) as block:
         starts: list[DecidedStart] = []
         for sample, label in enumerate(labels):
@@ -177,24 +189,90 @@ def explain_recording(query: Query, solver: Solver, name: str, time_us: int | No
             starts += found
             if not found:
                 causes = [each.verdict.cause for each in findings if not isinstance(each.verdict, Match)]
-                failed[causes[0].what if causes else "tracks"] += 1
+                what = causes[0].what if causes else "tracks"
+                failed[what] += 1
+                examples.setdefault(what, label.frame)
         intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
-        table = start_table(scenario, block, {}, starts)
-        results = intervals.intervals(table, lambda number: (starts[number].label, starts[number].correspondence))
+        results = _intervals(intervals, scenario, block, starts)
+        # what is cut off is looked at where no run comes to its end
+        whole = starts
+        for _ in range(_MOST_ROUNDS):
+            cut = {each.binding: each.start for each in results if each.cut_off}
+            whole = [each for each in whole if not _is_after(block, each, cut)]
+            if not cut or not whole:
+                break
+            results = _intervals(intervals, scenario, block, whole)
     if not results:
-        return IntervalExplanation(tracks, None, failed=failed)
+        rarest = min(failed, key=lambda what: failed[what], default="")
+        return IntervalExplanation(tracks, None, failed=failed, example=examples.get(rarest, ""))
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
+    if best.cut_off:
+        best = replace(best, broken=_already_broken(scenario, tracks, best))
     roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
-    return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best))
+    return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best), _changes(scenario, tracks, best))
 
 
-def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: Interval) -> tuple[Band, ...]:
+def _columns(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> AtomColumns:
+    """The samples of an interval."""
+    samples = Samples(tracks, dict(interval.binding), interval.start, interval.end + 1)
+    return AtomColumns(scenario, samples, start=np.zeros(len(samples), np.int64))
+
+
+def _changes(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[str, ...]:
+    """What would let an interval through: the requirement that is broken hold, or the program end."""
+    dynamics = scenario.dynamics
+    if dynamics is None or interval.truth == TRUE:
+        return ()
+    columns = _columns(scenario, tracks, interval)
+    changes = [
+        change
+        for each in dynamics.requirements
+        if each.span == interval.broken
+        for change in least_changes(columns, each.formula, dynamics.conditions, goes_on=interval.cut_off)
+    ]
+    if interval.cut_off and interval.broken is None:
+        for each in _conditional(dynamics.terminations):
+            assert each.condition is not None
+            changes += least_changes(columns, each.condition, dynamics.conditions, ends=True)
+    return tuple(change.text() for change in sorted(changes, key=lambda each: abs(each.amount)))
+
+
+def _intervals(
+    matcher: IntervalMatcher, scenario: Scenario, block: TrackBlock, starts: Sequence[DecidedStart]
+) -> list[IntervalVerdict]:
+    table = start_table(scenario, block, {}, starts)
+    return matcher.intervals(table, lambda number: (starts[number].label, starts[number].correspondence))
+
+
+def _is_after(block: TrackBlock, start: DecidedStart, samples: Mapping[tuple[tuple[int, TrackKey], ...], int]) -> bool:
+    """Whether a start is at the sample that its binding has among some, or after it."""
+    binding = tuple((index, block.key(member)) for index, member in sorted(start.members.items()))
+    return binding in samples and int(block.label_of[next(iter(start.members.values()))]) >= samples[binding]
+
+
+def _already_broken(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> Span | None:
+    """The first requirement that does not hold on an interval, however its recording would go on."""
+    dynamics = scenario.dynamics
+    if dynamics is None:
+        return None
+    columns = _columns(scenario, tracks, interval)
+
+    def at_each(atom: Atom) -> Truth:
+        return columns.truth(dynamics.conditions[atom.number])
+
+    for requirement in dynamics.requirements:
+        with suppress(HiddenVariable):
+            if not may_still_hold(requirement.formula, at_each):
+                return requirement.span
+    return None
+
+
+def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[Band, ...]:
     """The conditions and requirements of a program over an interval; those on hidden random variables are left out."""
     dynamics = scenario.dynamics
     if dynamics is None:
         return ()
-    samples = Samples(tracks, dict(interval.binding), interval.start, interval.end + 1)
-    columns = AtomColumns(scenario, samples, start=np.zeros(len(samples), np.int64))
+    columns = _columns(scenario, tracks, interval)
     known: dict[int, Truth] = {}
     for number, condition in enumerate(dynamics.conditions):
         try:
@@ -214,7 +292,7 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: Interval) ->
         numbers = _atoms(requirement.formula)
         conditions(numbers)
         if all(number in known for number in numbers):
-            ends = np.array([len(samples) - 1])
+            ends = np.array([interval.end - interval.start])
             values = evaluate(requirement.formula, lambda atom: known[atom.number], ends)[:, 0]
             text = " ".join(requirement.span.text.split())
             found.append(Band(text, requirement.span, tuple(values.tolist()), is_requirement=True))

@@ -21,7 +21,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.query.explain.sides import amount, sides
 from scenicq.query.explain.violations import allowed_values, choices, distance_off
 
-__all__ = ["Margin", "margins"]
+__all__ = ["SatisfiedConstraint", "margins"]
 
 _ROUNDING = 1e-3
 _MOST = 200
@@ -29,7 +29,7 @@ _MOST = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Margin:
+class SatisfiedConstraint:
     """A feature or requirement that a label satisfies.
 
     Attributes:
@@ -49,7 +49,7 @@ class Margin:
 
 def margins(
     matcher: Matcher, attempt: LabelSearch, plan: MatchPlan, assignment: Mapping[int, int]
-) -> tuple[Margin, ...]:
+) -> tuple[SatisfiedConstraint, ...]:
     """What a label shows of each feature and requirement under a correspondence by which it matches.
 
     Args:
@@ -58,7 +58,7 @@ def margins(
         plan: The scenario's groups.
         assignment: The correspondence.
     """
-    found: list[Margin] = []
+    found: list[SatisfiedConstraint] = []
     for each in plan.groups:
         outcome = attempt.decide(each, assignment)
         if not isinstance(outcome, Satisfied) or len(found) >= _MOST:
@@ -75,7 +75,7 @@ def margins(
     return tuple(sorted(found, key=lambda margin: margin.span.start if margin.span is not None else -1))
 
 
-def _of_feature(matcher: Matcher, item: Item) -> Margin:
+def _of_feature(matcher: Matcher, item: Item) -> SatisfiedConstraint:
     constraint, node, observed = item
     assert isinstance(constraint, Comparison)
     what, shown = describe_constraint(matcher.scenario, constraint), show_value(constraint.property, observed)
@@ -83,12 +83,14 @@ def _of_feature(matcher: Matcher, item: Item) -> Margin:
     off = distance_off(constraint, node, observed)
     if off is not None and off > _ROUNDING:
         unit = _unit(constraint.property, observed)
-        return Margin(what, shown, allowed, f"{amount(off, unit)} off, within tolerance", constraint.span)
+        return SatisfiedConstraint(what, shown, allowed, f"{amount(off, unit)} off, within tolerance", constraint.span)
     spare = None
     if isinstance(observed, float) and not isinstance(node, Constant):
         spare = _inside(constraint.property, node, observed)
     unit = _unit(constraint.property, observed)
-    return Margin(what, shown, allowed, "" if spare is None else f"{amount(spare, unit)} to spare", constraint.span)
+    return SatisfiedConstraint(
+        what, shown, allowed, "" if spare is None else f"{amount(spare, unit)} to spare", constraint.span
+    )
 
 
 def _unit(property_: str, value: Value) -> str:
@@ -118,12 +120,12 @@ def _of_requirement(
     constraint: Condition,
     assignment: Mapping[int, int],
     values: Mapping[Identity, Value],
-) -> Iterator[Margin]:
+) -> Iterator[SatisfiedConstraint]:
     what = describe_constraint(matcher.scenario, constraint)
     told = list(sides(attempt, constraint, assignment, values))
     true = [each for each in told if each.true]
     if not true:
-        yield Margin(what, "holds", "", "", constraint.span)
+        yield SatisfiedConstraint(what, "holds", "", "", constraint.span)
     for each in true:
         part = what if len(true) == 1 and len(told) == 1 else each.text
-        yield Margin(part, each.values, "", f"{amount(each.apart, each.unit)} to spare", constraint.span)
+        yield SatisfiedConstraint(part, each.values, "", f"{amount(each.apart, each.unit)} to spare", constraint.span)

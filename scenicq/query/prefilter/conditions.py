@@ -8,10 +8,11 @@ the ego, or about two objects.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scenicq.errors import Span
+from scenicq.forest.interval_values import Interval
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
@@ -34,12 +35,22 @@ from scenicq.geometry.regions import IntersectionOf, Region
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
+from scenicq.query.prefilter.ego_frame import DISTANCE, PLACE, in_ego_frame
 from scenicq.query.prefilter.regions import RegionNames, near_region
-from scenicq.query.prefilter.sql_bounds import ARITHMETIC, Bounds
+from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
-__all__ = ["EGO", "Condition", "conditions", "object_columns"]
+__all__ = [
+    "EGO",
+    "ConditionReader",
+    "NecessaryCondition",
+    "conditions",
+    "difference",
+    "object_columns",
+    "summands",
+    "turned_within",
+]
 
 EGO = "ego"
 """Alias of the frame's row; the objects of a condition are called `a` and, if there are two, `b`."""
@@ -48,7 +59,7 @@ _NUMBERS = ("heading", "width", "length", "height")
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class NecessaryCondition:
     """A necessary condition.
 
     Attributes:
@@ -80,21 +91,23 @@ def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, s
     found["velocity"] = (vx, vy)
     found["speed"] = f"sqrt({vx} * {vx} + {vy} * {vy})"
     found["acceleration"], found["angularSpeed"] = f"{start}acceleration", f"{start}yaw_rate"
+    if not prefix:
+        found[PLACE], found[DISTANCE] = (f"{start}ego_right", f"{start}ego_ahead"), f"{start}ego_distance"
     return found
 
 
 @dataclass(slots=True)
-class _Reader:
-    """Reads conditions off one scenario."""
+class ConditionReader:
+    """Reads conditions off one scenario; `of` gives bounds over the columns of some objects."""
 
     scenario: Scenario
     tolerance: Tolerance
     names: RegionNames
     road: RoadDirection
-    bounds: dict[tuple[int, ...], Bounds] = field(default_factory=dict["tuple[int, ...]", "Bounds"])
+    bounds: dict[tuple[int, ...], SqlBounds] = field(default_factory=dict["tuple[int, ...]", "SqlBounds"])
 
-    def of(self, objects: tuple[int, ...]) -> Bounds:
-        """Bounds over the columns of some objects and the ego's."""
+    def of(self, objects: tuple[int, ...]) -> SqlBounds:
+        """SqlBounds over the columns of some objects and the ego's."""
         if objects not in self.bounds:
             aliases = {self.scenario.ego: (EGO, "ego_")} | dict(zip(objects, (("a", ""), ("b", "")), strict=False))
             columns = {
@@ -102,7 +115,7 @@ class _Reader:
                 for index, (alias, prefix) in aliases.items()
                 for name, column in object_columns(alias, prefix).items()
             }
-            self.bounds[objects] = Bounds(columns)
+            self.bounds[objects] = SqlBounds(columns)
         return self.bounds[objects]
 
     def involved(self, *roots: Node, about: int | None = None) -> tuple[int, ...]:
@@ -131,7 +144,7 @@ class _Reader:
             yield objects, _sql(any_of(allowed)), ""
 
     def _position(
-        self, index: int, node: Node, objects: tuple[int, ...], bounds: Bounds
+        self, index: int, node: Node, objects: tuple[int, ...], bounds: SqlBounds
     ) -> Iterator[tuple[tuple[int, ...], str, str]]:
         reach = self.tolerance.of(index, "position").reach
         own = bounds.columns[index, "position"]
@@ -143,13 +156,13 @@ class _Reader:
                 yield (() if index == self.scenario.ego else (index,)) if near else objects, sql, near
             return
         x, y = (own[0], own[1])
-        place, rest, moved = self._frame((x, y), node, bounds)
+        place, rest, moved = self.framed((x, y), node, bounds)
         if not moved:
             return
         allowed = [all_of([between(place[0], a, reach), between(place[1], b, reach)]) for a, b in bounds.boxes(rest)]
         yield objects, _sql(any_of(allowed)), ""
 
-    def _frame(self, place: tuple[Expr, Expr], node: Node, bounds: Bounds) -> tuple[tuple[Expr, Expr], Node, bool]:
+    def framed(self, place: tuple[Expr, Expr], node: Node, bounds: SqlBounds) -> tuple[tuple[Expr, Expr], Node, bool]:
         """A place seen in the frames that an expression goes through, and what is left of the expression."""
         moved = False
         while True:
@@ -162,7 +175,7 @@ class _Reader:
                 sides = ((node.left, node.right), (node.right, node.left))
                 for part, rest in sides:
                     if known := bounds.exact_vector(part):
-                        shifted = [_difference(p, q) for p, q in zip(place, known, strict=True)]
+                        shifted = [difference(p, q) for p, q in zip(place, known, strict=True)]
                         place, node, moved = (shifted[0], shifted[1]), rest, True
                         break
                 else:
@@ -179,89 +192,82 @@ class _Reader:
         return (
             isinstance(node, VectorSum)
             and isinstance(node.right, Rotate)
-            and self._is_ego(node.left, "position")
-            and self._is_ego(node.right.angle, "heading")
+            and self.is_ego(node.left, "position")
+            and self.is_ego(node.right.angle, "heading")
             and place in (("a.x", "a.y"), ("b.x", "b.y"))
         )
 
-    def _is_ego(self, node: Node, name: str) -> bool:
+    def is_ego(self, node: Node, name: str) -> bool:
+        """Whether an expression is a property of the ego."""
         return isinstance(node, Feature) and (node.object, node.property) == (self.scenario.ego, name)
 
     def _inside(
-        self, region: Node, place: tuple[str, str], bounds: Bounds, names: RegionNames | None, reach: float
+        self, region: Node, place: tuple[str, str], bounds: SqlBounds, names: RegionNames | None, reach: float
     ) -> Iterator[tuple[str, str]]:
         """Conditions on memberships, or SQL, that a place in a region meets to within metres."""
-        match region:
-            case Constant() if isinstance(region.value, Region):
-                parts = region.value.parts if isinstance(region.value, IntersectionOf) else (region.value,)
-                for part in parts:
-                    near = None if names is None else near_region(part, names, reach)
-                    if near is not None:
-                        yield near, ""
-            case RegionIntersection():
-                for part in region.parts:
-                    yield from self._inside(part, place, bounds, names, reach)
-            case DiscAt() | SectorAt():
-                yield "", _sql(self._in_view(region, place, bounds, reach))
-            case _:
-                return
+        todo = [region]
+        while todo:
+            match todo.pop():
+                case Constant(value=known) if isinstance(known, Region):
+                    parts = known.parts if isinstance(known, IntersectionOf) else (known,)
+                    for part in parts:
+                        near = None if names is None else near_region(part, names, reach)
+                        if near is not None:
+                            yield near, ""
+                case RegionIntersection(parts=parts):
+                    todo += reversed(parts)
+                case DiscAt() | SectorAt() as seen:
+                    yield "", _sql(self._in_view(seen, place, bounds, reach))
+                case _:
+                    pass
 
-    def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: Bounds, reach: float) -> str | bool:
+    def _in_view(
+        self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: SqlBounds, reach: float
+    ) -> str | bool:
         center = bounds.exact_vector(region.center)
         if center is None:
             return True
-        from_ego = self._is_ego(region.center, "position") and place == ("a.x", "a.y")
-        dx, dy = (_difference(p, q) for p, q in zip(place, center, strict=True))
+        from_ego = self.is_ego(region.center, "position") and place == ("a.x", "a.y")
+        dx, dy = (difference(p, q) for p, q in zip(place, center, strict=True))
         away = "a.ego_distance" if from_ego else f"sqrt({number(dx)} * {number(dx)} + {number(dy)} * {number(dy)})"
         near = any_of([less(away, SQL.plus(each.high, reach)) for each in bounds.intervals(region.radius)])
         if not isinstance(region, SectorAt) or not isinstance(region.angle, Constant):
             return near
         half = float(region.angle.value) / 2 if isinstance(region.angle.value, float) else math.pi
-        if not (from_ego and self._is_ego(region.heading, "heading") and 0 <= half <= math.pi / 2):
+        if not (from_ego and self.is_ego(region.heading, "heading") and 0 <= half <= math.pi / 2):
             return near
         # a wedge of at most half a turn lies on one side of each of its edges
         aside = f"abs(a.ego_right) * {number(math.cos(half))} - a.ego_ahead * {number(math.sin(half))}"
         return all_of([near, less(f"({aside})", reach)])
 
-    def _heading(self, index: int, node: Node, bounds: Bounds) -> str:
+    def _heading(self, index: int, node: Node, bounds: SqlBounds) -> str:
+        own, terms, along = self.heading_terms(index, node, bounds)
+        alternatives = [SQL.known(0.0)]
+        for term in terms:
+            alternatives = [ARITHMETIC.add(total, more) for total in alternatives for more in bounds.intervals(term)]
+        each = turned_within(own, alternatives, self.tolerance.of(index, "heading").size + SLACK, along)
+        return f"({own} IS NULL OR {each})" if each and along else each
+
+    def heading_terms(self, index: int, node: Node, bounds: SqlBounds) -> tuple[str, Sequence[Node], str]:
+        """A heading's column, the terms that it is the sum of, and the column of directions that one of them is.
+
+        That one is left out of the terms, as is the ego's heading: the column is then what is left of the heading.
+        """
         own = bounds.columns[index, "heading"]
         assert isinstance(own, str)
         alias = own.removesuffix("heading")
-        terms = _summands(node)
-        fields = [term for term in terms if isinstance(term, DirectionAt)]
-        along = len(fields) == 1 and self._own_direction(fields[0], index)
-        base = own
-        rest = [term for term in terms if not (along and isinstance(term, DirectionAt))]
-        relative = next((term for term in rest if self._is_ego(term, "heading")), None)
+        rest: list[Node] = summands(node)
+        fields = [term for term in rest if isinstance(term, DirectionAt)]
+        along = len(fields) == 1 and self.own_direction(fields[0], index)
+        if along:
+            rest = [term for term in rest if not isinstance(term, DirectionAt)]
+        relative = next((term for term in rest if self.is_ego(term, "heading")), None)
         if relative is not None and index != self.scenario.ego:
-            base, rest = f"{alias}relative_heading", [term for term in rest if term is not relative]
-        width = self.tolerance.of(index, "heading").size + SLACK
-        alternatives = [SQL.known(0.0)]
-        for term in rest:
-            alternatives = [ARITHMETIC.add(total, more) for total in alternatives for more in bounds.intervals(term)]
-        spans: list[tuple[Expr, Expr]] = []
-        for low, high, _ in alternatives:
-            span = _difference(high, low)
-            if (isinstance(span, float) and span + 2 * width >= math.tau) or math.inf in (high, span):
-                return ""
-            spans.append((SQL.plus(low, -width), SQL.plus(span, 2 * width)))
+            own, rest = f"{alias}relative_heading", [term for term in rest if term is not relative]
+        return own, rest, f"{alias}road_directions" if along else ""
 
-        def holds(turned: str) -> str:
-            # from where each span starts
-            angles = [(modulo_turn(number(_difference(turned, start))), span) for start, span in spans]
-            return _sql(any_of([less(angle, span) for angle, span in angles]))
-
-        if not along:
-            return holds(base)
-        directions = f"{alias}road_directions"
-        one, each = holds(f"{base} - {directions}[1]"), holds(f"{base} - d")
-        # most places have one direction, for which arithmetic takes a fraction of what a function of lists does
-        among = (
-            f"CASE WHEN len({directions}) = 1 THEN {one} ELSE len(list_filter({directions}, lambda d: {each})) > 0 END"
-        )
-        return f"({base} IS NULL OR {among})" if each else ""
-
-    def _own_direction(self, node: DirectionAt, index: int) -> bool:
+    def own_direction(self, node: DirectionAt, index: int) -> bool:
+        """Whether an expression is the direction of the road where an object is."""
         field_, point = node.field, node.point
         return (
             isinstance(point, Feature)
@@ -274,7 +280,7 @@ class _Reader:
 
     def requirement(self, root: Node) -> Iterator[tuple[tuple[int, ...], str, str]]:
         """The same for a requirement."""
-        for part in conjuncts(root):
+        for part in conjuncts(in_ego_frame(root, self.scenario.ego)):
             objects = self.involved(part)
             if len(objects) > 2:
                 continue
@@ -287,7 +293,8 @@ class _Reader:
             yield objects, _sql(self.of(objects).can_hold(part)), ""
 
 
-def _difference(a: Expr, b: Expr) -> Expr:
+def difference(a: Expr, b: Expr) -> Expr:
+    """A number less another."""
     return SQL.plus(a, SQL.negative(b))
 
 
@@ -296,10 +303,43 @@ def _sql(condition: str | bool) -> str:
     return condition if isinstance(condition, str) else "" if condition else "false"
 
 
+def turned_within(own: str, alternatives: Sequence[Interval[Expr]], width: float, directions: str = "") -> str:
+    """Whether an angle lies in an interval, or within a width of it; with slack.
+
+    Args:
+        own: The angle.
+        alternatives: The intervals, of which one does.
+        width: In radians.
+        directions: A list of angles, of which one is added to the intervals.
+
+    Returns:
+        SQL, empty where every angle does.
+    """
+    spans: list[tuple[Expr, Expr]] = []
+    for low, high, _ in alternatives:
+        span = difference(high, low)
+        if (isinstance(span, float) and span + 2 * width >= math.tau) or math.inf in (high, span):
+            return ""
+        spans.append((SQL.plus(low, -width), SQL.plus(span, 2 * width)))
+
+    def holds(turned: str) -> str:
+        # from where each span starts
+        angles = [(modulo_turn(number(difference(turned, start))), span) for start, span in spans]
+        return _sql(any_of([less(angle, span) for angle, span in angles]))
+
+    if not directions:
+        return holds(own)
+    one, each = holds(f"{own} - {directions}[1]"), holds(f"{own} - d")
+    if not each:
+        return ""
+    # most places have one direction, for which arithmetic takes a fraction of what a function of lists does
+    return f"CASE WHEN len({directions}) = 1 THEN {one} ELSE len(list_filter({directions}, lambda d: {each})) > 0 END"
+
+
 _MOST_SUMMANDS = 64
 
 
-def _summands(node: Node) -> list[Node]:
+def summands(node: Node) -> list[Node]:
     """The terms of a sum; the sum itself if it has very many: terms that are shared count again and again."""
     found: list[Node] = []
     stack = [node]
@@ -314,7 +354,7 @@ def _summands(node: Node) -> list[Node]:
     return found
 
 
-def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> Iterator[Condition]:
+def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> Iterator[NecessaryCondition]:
     """The necessary conditions of a scenario whose ego is the label's own, in the order of the program.
 
     Args:
@@ -322,22 +362,24 @@ def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> I
         network: The map it was compiled for.
         options: Tolerances.
     """
-    if any(thing.mutated for thing in scenario.objects):
+    if any(owner.mutated for owner in scenario.objects):
         return  # noise of any size hides where things are
-    reader = _Reader(scenario, options.tolerance.for_scenario(scenario), RegionNames.of(network), network.roadDirection)
-    for thing in scenario.objects:
-        named: Mapping[str, Node] = {name: given.value for name, given in thing.properties.items()}
+    reader = ConditionReader(
+        scenario, options.tolerance.for_scenario(scenario), RegionNames.of(network), network.roadDirection
+    )
+    for owner in scenario.objects:
+        named: Mapping[str, Node] = {name: given.value for name, given in owner.properties.items()}
         compared = [name for name in ("position", "heading") if name in named]
-        compared += [name for name in named if thing.properties[name].explicit and name not in compared]
+        compared += [name for name in named if owner.properties[name].explicit and name not in compared]
         for name in compared:
-            what, span = f"{thing.name}.{name}", thing.properties[name].span
-            for objects, sql, region in reader.comparison(thing.index, name, named[name]):
+            what, span = f"{owner.name}.{name}", owner.properties[name].span
+            for objects, sql, region in reader.comparison(owner.index, name, named[name]):
                 if sql or region:
-                    yield Condition(what, objects, sql, span, region)
+                    yield NecessaryCondition(what, objects, sql, span, region)
     for requirement in scenario.requirements:
         if requirement.built_in is not None or requirement.span is None:
             continue
         what = " ".join(requirement.span.text.split())
         for objects, sql, region in reader.requirement(requirement.condition):
             if sql or region:
-                yield Condition(what, objects, sql, requirement.span, region)
+                yield NecessaryCondition(what, objects, sql, requirement.span, region)

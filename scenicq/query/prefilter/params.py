@@ -6,22 +6,22 @@ from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Constant, Node, Select
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
-from scenicq.query.prefilter.conditions import EGO, Condition
-from scenicq.query.prefilter.sql_bounds import Bounds
+from scenicq.query.prefilter.conditions import EGO, NecessaryCondition
+from scenicq.query.prefilter.sql_bounds import SqlBounds
 from scenicq.query.prefilter.sql_ends import any_of, between
 from scenicq.store.sql import sql_text
 
 __all__ = ["param_conditions"]
 
 
-def param_conditions(scenario: Scenario, options: MatchOptions) -> list[Condition]:
+def param_conditions(scenario: Scenario, options: MatchOptions) -> list[NecessaryCondition]:
     """What the parameters that a program sets demand of those of a label, where it has them.
 
     Args:
         scenario: The scenario.
         options: Which parameters are ignored, and the tolerance of numbers.
     """
-    found: list[Condition] = []
+    found: list[NecessaryCondition] = []
     for name, given in scenario.params.items():
         if not given.explicit or name in options.ignore_params or not name.isidentifier():
             continue
@@ -35,11 +35,11 @@ def param_conditions(scenario: Scenario, options: MatchOptions) -> list[Conditio
             sql = any_of(
                 [
                     between(value, limits, options.tolerance.of(PARAMS, name).size)
-                    for limits in Bounds({}).intervals(given.value)
+                    for limits in SqlBounds({}).intervals(given.value)
                 ]
             )
         if isinstance(sql, str):
-            found.append(Condition(f"param {name}", (), sql, given.span))
+            found.append(NecessaryCondition(f"param {name}", (), sql, given.span))
     return found
 
 

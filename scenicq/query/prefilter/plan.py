@@ -9,8 +9,7 @@ ever joined two by two, and only those that are left. A frame that misses a step
 from __future__ import annotations
 
 import itertools
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scenicq.errors import Span
@@ -19,9 +18,11 @@ from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.conditions import EGO, Condition, conditions
+from scenicq.query.prefilter.conditions import EGO, NecessaryCondition, conditions
+from scenicq.query.prefilter.decision import columns_of, decision, new_table
 from scenicq.query.prefilter.params import param_conditions
 from scenicq.query.prefilter.sql_ends import number
+from scenicq.query.prefilter.sufficient import sufficient_conditions
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.sql import sql_text
 
@@ -75,27 +76,35 @@ class Plan:
         stages: How they are decided.
         roles: The objects for which the table `roles` then has a column `r0`, `r1` ...: whether the object in row `row`
             may play them. Empty if every object of a frame must be looked at.
+        decision: SQL that makes the table `decided` of frames that surely match, of those that all stages have left;
+            none where SQL decides nothing, or was not asked to.
     """
 
     map: str
     steps: tuple[Step, ...]
     stages: tuple[Stage, ...]
     roles: tuple[int, ...]
+    decision: tuple[str, ...] = ()
+
+    @property
+    def left(self) -> str:
+        """SQL of the numbers of the frames that all stages have left."""
+        return f"(SELECT f FROM {self.stages[-1].table} WHERE missed IS NULL)"
 
     @property
     def sql(self) -> str:
         """All statements, for people."""
-        return ";\n".join(statement for stage in self.stages for statement in stage.statements)
+        return ";\n".join([*(statement for stage in self.stages for statement in stage.statements), *self.decision])
 
 
 @dataclass(slots=True)
 class _Role:
     """One object's conditions: those on columns of its row, then those on memberships."""
 
-    thing: ScenarioObject
+    owner: ScenarioObject
     classes: str
-    plain: list[Condition]
-    placed: list[Condition]
+    plain: list[NecessaryCondition]
+    placed: list[NecessaryCondition]
     column: str
 
     @property
@@ -146,16 +155,6 @@ def _level(conditions_: Sequence[str], first: int = 0) -> str:
     return f"(CASE {cases} ELSE {first + len(conditions_)} END)::UTINYINT"
 
 
-def _table(name: str, query: str) -> str:
-    return f"CREATE OR REPLACE TEMP TABLE {name} AS {query}"
-
-
-def _columns(alias: str, texts: Iterable[str]) -> list[str]:
-    """The columns of a table that conditions use."""
-    pattern = re.compile(rf"\b{alias}\.(\w+)")
-    return sorted({name for text in texts for name in pattern.findall(text)})
-
-
 def _classes(category: str, options: MatchOptions) -> list[str]:
     return sorted(name for name in subclasses(ROOT) if class_matches(category, name, options.classes))
 
@@ -165,7 +164,7 @@ def _any_of(names: Iterable[str]) -> str:
     return f"a.class IN ({listed})" if listed else "false"
 
 
-def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Plan:
+def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, deciding: bool = False) -> Plan:
     """The prefilter of a scenario, compiled against the map, under the options.
 
     Every step is necessary: a frame that matches misses none of them, and keeps every object that plays a role in some
@@ -175,39 +174,45 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions) -> Pl
         scenario: The scenario.
         network: The map it was compiled against.
         options: Tolerances, classes, radius.
+        deciding: Whether SQL is to say, too, which frames surely match.
     """
     scenario, own_ego = ready(scenario), options.ego == "label"
     found = list(conditions(scenario, network, options)) if own_ego else []
     columns: dict[tuple[str, ...], str] = {}
     roles: list[_Role] = []
-    for thing in scenario.objects:
-        if thing.index != scenario.ego:
-            mine = [each for each in found if each.objects == (thing.index,)]
+    for owner in scenario.objects:
+        if owner.index != scenario.ego:
+            mine = [each for each in found if each.objects == (owner.index,)]
             plain, placed = [each for each in mine if not each.region], [each for each in mine if each.region]
-            classes = _any_of(_classes(thing.category, options))
+            classes = _any_of(_classes(owner.category, options))
             key = (classes, *(each.sql or each.region for each in (*plain, *placed)))
-            roles.append(_Role(thing, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
+            roles.append(_Role(owner, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
     pairs = _pairs(found)
     draft = _Draft()
     _frames(draft, [each for each in found if not each.objects], param_conditions(scenario, options), roles, pairs)
     if roles:
         _objects(draft, roles, pairs, options)
-    placed_table = _regions(draft, [each for each in found if not each.objects and each.region], roles)
+    proofs = sufficient_conditions(scenario, network, options) if deciding else None
+    wanted = list(dict.fromkeys(near for each in proofs or () for _, near in each.places))
+    flags = {near: f"s{place}" for place, near in enumerate(wanted) if any(each.region for each in found)}
+    placed_table = _regions(draft, [each for each in found if not each.objects and each.region], roles, flags)
     if roles and own_ego:
         _distinct(draft, roles, placed_table, pairs)
         for objects, tied in list(pairs.items())[:_MOST_PAIRS]:
             _pair(draft, roles, objects, tied)
-    narrowed = own_ego and not options.exact
+    played = tuple(role.owner.index for role in roles)
+    left = f"(SELECT f FROM {draft.last} WHERE missed IS NULL)"
     return Plan(
         network.name,
         tuple(draft.steps),
         tuple(draft.stages),
-        tuple(role.thing.index for role in roles) if narrowed else (),
+        played if own_ego and not options.exact else (),
+        () if proofs is None else decision(proofs, played, flags, options, tables=(LABELS, OBJECTS), left=left),
     )
 
 
-def _pairs(found: Sequence[Condition]) -> dict[tuple[int, ...], list[Condition]]:
-    pairs: dict[tuple[int, ...], list[Condition]] = {}
+def _pairs(found: Sequence[NecessaryCondition]) -> dict[tuple[int, ...], list[NecessaryCondition]]:
+    pairs: dict[tuple[int, ...], list[NecessaryCondition]] = {}
     for each in found:
         if len(each.objects) == 2:
             pairs.setdefault(each.objects, []).append(each)
@@ -216,21 +221,21 @@ def _pairs(found: Sequence[Condition]) -> dict[tuple[int, ...], list[Condition]]
 
 def _frames(
     draft: _Draft,
-    own: Sequence[Condition],
-    params: Sequence[Condition],
+    own: Sequence[NecessaryCondition],
+    params: Sequence[NecessaryCondition],
     roles: Sequence[_Role],
-    pairs: dict[tuple[int, ...], list[Condition]],
+    pairs: dict[tuple[int, ...], list[NecessaryCondition]],
 ) -> None:
     """What the columns of the frame decide."""
     used = [each.sql for role in roles for each in role.plain] + [each.sql for tied in pairs.values() for each in tied]
-    kept = "".join(f", {EGO}.{name}" for name in _columns(EGO, used))
+    kept = "".join(f", {EGO}.{name}" for name in columns_of(EGO, used))
     blamed = [
         (f"NOT coalesce({each.sql}, true)", draft.step(each.what, each.span))
         for each in (*params, *own)
         if not each.region
     ]
     query = f"SELECT {EGO}.number AS f, {EGO}.frame{kept}, {_case(blamed)} AS missed FROM {LABELS} {EGO}"
-    draft.stages.append(Stage("stage0", (_table("stage0", query),)))
+    draft.stages.append(Stage("stage0", (new_table("stage0", query),)))
 
 
 def _reached(role: _Role, classes: Sequence[str]) -> str:
@@ -240,12 +245,12 @@ def _reached(role: _Role, classes: Sequence[str]) -> str:
 
 
 def _objects(
-    draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[Condition]], options: MatchOptions
+    draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[NecessaryCondition]], options: MatchOptions
 ) -> None:
     """One pass over the objects: how far each comes in each role."""
     own_ego = options.ego == "label"
     tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
-    kept = [f"a.{name}" for name in sorted({*_columns("a", tied), *_columns("b", tied)})]
+    kept = [f"a.{name}" for name in sorted({*columns_of("a", tied), *columns_of("b", tied)})]
     if any(role.placed for role in roles):
         kept.append("a.id")
     distinct = {role.column: role for role in roles}
@@ -264,7 +269,7 @@ def _objects(
         # With any object as the ego, the label's own ego may play another role.
         least = pools[role.classes] - (not own_ego)
         count = counts.setdefault(f"count(*) FILTER ({role.column} >= 1)", f"n{len(counts)}")
-        step = draft.step(f"{role.thing.name}.class", role.thing.span, f"no {role.thing.category}")
+        step = draft.step(f"{role.owner.name}.class", role.owner.span, f"no {role.owner.category}")
         blamed.append((f"coalesce({count}, 0) < {least}", step))
     for role in roles:
         furthest = counts.setdefault(f"max({role.column})", f"n{len(counts)}")
@@ -272,14 +277,19 @@ def _objects(
             blamed.append((f"{furthest} <= {place}", draft.step(each.what, each.span)))
     tallied = ", ".join(f"{sql} AS {name}" for sql, name in counts.items())
     draft.stage(
-        [_table("narrow", narrow)],
+        [new_table("narrow", narrow)],
         blamed,
         f"LEFT JOIN (SELECT f, {tallied} FROM narrow GROUP BY f) t ON t.f = s.f",
     )
 
 
-def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) -> str:
-    """What memberships of regions decide; returns the table of objects and how far they come."""
+def _regions(
+    draft: _Draft, own: Sequence[NecessaryCondition], roles: Sequence[_Role], wanted: Mapping[str, str]
+) -> str:  # fmt: skip
+    """What memberships of regions decide; returns the table of objects and how far they come.
+
+    The table `flags` has a column for each condition that is wanted besides.
+    """
     mine = {each.region: f"e{place}" for place, each in enumerate(own)}
     distinct = {role.column: role for role in roles if role.placed}
     others: dict[str, str] = {}
@@ -288,7 +298,7 @@ def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) ->
             others.setdefault(each.region, f"g{len(others)}")
     if not mine and not others:
         return "narrow"
-    flags = [f"bool_or({sql}) AS {name}" for sql, name in (*mine.items(), *others.items())]
+    flags = [f"bool_or({sql}) AS {name}" for sql, name in (*mine.items(), *others.items(), *wanted.items())]
     left = f"f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)"
     asked = [f"SELECT f, frame, 'ego' AS object FROM stage0 WHERE {left}"] if mine else []
     if others:
@@ -298,7 +308,7 @@ def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) ->
             f"WHERE ({placed}) AND n.{left}"
         )
     statements = [
-        _table(
+        new_table(
             "flags",
             f"SELECT q.f, m.object, {', '.join(flags)} FROM {MEMBERSHIPS} m JOIN ({' UNION ALL '.join(asked)}) q "
             f"ON m.frame = q.frame AND m.object = q.object WHERE {' OR '.join((*mine, *others))} "
@@ -316,7 +326,7 @@ def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) ->
             further = _level([f"coalesce(g.{others[each.region]}, false)" for each in role.placed], role.full)
             raised.append(f"CASE WHEN {name} < {role.full} THEN {name} ELSE {further} END AS {name}")
         statements.append(
-            _table(
+            new_table(
                 "placed",
                 f"SELECT n.* REPLACE ({', '.join(raised)}) FROM narrow n "
                 "LEFT JOIN flags g ON g.f = n.f AND g.object = n.id "
@@ -333,14 +343,14 @@ def _regions(draft: _Draft, own: Sequence[Condition], roles: Sequence[_Role]) ->
 
 
 def _distinct(
-    draft: _Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[Condition]]
+    draft: _Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[NecessaryCondition]]
 ) -> None:
     """Who is left for each role, and whether there are enough of them for any two and for all."""
     tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
-    kept = "".join(f", {name}" for name in sorted({*_columns("a", tied), *_columns("b", tied)}))
+    kept = "".join(f", {name}" for name in sorted({*columns_of("a", tied), *columns_of("b", tied)}))
     flags = [f"{role.column} = {role.full + len(role.placed)}" for role in roles]
     chosen = ", ".join(f"{flag} AS r{place}" for place, flag in enumerate(flags))
-    table = _table(
+    table = new_table(
         "roles",
         f"SELECT f, row{kept}, {chosen} FROM {source} "
         f"WHERE ({' OR '.join(dict.fromkeys(flags))}) AND f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)",
@@ -355,25 +365,25 @@ def _distinct(
     blamed: list[tuple[str, int]] = []
     tally = ""
     if len(roles) > 1:
-        step = draft.step("correspondence", roles[-1].thing.span, "no distinct label objects for all objects")
+        step = draft.step("correspondence", roles[-1].owner.span, "no distinct label objects for all objects")
         blamed = [(f"coalesce(n{place}, 0) < {len(places)}", step) for place, places in enumerate(together)]
         tally = f"LEFT JOIN (SELECT f, {', '.join(counts)} FROM roles GROUP BY f) t ON t.f = s.f"
     draft.stage([table], blamed, tally)
 
 
-def _pair(draft: _Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[Condition]) -> None:
+def _pair(draft: _Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[NecessaryCondition]) -> None:
     """Two roles whose objects conditions tie together: whoever has no partner is out of the role."""
-    one, other = (next(place for place, role in enumerate(roles) if role.thing.index == index) for index in objects)
-    ego = f" JOIN stage0 {EGO} ON {EGO}.f = a.f" if _columns(EGO, [each.sql for each in tied]) else ""
+    one, other = (next(place for place, role in enumerate(roles) if role.owner.index == index) for index in objects)
+    ego = f" JOIN stage0 {EGO} ON {EGO}.f = a.f" if columns_of(EGO, [each.sql for each in tied]) else ""
     level = _level([each.sql for each in tied])
     statements = [
-        _table(
+        new_table(
             "pairs",
             f"SELECT a.f, a.row AS one, b.row AS other, {level} AS level FROM roles a "
             f"JOIN roles b ON a.f = b.f AND a.row <> b.row{ego} WHERE a.r{one} AND b.r{other} "
             f"AND a.f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)",
         ),
-        _table(
+        new_table(
             "roles",
             "SELECT * REPLACE ("
             + ", ".join(

@@ -57,26 +57,34 @@ def near_region(region: Region, names: RegionNames, reach: float) -> str | None:
     Returns:
         SQL; None if the region is not made of elements of the map.
     """
-    match region:
-        case PolygonSet():
-            known = region.ids and all(name in names.elements for name in region.ids)
-            if id(region) in names.kinds:
-                wanted = ", ".join(map(sql_text, names.kinds[id(region)]))
-                chosen = f"kind IN ({wanted})"
-            elif known and len(region.ids) <= _MOST_IDS and len(region.ids) == len(region.polygons):
-                ids = ", ".join(sql_text(names.elements[name]) for name in region.ids)
-                # a subquery is hashed, a list is gone through for every row
-                chosen = f"region IN (SELECT unnest([{ids}]))" if len(region.ids) > _FEW_IDS else f"region IN ({ids})"
-            else:
+    found: list[str] = []
+    todo = [region]
+    while todo:
+        match todo.pop():
+            case PolygonSet() as area:
+                chosen = _chosen(area, names)
+                if chosen is None:
+                    return None
+                found.append(chosen)
+            case UnionOf(parts=parts) if all(id(part) in names.kinds for part in parts):
+                kinds = sorted({kind for part in parts for kind in names.kinds[id(part)]})
+                found.append(f"kind IN ({', '.join(map(sql_text, kinds))})")
+            case UnionOf(parts=parts):
+                todo += reversed(parts)
+            case _:
                 return None
-            return f"({chosen} AND distance <= {number(reach + SLACK)})"
-        case UnionOf() if all(id(part) in names.kinds for part in region.parts):
-            kinds = sorted({kind for part in region.parts for kind in names.kinds[id(part)]})
-            return f"(kind IN ({', '.join(map(sql_text, kinds))}) AND distance <= {number(reach + SLACK)})"
-        case UnionOf():
-            parts = [near_region(part, names, reach) for part in region.parts]
-            if any(part is None for part in parts):
-                return None
-            return "(" + " OR ".join(part for part in parts if part is not None) + ")"
-        case _:
-            return None
+    within = f"distance <= {number(reach + SLACK)}"
+    conditions = [f"({chosen} AND {within})" for chosen in found]
+    return conditions[0] if len(found) == 1 else f"({' OR '.join(conditions)})"
+
+
+def _chosen(area: PolygonSet, names: RegionNames) -> str | None:
+    """The rows of `memberships` that are about an area of the map; None if it is not made of the map's elements."""
+    if id(area) in names.kinds:
+        return f"kind IN ({', '.join(map(sql_text, names.kinds[id(area)]))})"
+    known = area.ids and all(name in names.elements for name in area.ids)
+    if not known or len(area.ids) > _MOST_IDS or len(area.ids) != len(area.polygons):
+        return None
+    ids = ", ".join(sql_text(names.elements[name]) for name in area.ids)
+    # a subquery is hashed, a list is gone through for every row
+    return f"region IN (SELECT unnest([{ids}]))" if len(area.ids) > _FEW_IDS else f"region IN ({ids})"

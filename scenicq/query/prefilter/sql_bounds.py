@@ -15,16 +15,15 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from scenicq.forest.interpret import OnMap, RegionNode, interpret, steps_of
-from scenicq.forest.interval_values import Bounds as Bound
-from scenicq.forest.interval_values import Interval, IntervalVector, Truth
+from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import ArithmeticOp, CompareOp, DiscreteRange, Feature, Leaf, LogicOp, Node, Value
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import SQL, Expr, any_of
 
-__all__ = ["ARITHMETIC", "Bounds", "Columns"]
+__all__ = ["ARITHMETIC", "Columns", "SqlBounds"]
 
-Alternatives: TypeAlias = tuple[Bound[Expr], ...]
+Alternatives: TypeAlias = tuple[IntervalValue[Expr], ...]
 """The value lies in one of them."""
 
 Columns = Mapping[tuple[int, str], str | tuple[str, str]]
@@ -40,7 +39,7 @@ _PLANE = IntervalVector(ARITHMETIC.everything(), ARITHMETIC.everything())
 
 
 @dataclass(slots=True)
-class Bounds:
+class SqlBounds:
     """Bounds of the nodes of one scenario over the columns of some objects.
 
     Attributes:
@@ -77,13 +76,17 @@ class Bounds:
         """SQL that is true wherever a condition can hold; True if it always can."""
         return any_of([each.can_hold if isinstance(each, Truth) else True for each in self._value(root)])
 
+    def can_fail(self, root: Node) -> str | bool:
+        """SQL that is true wherever a condition can fail; True if it always can."""
+        return any_of([each.can_fail if isinstance(each, Truth) else True for each in self._value(root)])
+
     def _value(self, root: Node) -> Alternatives:
         if id(root) not in self._known:
             domain = IntervalDomain(SQL, self._column, slack=SLACK, boxed=False)
             self._known = interpret(steps_of(root), _Alternatives(domain), self._known)
         return self._known[id(root)]
 
-    def _column(self, node: Feature) -> Bound[Expr]:
+    def _column(self, node: Feature) -> IntervalValue[Expr]:
         column = self.columns.get((node.object, node.property))
         if isinstance(column, tuple):
             return IntervalVector(*map(SQL.known, column))
@@ -151,12 +154,12 @@ class _Alternatives:
     def region(self, node: RegionNode, args: Sequence[Alternatives]) -> Alternatives:
         return self._each(lambda *chosen: self.domain.region(node, chosen), args)
 
-    def _each(self, operation: Callable[..., Bound[Expr]], args: Sequence[Alternatives]) -> Alternatives:
+    def _each(self, operation: Callable[..., IntervalValue[Expr]], args: Sequence[Alternatives]) -> Alternatives:
         if math.prod(map(len, args)) > _MOST_ALTERNATIVES**2:
             args = [(self._joined(arg),) for arg in args]
         return self._few([operation(*chosen) for chosen in itertools.product(*args)])
 
-    def _few(self, found: Sequence[Bound[Expr]]) -> Alternatives:
+    def _few(self, found: Sequence[IntervalValue[Expr]]) -> Alternatives:
         """At most so many alternatives, none of them endless to read."""
         kept = list(dict.fromkeys(found))
         if len(kept) > _MOST_ALTERNATIVES:
@@ -168,7 +171,7 @@ class _Alternatives:
             for each in kept
         )  # fmt: skip
 
-    def _joined(self, parts: Sequence[Bound[Expr]]) -> Bound[Expr]:
+    def _joined(self, parts: Sequence[IntervalValue[Expr]]) -> IntervalValue[Expr]:
         """What holds all of some alternatives."""
         return parts[0] if len(parts) == 1 else self.domain.select(None, parts)
 

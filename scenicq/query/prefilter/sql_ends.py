@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from scenicq.forest.interval_ends import FLOATS, Ends
-from scenicq.forest.interval_values import Array, Interval
+from scenicq.forest.interval_values import FloatOrArray, Interval
 from scenicq.geometry.angles import heading_of
 from scenicq.match.tolerance import SLACK
 
@@ -19,7 +19,7 @@ __all__ = ["SQL", "Expr", "all_of", "any_of", "between", "less", "modulo_turn", 
 
 Expr: TypeAlias = float | str
 """A number, or SQL of one."""
-Condition: TypeAlias = str | bool
+SqlTruth: TypeAlias = str | bool
 
 
 def number(value: Expr) -> str:
@@ -113,7 +113,7 @@ class _Sql:
     def turned(self, a: Expr) -> Expr:
         return FLOATS.turned(a) if isinstance(a, float) else f"({a} - 2 * pi() * round(({a}) / (2 * pi())))"
 
-    def at_most(self, a: Expr, b: Expr) -> Condition:
+    def at_most(self, a: Expr, b: Expr) -> SqlTruth:
         if isinstance(a, float) and isinstance(b, float):
             return a <= b
         if a == -math.inf or b == math.inf:
@@ -122,16 +122,16 @@ class _Sql:
             return False
         return f"{number(a)} <= {number(b)}"
 
-    def both(self, a: Condition, b: Condition) -> Condition:
+    def both(self, a: SqlTruth, b: SqlTruth) -> SqlTruth:
         return all_of((a, b))
 
-    def either(self, a: Condition, b: Condition) -> Condition:
+    def either(self, a: SqlTruth, b: SqlTruth) -> SqlTruth:
         return any_of((a, b))
 
-    def negation(self, a: Condition) -> Condition:
+    def negation(self, a: SqlTruth) -> SqlTruth:
         return f"NOT ({a})" if isinstance(a, str) else not a
 
-    def where(self, condition: Condition, a: Expr, b: Expr) -> Expr:
+    def where(self, condition: SqlTruth, a: Expr, b: Expr) -> Expr:
         if not isinstance(condition, str):
             return a if condition else b
         return a if a == b else f"(CASE WHEN {condition} THEN {number(a)} ELSE {number(b)} END)"
@@ -158,17 +158,17 @@ def modulo_turn(text: str) -> str:
     return f"({text} - 2 * pi() * floor(({text}) / (2 * pi())))"
 
 
-def less(a: Expr, b: Expr) -> Condition:
+def less(a: Expr, b: Expr) -> SqlTruth:
     """Whether a value is at most another, with slack."""
     return SQL.at_most(a, SQL.plus(b, SLACK))
 
 
-def between(value: Expr, limits: Interval[Expr], reach: float) -> Condition:
+def between(value: Expr, limits: Interval[Expr], reach: float) -> SqlTruth:
     """Whether a value lies in an interval or within a reach of it."""
     return all_of([less(SQL.plus(limits.low, -reach), value), less(value, SQL.plus(limits.high, reach))])
 
 
-def all_of(parts: Sequence[Array]) -> Condition:
+def all_of(parts: Sequence[FloatOrArray]) -> SqlTruth:
     """Whether all hold."""
     if any(part is False for part in parts):
         return False
@@ -176,7 +176,7 @@ def all_of(parts: Sequence[Array]) -> Condition:
     return f"({' AND '.join(texts)})" if len(texts) > 1 else texts[0] if texts else True
 
 
-def any_of(parts: Sequence[Array]) -> Condition:
+def any_of(parts: Sequence[FloatOrArray]) -> SqlTruth:
     """Whether one holds."""
     if any(part is True for part in parts):
         return True

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from scenicq.errors import Span
 
-__all__ = ["Node"]
+__all__ = ["SyntaxNode"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Node:
+class SyntaxNode:
     """Base of all nodes.
 
     Attributes:

@@ -7,7 +7,7 @@ from types import EllipsisType
 from typing import TYPE_CHECKING, Literal
 
 from scenicq.errors import Span
-from scenicq.syntax.nodes.base import Node
+from scenicq.syntax.nodes.base import SyntaxNode
 
 if TYPE_CHECKING:
     from scenicq.syntax.ast import Expression
@@ -19,10 +19,9 @@ __all__ = [
     "BoolOp",
     "Call",
     "Clause",
-    "Compare",
-    "Comparison",
+    "ComparisonChain",
+    "ComparisonLink",
     "Comprehension",
-    "Constant",
     "Dict",
     "DictComprehension",
     "DictItem",
@@ -30,13 +29,14 @@ __all__ = [
     "IfElse",
     "Lambda",
     "List",
+    "LiteralValue",
     "Name",
     "Parameter",
     "Replacement",
     "Set",
-    "Slice",
     "Starred",
     "Subscript",
+    "SubscriptSlice",
     "Tuple",
     "UnaryOp",
     "UnsupportedExpression",
@@ -45,21 +45,21 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Name(Node):
+class Name(SyntaxNode):
     """A variable: `road`."""
 
     id: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Constant(Node):
+class LiteralValue(SyntaxNode):
     """A literal: `1`, `2.5`, `'text'` (adjacent strings are joined), `b'x'`, `True`, `None`, `...`."""
 
     value: bool | int | float | complex | str | bytes | EllipsisType | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Replacement(Node):
+class Replacement(SyntaxNode):
     """`{value!conversion:format}` in a formatted string; conversion is `r`, `s`, `a` or empty."""
 
     value: Expression
@@ -68,35 +68,35 @@ class Replacement(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FormattedString(Node):
+class FormattedString(SyntaxNode):
     """`f'...'`: text (as string constants) and replacements, in order."""
 
-    parts: tuple[Constant | Replacement, ...]
+    parts: tuple[LiteralValue | Replacement, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tuple(Node):
+class Tuple(SyntaxNode):
     """`a, b`, with or without parentheses (the span includes them); in Scenic 1 `(a, b)` may be an interval."""
 
     items: tuple[Expression, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class List(Node):
+class List(SyntaxNode):
     """`[a, b]`."""
 
     items: tuple[Expression, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Set(Node):
+class Set(SyntaxNode):
     """`{a, b}`."""
 
     items: tuple[Expression, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DictItem(Node):
+class DictItem(SyntaxNode):
     """`key: value`, or `**value` where the key is None."""
 
     key: Expression | None
@@ -104,21 +104,21 @@ class DictItem(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Dict(Node):
+class Dict(SyntaxNode):
     """`{key: value, ...}`."""
 
     items: tuple[DictItem, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Starred(Node):
+class Starred(SyntaxNode):
     """`*value` in a display, a subscript or an assignment's target (calls use `Argument`)."""
 
     value: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UnaryOp(Node):
+class UnaryOp(SyntaxNode):
     """`-x`, `+x`, `~x`, `not x`."""
 
     operator: Literal["-", "+", "~", "not"]
@@ -126,7 +126,7 @@ class UnaryOp(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BinaryOp(Node):
+class BinaryOp(SyntaxNode):
     """Python's arithmetic and bit operators, but for `@` (see `Vector`)."""
 
     operator: Literal["+", "-", "*", "/", "//", "%", "**", "<<", ">>", "&", "|", "^"]
@@ -135,7 +135,7 @@ class BinaryOp(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BoolOp(Node):
+class BoolOp(SyntaxNode):
     """`a and b and c`, or the same with `or`; at least two values."""
 
     operator: Literal["and", "or"]
@@ -143,7 +143,7 @@ class BoolOp(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comparison(Node):
+class ComparisonLink(SyntaxNode):
     """One `operator right` of a chain; Scenic 1's `is in` reads as `in`. The span covers the operator and `right`."""
 
     operator: Literal["==", "!=", "<", "<=", ">", ">=", "in", "not in", "is", "is not"]
@@ -151,15 +151,15 @@ class Comparison(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Compare(Node):
+class ComparisonChain(SyntaxNode):
     """`left op a op b ...`."""
 
     left: Expression
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[ComparisonLink, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class IfElse(Node):
+class IfElse(SyntaxNode):
     """`then if test else otherwise`."""
 
     test: Expression
@@ -168,7 +168,7 @@ class IfElse(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Parameter(Node):
+class Parameter(SyntaxNode):
     """One parameter of a function; the kind says how arguments reach it."""
 
     name: str
@@ -178,7 +178,7 @@ class Parameter(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lambda(Node):
+class Lambda(SyntaxNode):
     """`lambda parameters: body`."""
 
     parameters: tuple[Parameter, ...]
@@ -186,7 +186,7 @@ class Lambda(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Clause(Node):
+class Clause(SyntaxNode):
     """`for target in iterable if condition if condition` of a comprehension."""
 
     target: Expression
@@ -195,7 +195,7 @@ class Clause(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comprehension(Node):
+class Comprehension(SyntaxNode):
     """`[element for ...]`, `{element for ...}`, `(element for ...)`."""
 
     kind: Literal["list", "set", "generator"]
@@ -204,7 +204,7 @@ class Comprehension(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DictComprehension(Node):
+class DictComprehension(SyntaxNode):
     """`{key: value for ...}`."""
 
     key: Expression
@@ -213,7 +213,7 @@ class DictComprehension(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Argument(Node):
+class Argument(SyntaxNode):
     """`value`, `name=value`, `*value` or `**value` in a call or in the bases of a class."""
 
     name: str | None
@@ -222,7 +222,7 @@ class Argument(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Call(Node):
+class Call(SyntaxNode):
     """`function(arguments)`."""
 
     function: Expression
@@ -230,7 +230,7 @@ class Call(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Attribute(Node):
+class Attribute(SyntaxNode):
     """`value.name`."""
 
     value: Expression
@@ -239,7 +239,7 @@ class Attribute(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slice(Node):
+class SubscriptSlice(SyntaxNode):
     """`lower:upper:step` in a subscript."""
 
     lower: Expression | None
@@ -248,7 +248,7 @@ class Slice(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Subscript(Node):
+class Subscript(SyntaxNode):
     """`value[index]`; several indices are a `Tuple`."""
 
     value: Expression
@@ -256,7 +256,7 @@ class Subscript(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Walrus(Node):
+class Walrus(SyntaxNode):
     """`(target := value)`."""
 
     target: Name
@@ -264,7 +264,7 @@ class Walrus(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UnsupportedExpression(Node):
+class UnsupportedExpression(SyntaxNode):
     """Python that no scenario needs: `await x`, `yield x`; construct is the keyword."""
 
     construct: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from scenicq.syntax.nodes.base import Node
+from scenicq.syntax.nodes.base import SyntaxNode
 
 if TYPE_CHECKING:
     from scenicq.syntax.ast import Expression, Specifier
@@ -16,13 +16,13 @@ __all__ = [
     "ApparentHeading",
     "CanSee",
     "Deg",
-    "Distance",
+    "DistanceOperator",
     "DistancePast",
     "FieldAt",
     "Follow",
     "Implies",
     "InitialScenario",
-    "Intersects",
+    "IntersectsOperator",
     "New",
     "OffsetAlong",
     "OffsetBy",
@@ -31,15 +31,15 @@ __all__ = [
     "RelativePosition",
     "RelativeTo",
     "Temporal",
-    "Until",
-    "Vector",
+    "UntilOperator",
+    "VectorOperator",
     "Visible",
     "VisibleFrom",
 ]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class New(Node):
+class New(SyntaxNode):
     """An instance: `new Car at (1, 2)` (3), `Car at 1 @ 2` (1 and 2: `keyword` is false, at least one specifier)."""
 
     cls: Expression
@@ -48,14 +48,14 @@ class New(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Deg(Node):
+class Deg(SyntaxNode):
     """`value deg`."""
 
     value: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Vector(Node):
+class VectorOperator(SyntaxNode):
     """`x @ y`."""
 
     x: Expression
@@ -63,7 +63,7 @@ class Vector(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FieldAt(Node):
+class FieldAt(SyntaxNode):
     """`field at position`."""
 
     field: Expression
@@ -71,7 +71,7 @@ class FieldAt(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RelativeTo(Node):
+class RelativeTo(SyntaxNode):
     """`left relative to right`, of headings, fields or vectors."""
 
     left: Expression
@@ -79,7 +79,7 @@ class RelativeTo(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OffsetBy(Node):
+class OffsetBy(SyntaxNode):
     """`origin offset by offset`."""
 
     origin: Expression
@@ -87,7 +87,7 @@ class OffsetBy(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OffsetAlong(Node):
+class OffsetAlong(SyntaxNode):
     """`origin offset along direction by offset`."""
 
     origin: Expression
@@ -96,7 +96,7 @@ class OffsetAlong(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RelativePosition(Node):
+class RelativePosition(SyntaxNode):
     """`relative position of target [from origin]`; without origin, from the ego (as for all that follow)."""
 
     target: Expression
@@ -104,7 +104,7 @@ class RelativePosition(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RelativeHeading(Node):
+class RelativeHeading(SyntaxNode):
     """`relative heading of target [from origin]`."""
 
     target: Expression
@@ -112,7 +112,7 @@ class RelativeHeading(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ApparentHeading(Node):
+class ApparentHeading(SyntaxNode):
     """`apparent heading of target [from origin]`."""
 
     target: Expression
@@ -120,7 +120,7 @@ class ApparentHeading(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Distance(Node):
+class DistanceOperator(SyntaxNode):
     """`distance [from origin] to target`."""
 
     target: Expression
@@ -128,7 +128,7 @@ class Distance(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DistancePast(Node):
+class DistancePast(SyntaxNode):
     """`distance past target [of origin]`."""
 
     target: Expression
@@ -136,7 +136,7 @@ class DistancePast(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Angle(Node):
+class Angle(SyntaxNode):
     """`angle [from origin] to target`, also spelled `azimuth`."""
 
     target: Expression
@@ -144,7 +144,7 @@ class Angle(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Altitude(Node):
+class Altitude(SyntaxNode):
     """`altitude [from origin] to target`."""
 
     target: Expression
@@ -152,7 +152,7 @@ class Altitude(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CanSee(Node):
+class CanSee(SyntaxNode):
     """`viewer can see target`."""
 
     viewer: Expression
@@ -160,7 +160,7 @@ class CanSee(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Intersects(Node):
+class IntersectsOperator(SyntaxNode):
     """`left intersects right`."""
 
     left: Expression
@@ -168,7 +168,7 @@ class Intersects(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Follow(Node):
+class Follow(SyntaxNode):
     """`follow field [from origin] for distance`."""
 
     field: Expression
@@ -177,7 +177,7 @@ class Follow(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Visible(Node):
+class Visible(SyntaxNode):
     """`visible region`, `not visible region`: the part that the ego sees, or does not."""
 
     region: Expression
@@ -185,7 +185,7 @@ class Visible(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VisibleFrom(Node):
+class VisibleFrom(SyntaxNode):
     """`region visible from viewer`, `region not visible from viewer`."""
 
     region: Expression
@@ -194,7 +194,7 @@ class VisibleFrom(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PartOf(Node):
+class PartOf(SyntaxNode):
     """`front of target`, `front left of target`, ...: a point of the box, oriented along the heading."""
 
     part: str
@@ -202,7 +202,7 @@ class PartOf(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Temporal(Node):
+class Temporal(SyntaxNode):
     """`always x`, `eventually x`, `next x`."""
 
     operator: Literal["always", "eventually", "next"]
@@ -210,7 +210,7 @@ class Temporal(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Until(Node):
+class UntilOperator(SyntaxNode):
     """`left until right`."""
 
     left: Expression
@@ -218,7 +218,7 @@ class Until(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Implies(Node):
+class Implies(SyntaxNode):
     """`left implies right`."""
 
     left: Expression
@@ -226,5 +226,5 @@ class Implies(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class InitialScenario(Node):
+class InitialScenario(SyntaxNode):
     """`initial scenario`: true in the scenario that runs first."""

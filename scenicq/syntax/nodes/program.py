@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from scenicq.errors import Source, Span
-from scenicq.syntax.nodes.base import Node
+from scenicq.syntax.nodes.base import SyntaxNode
 
 if TYPE_CHECKING:
     from scenicq.syntax.ast import Expression, Statement
@@ -17,10 +17,10 @@ __all__ = [
     "DynamicStatement",
     "Evidence",
     "Model",
-    "Module",
     "Mutate",
     "Param",
     "ParamItem",
+    "Program",
     "Require",
     "RequireMonitor",
     "Simulator",
@@ -28,7 +28,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Model(Node):
+class Model(SyntaxNode):
     """`model scenic.domains.driving.model`."""
 
     name: str
@@ -36,7 +36,7 @@ class Model(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ParamItem(Node):
+class ParamItem(SyntaxNode):
     """`name = value` of a `param` statement; the name may have been quoted."""
 
     name: str
@@ -45,14 +45,14 @@ class ParamItem(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Param(Node):
+class Param(SyntaxNode):
     """`param a = 1, b = 2`."""
 
     items: tuple[ParamItem, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Require(Node):
+class Require(SyntaxNode):
     """`require condition`, `require[probability] condition`, each with an optional `as name`."""
 
     condition: Expression
@@ -61,14 +61,14 @@ class Require(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RequireMonitor(Node):
+class RequireMonitor(SyntaxNode):
     """`require monitor M()`."""
 
     monitor: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mutate(Node):
+class Mutate(SyntaxNode):
     """`mutate a, b by scale`; without objects, all."""
 
     objects: tuple[Expression, ...]
@@ -76,14 +76,14 @@ class Mutate(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Simulator(Node):
+class Simulator(SyntaxNode):
     """`simulator S()`."""
 
     value: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DynamicStatement(Node):
+class DynamicStatement(SyntaxNode):
     """What happens over time, skipped with its body but for what ends a run.
 
     Kinds: `terminate when`, `terminate after`, `terminate simulation`, `terminate`, `record`, `record initial`,
@@ -102,7 +102,7 @@ class DynamicStatement(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DynamicDefinition(Node):
+class DynamicDefinition(SyntaxNode):
     """A definition of what happens over time, skipped with its body but for monitors; unnamed blocks have no name.
 
     Kinds: `behavior`, `monitor`, `scenario`, `setup`, `compose`, `precondition`, `invariant`. The span ends with the
@@ -137,7 +137,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Module:
+class Program:
     """A whole program.
 
     Attributes:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from scenicq.errors import Span
-from scenicq.syntax.nodes.base import Node
+from scenicq.syntax.nodes.base import SyntaxNode
 
 if TYPE_CHECKING:
     from scenicq.syntax.ast import Expression
@@ -33,7 +33,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WithSpecifier(Node):
+class WithSpecifier(SyntaxNode):
     """`with property value`."""
 
     property: str
@@ -42,42 +42,42 @@ class WithSpecifier(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AtSpecifier(Node):
+class AtSpecifier(SyntaxNode):
     """`at position`."""
 
     position: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class InSpecifier(Node):
+class InSpecifier(SyntaxNode):
     """`in region`."""
 
     region: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OnSpecifier(Node):
+class OnSpecifier(SyntaxNode):
     """`on region` (Scenic 3: also a vector)."""
 
     region: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ContainedInSpecifier(Node):
+class ContainedInSpecifier(SyntaxNode):
     """`contained in region`."""
 
     region: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OffsetBySpecifier(Node):
+class OffsetBySpecifier(SyntaxNode):
     """`offset by offset`."""
 
     offset: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OffsetAlongSpecifier(Node):
+class OffsetAlongSpecifier(SyntaxNode):
     """`offset along direction by offset`."""
 
     direction: Expression
@@ -85,7 +85,7 @@ class OffsetAlongSpecifier(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BeyondSpecifier(Node):
+class BeyondSpecifier(SyntaxNode):
     """`beyond target by offset [from origin]`."""
 
     target: Expression
@@ -94,21 +94,21 @@ class BeyondSpecifier(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VisibleSpecifier(Node):
+class VisibleSpecifier(SyntaxNode):
     """`visible [from viewer]`."""
 
     viewer: Expression | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NotVisibleSpecifier(Node):
+class NotVisibleSpecifier(SyntaxNode):
     """`not visible [from viewer]`."""
 
     viewer: Expression | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DirectionSpecifier(Node):
+class DirectionSpecifier(SyntaxNode):
     """`left of reference [by distance]`, and `right of`, `ahead of`, `behind`, `above`, `below`."""
 
     direction: Literal["left", "right", "ahead", "behind", "above", "below"]
@@ -117,7 +117,7 @@ class DirectionSpecifier(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FollowingSpecifier(Node):
+class FollowingSpecifier(SyntaxNode):
     """`following field [from origin] for distance`."""
 
     field: Expression
@@ -126,14 +126,14 @@ class FollowingSpecifier(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FacingSpecifier(Node):
+class FacingSpecifier(SyntaxNode):
     """`facing heading`, of a heading or a vector field."""
 
     heading: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FacingTowardSpecifier(Node):
+class FacingTowardSpecifier(SyntaxNode):
     """`facing [directly] toward target`."""
 
     target: Expression
@@ -141,7 +141,7 @@ class FacingTowardSpecifier(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FacingAwayFromSpecifier(Node):
+class FacingAwayFromSpecifier(SyntaxNode):
     """`facing [directly] away from target`."""
 
     target: Expression
@@ -149,7 +149,7 @@ class FacingAwayFromSpecifier(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ApparentlyFacingSpecifier(Node):
+class ApparentlyFacingSpecifier(SyntaxNode):
     """`apparently facing heading [from origin]`."""
 
     heading: Expression
@@ -157,7 +157,7 @@ class ApparentlyFacingSpecifier(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UsingSpecifier(Node):
+class UsingSpecifier(SyntaxNode):
     """`using f(...)`."""
 
     value: Expression

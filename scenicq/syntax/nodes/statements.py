@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from scenicq.errors import Span
-from scenicq.syntax.nodes.base import Node
+from scenicq.syntax.nodes.base import SyntaxNode
 from scenicq.syntax.nodes.expressions import Argument, Name, Parameter
 
 if TYPE_CHECKING:
@@ -45,14 +45,14 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExpressionStatement(Node):
+class ExpressionStatement(SyntaxNode):
     """An expression on its own line."""
 
     value: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Assign(Node):
+class Assign(SyntaxNode):
     """`a = b = value`."""
 
     targets: tuple[Expression, ...]
@@ -60,7 +60,7 @@ class Assign(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AugmentedAssign(Node):
+class AugmentedAssign(SyntaxNode):
     """`target += value`; the operator is without `=`."""
 
     target: Expression
@@ -69,7 +69,7 @@ class AugmentedAssign(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AnnotatedAssign(Node):
+class AnnotatedAssign(SyntaxNode):
     """`target: annotation [= value]`."""
 
     target: Expression
@@ -78,7 +78,7 @@ class AnnotatedAssign(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Branch(Node):
+class Branch(SyntaxNode):
     """`if test: body` or `elif test: body`."""
 
     test: Expression
@@ -86,7 +86,7 @@ class Branch(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class If(Node):
+class If(SyntaxNode):
     """`if`, any number of `elif`, and the body of `else` (empty where there is none)."""
 
     branches: tuple[Branch, ...]
@@ -94,7 +94,7 @@ class If(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class For(Node):
+class For(SyntaxNode):
     """`for target in iterable: body`, with an `else`."""
 
     target: Expression
@@ -104,7 +104,7 @@ class For(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class While(Node):
+class While(SyntaxNode):
     """`while test: body`, with an `else`."""
 
     test: Expression
@@ -113,22 +113,22 @@ class While(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Break(Node):
+class Break(SyntaxNode):
     """`break`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Continue(Node):
+class Continue(SyntaxNode):
     """`continue`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pass(Node):
+class Pass(SyntaxNode):
     """`pass`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FunctionDef(Node):
+class FunctionDef(SyntaxNode):
     """`def name(parameters) -> returns: body`; the span starts at `def`, after the decorators."""
 
     name: str
@@ -140,21 +140,21 @@ class FunctionDef(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Return(Node):
+class Return(SyntaxNode):
     """`return [value]`."""
 
     value: Expression | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Delete(Node):
+class Delete(SyntaxNode):
     """`del a, b`."""
 
     targets: tuple[Expression, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Assert(Node):
+class Assert(SyntaxNode):
     """`assert test [, message]`."""
 
     test: Expression
@@ -162,7 +162,7 @@ class Assert(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Raise(Node):
+class Raise(SyntaxNode):
     """`raise [exception [from cause]]`."""
 
     exception: Expression | None
@@ -170,7 +170,7 @@ class Raise(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExceptHandler(Node):
+class ExceptHandler(SyntaxNode):
     """`except [type [as name]]: body`."""
 
     type: Expression | None
@@ -179,7 +179,7 @@ class ExceptHandler(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Try(Node):
+class Try(SyntaxNode):
     """`try`, `except`, `else`, `finally` (`interrupt when` makes it a `DynamicStatement`)."""
 
     body: tuple[Statement, ...]
@@ -189,7 +189,7 @@ class Try(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WithItem(Node):
+class WithItem(SyntaxNode):
     """`context [as target]`."""
 
     context: Expression
@@ -197,7 +197,7 @@ class WithItem(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WithStatement(Node):
+class WithStatement(SyntaxNode):
     """`with items: body`."""
 
     items: tuple[WithItem, ...]
@@ -205,7 +205,7 @@ class WithStatement(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PropertyDefault(Node):
+class PropertyDefault(SyntaxNode):
     """`name: value` in a class, or `name[additive]: value` with modifiers `additive`, `dynamic`, `final`."""
 
     name: str
@@ -215,7 +215,7 @@ class PropertyDefault(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ClassDef(Node):
+class ClassDef(SyntaxNode):
     """`class name(bases): body`; a property line is a `PropertyDefault`, all else an ordinary statement."""
 
     name: str
@@ -226,7 +226,7 @@ class ClassDef(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ImportAlias(Node):
+class ImportAlias(SyntaxNode):
     """`path [as name]`; the path is dotted in `import`, a single name (or `*`) in `from`."""
 
     path: str
@@ -234,14 +234,14 @@ class ImportAlias(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Import(Node):
+class Import(SyntaxNode):
     """`import a.b as c, d`."""
 
     aliases: tuple[ImportAlias, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ImportFrom(Node):
+class ImportFrom(SyntaxNode):
     """`from ..module import a as b, c`; level counts the leading dots."""
 
     module: str
@@ -250,21 +250,21 @@ class ImportFrom(Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Global(Node):
+class Global(SyntaxNode):
     """`global a, b`."""
 
     names: tuple[Name, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Nonlocal(Node):
+class Nonlocal(SyntaxNode):
     """`nonlocal a, b`."""
 
     names: tuple[Name, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UnsupportedStatement(Node):
+class UnsupportedStatement(SyntaxNode):
     """Python that no scenario needs, skipped with its body: `async def`, `match`; construct is the keyword."""
 
     construct: str

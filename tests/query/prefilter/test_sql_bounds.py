@@ -18,7 +18,7 @@ from test_intervals import observing
 from scenicq.forest import build
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.nodes import Bearing, Compare, CompareOp, DiscreteRange, Feature, Logic, LogicOp, Norm, Undefined
-from scenicq.query.prefilter.sql_bounds import Bounds
+from scenicq.query.prefilter.sql_bounds import SqlBounds
 from scenicq.query.prefilter.sql_ends import number
 
 ROWS = 4
@@ -48,7 +48,7 @@ def test_one_of_the_alternatives_holds_the_value_of_each_row(case, seed):
         names[n, "seen"] = found
         for name in found if isinstance(found, tuple) else (found,):
             columns[name] = rng.uniform(-9, 9, ROWS).tolist()
-    bounds = Bounds(names)
+    bounds = SqlBounds(names)
     boxes, far = bounds.boxes(root), Compare(CompareOp.GT, Norm(root), build.constant(20.0))
     ahead = Compare(CompareOp.LE, Bearing(root), build.constant(1.0))
     conditions = [far, Logic(LogicOp.NOT, (far,)), Logic(LogicOp.AND, (far, ahead))]
@@ -76,7 +76,7 @@ def test_one_of_the_alternatives_holds_the_value_of_each_row(case, seed):
 
 def test_what_a_row_lacks_is_null_and_options_are_alternatives():
     speed = Feature(0, "speed", "scalar")
-    bounds = Bounds({(0, "speed"): "speed"})
+    bounds = SqlBounds({(0, "speed"): "speed"})
     root = build.add(speed, DiscreteRange(build.constant(1.0), build.constant(3.0)))
     found = bounds.intervals(root)
     assert [each.exact for each in found] == [True] * 3

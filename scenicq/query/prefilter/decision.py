@@ -1,0 +1,138 @@
+"""The last step of a plan, where nobody asks for proofs: SQL that names frames which surely match.
+
+It works on the objects that the prefilter has left for each role. Whether there are distinct ones for all roles is told
+by counting (Hall's theorem) where no condition ties two of them together, else by joining them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+import duckdb
+
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import SLACK
+from scenicq.query.prefilter.conditions import EGO
+from scenicq.query.prefilter.sql_ends import number
+from scenicq.query.prefilter.sufficient import SufficientCondition
+
+__all__ = ["columns_of", "decided_frames", "decision", "new_table"]
+
+_DECIDED = "decided"
+
+_MOST_COUNTED, _MOST_JOINED = 6, 3
+"""Roles that may be counted, and that may be joined."""
+
+
+def decision(
+    found: Sequence[SufficientCondition],
+    roles: Sequence[int],
+    flags: Mapping[str, str],
+    options: MatchOptions,
+    *,
+    tables: tuple[str, str],
+    left: str,
+) -> tuple[str, ...]:
+    """Statements that make the table `decided` of the numbers `f` of the frames that surely match.
+
+    Args:
+        found: What proves a match.
+        roles: The object of each column of the table `roles`.
+        flags: The column of the table `flags` for each condition on memberships.
+        options: The radius.
+        tables: The views of frames and of objects.
+        left: SQL of the numbers of the frames that are left.
+
+    Returns:
+        None of them where SQL cannot decide it.
+    """
+    labels, objects = tables
+    ties = [each for each in found if len(each.objects) == 2]
+    if len(roles) > (_MOST_JOINED if ties else _MOST_COUNTED):
+        return ()
+    if any(near not in flags or len(each.objects) == 2 for each in found for _, near in each.places):
+        return ()
+
+    def proved(objects_: tuple[int, ...]) -> list[str]:
+        mine = [each for each in found if each.objects == objects_]
+        placed = [("g" if index in roles else "e", near) for each in mine for index, near in each.places]
+        return [each.sql for each in mine if each.sql] + [f"{alias}.{flags[near]}" for alias, near in placed]
+
+    frames = " AND ".join([f"{EGO}.number IN {left}", *proved(())])
+    ego_flags = f" LEFT JOIN flags e ON e.f = {EGO}.number AND e.object = 'ego'" if flags else ""
+    if not roles:
+        return (new_table(_DECIDED, f"SELECT {EGO}.number AS f FROM {labels} {EGO}{ego_flags} WHERE {frames}"),)
+    near = [] if options.radius is None else [f"a.ego_distance <= {number(options.radius - SLACK)}"]
+    columns = [
+        f"coalesce({' AND '.join([f'r.r{place}', *near, *proved((index,))])}, false) AS s{place}"
+        for place, index in enumerate(roles)
+    ]
+    tied = [each.sql for each in ties]
+    columns += [f"a.{name}" for name in sorted({*columns_of("a", tied), *columns_of("b", tied)})]
+    columns += [f"{EGO}.{name}" for name in columns_of(EGO, tied)]
+    object_flags = " LEFT JOIN flags g ON g.f = r.f AND g.object = a.id" if flags else ""
+    sure = (
+        f"SELECT r.f, r.row, {', '.join(columns)} FROM roles r JOIN {objects} a ON a.number = r.row "
+        f"JOIN {labels} {EGO} ON {EGO}.number = r.f{ego_flags}{object_flags} WHERE {frames}"
+    )
+    return new_table("sure", sure), new_table(_DECIDED, _joined(roles, ties) if ties else _counted(len(roles)))
+
+
+def decided_frames(
+    connection: duckdb.DuckDBPyConnection, statements: Sequence[str], labels: str, left: str
+) -> list[tuple[int, bool, str, str, int]]:
+    """The frames that are left of the block that was sifted last, in order, with whether they surely match.
+
+    Args:
+        connection: The one that sifted.
+        statements: Those of `decision`.
+        labels: The view of frames.
+        left: SQL of the numbers of the frames that are left.
+
+    Returns:
+        Number, whether it surely matches, frame, recording and timestamp of each.
+    """
+    for statement in statements:
+        connection.execute(statement)
+    return connection.execute(
+        f"SELECT number, number IN (SELECT f FROM {_DECIDED}), frame, recording, timestamp_us FROM {labels} "
+        f"WHERE number IN {left} ORDER BY number"
+    ).fetchall()
+
+
+def new_table(name: str, query: str) -> str:
+    """The statement that makes a table in memory."""
+    return f"CREATE OR REPLACE TEMP TABLE {name} AS {query}"
+
+
+def columns_of(alias: str, texts: Iterable[str]) -> list[str]:
+    """The columns of a table that conditions use."""
+    pattern = re.compile(rf"\b{alias}\.(\w+)")
+    return sorted({name for text in texts for name in pattern.findall(text)})
+
+
+def _counted(roles: int) -> str:
+    """The frames in which any number of roles have as many objects among them."""
+    enough = [
+        f"count(*) FILTER ({' OR '.join(f's{place}' for place in chosen)}) >= {size}"
+        for size in range(1, roles + 1)
+        for chosen in itertools.combinations(range(roles), size)
+    ]
+    return f"SELECT f FROM sure GROUP BY f HAVING {' AND '.join(enough)}"
+
+
+def _joined(roles: Sequence[int], ties: Sequence[SufficientCondition]) -> str:
+    """The frames in which distinct objects have all roles, two by two tied together."""
+    tables = ["sure p0"]
+    for place in range(1, len(roles)):
+        apart = [f"p{place}.row <> p{other}.row" for other in range(place)]
+        tables.append(f"JOIN sure p{place} ON p{place}.f = p0.f AND {' AND '.join(apart)}")
+    holds = [f"p{place}.s{place}" for place in range(len(roles))]
+    for each in ties:
+        one, other = (f"p{roles.index(index)}" for index in each.objects)
+        text = re.sub(r"\ba\.", f"{one}.", each.sql)
+        text = re.sub(rf"\b{EGO}\.", f"{one}.", re.sub(r"\bb\.", f"{other}.", text))
+        holds.append(f"({text})")
+    return f"SELECT DISTINCT p0.f FROM {' '.join(tables)} WHERE {' AND '.join(holds)}"

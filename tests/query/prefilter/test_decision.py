@@ -1,0 +1,143 @@
+"""What SQL says surely matches does: the matcher finds a proof for every such frame."""
+
+from __future__ import annotations
+
+import math
+import sys
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from scenicq.compiler.program import compile_scenario
+from scenicq.errors import ScenarioError, Source
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.preprocess import ready
+from scenicq.match.tolerance import EXACT, Tolerance
+from scenicq.match.verdict import Match
+from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.query.prefilter.decision import decided_frames
+from scenicq.query.prefilter.executor import blocks, extents, run_prefilter
+from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
+from scenicq.store.dataset import Dataset
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[2] / "match"))
+from made_up import RANDOM, TIED, made_up
+from nudged_scenes import STREET, dataset_of
+from programs import HEADER, PROGRAMS
+
+OPTIONS = {
+    "default": MatchOptions(),
+    "exact": MatchOptions(tolerance=EXACT),
+    "box": MatchOptions(tolerance=Tolerance(x=0.5, y=0.25, heading=math.radians(10)), classes="coarse", radius=25.0),
+    "wide": MatchOptions(tolerance=Tolerance(position=3.0, heading=math.radians(60))),
+}
+SINGLE: dict[str, str] = {
+    "range": "other = new Car offset by (Range(-6, 6), Range(4, 12))",
+    "ahead": "other = new Car ahead of ego by Range(1, 10)",
+    "twice": "gap = Range(1, 6)\nother = new Car offset by (gap, 2 * gap)",
+    "cancels": "gap = Range(1, 6)\nother = new Car offset by (gap - gap, 8)",
+    "turned": "turn = Range(10, 40) deg\nother = new Car offset by (Range(-6, 6), Range(4, 12)),\n"
+    "    facing turn - turn relative to ego.heading",
+    "shared": "gap = Range(1, 6)\nother = new Car offset by (gap, 9), facing gap * 10 deg relative to ego.heading",
+    "options": "other = new Car offset by (Uniform(-1, 1) * Range(3, 5), Uniform(4, 8, Range(10, 12)))",
+    "steps": "other = new Car offset by (DiscreteRange(-3, 3), 8)",
+    "walker": "other = new Pedestrian on road, facing Range(-90, 90) deg\nrequire (distance to other) < 20",
+    "view": "other = new Car on visible road\nrequire (distance to other) < 12",
+    "slow": "other = new Car on road, with speed Range(0, 2)",
+    "size": "other = new Car ahead of ego by Range(1, 10), with width Range(1.5, 2)",
+    "or": "other = new Car\nrequire (distance to other) < 8 or other.position.x < 0",
+    "hidden": "far = Range(5, 8)\nother = new Car\nrequire (distance to other) < far",
+    "none": "far = Range(8, 5)\nother = new Car offset by (0, far)",
+    "two": "first = new Car on road\nsecond = new Car on road\nthird = new Car on road",
+    "crossing": "first = new Car on road\nsecond = new Car on road\nrequire (distance from first to second) < 9",
+}
+SINGLE = {name: f"ego = new Car\n{text}" for name, text in SINGLE.items()}
+SINGLE["seen"] = (
+    "ego = new Car with visibleDistance 15, with viewAngle 200 deg\nother = new Pedestrian on visible road, facing 3"
+)
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory) -> Dataset:
+    """Scenes of programs, as they are and nudged."""
+    chosen = SINGLE | TIED | {name: PROGRAMS[name] for name in sorted(PROGRAMS)[::3]} | dict(list(RANDOM.items())[:8])
+    return dataset_of(chosen, tmp_path_factory.mktemp("decision"))
+
+
+def plan_of(text: str, options: MatchOptions) -> tuple[Plan, Matcher]:
+    scenario = ready(compile_scenario(Source("test.scenic", HEADER + text), STREET))
+    options = replace(options, timeout_s=20.0)
+    return make_plan(scenario, STREET, options, deciding=True), Matcher(scenario, options)
+
+
+def sure_frames(dataset: Dataset, plan: Plan) -> tuple[list[str], int]:
+    """The frames that surely match, and how many others are left."""
+    with closing(dataset.connect()) as connection:
+        (block,) = blocks(extents(dataset, connection), "street")
+        if not (run_prefilter(dataset, connection, plan, block) < 0).any():
+            return [], 0
+        rows = decided_frames(connection, plan.decision, LABELS, plan.left)
+    return [frame for _, sure, frame, *_ in rows if sure], sum(not sure for _, sure, *_ in rows)
+
+
+def check(dataset: Dataset, text: str, options: MatchOptions) -> tuple[int, int]:
+    """How many frames surely match, each of which the matcher proves, and how many are left open."""
+    try:
+        plan, matcher = plan_of(text, options)
+    except ScenarioError:
+        return 0, 0  # a random program may be wrong
+    if not plan.decision:
+        return 0, 0
+    sure, left = sure_frames(dataset, plan)
+    for label in dataset.labels(sure):
+        assert isinstance(matcher.match(label), Match), label.frame
+    return len(sure), left
+
+
+@pytest.mark.parametrize("options", list(OPTIONS))
+@pytest.mark.parametrize("name", list(SINGLE | TIED))
+def test_what_sql_decides_has_a_proof(dataset, name, options):
+    check(dataset, (SINGLE | TIED)[name], OPTIONS[options])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", list(OPTIONS))
+@pytest.mark.parametrize("name", list(PROGRAMS))
+def test_what_sql_decides_of_programs_has_a_proof(dataset, name, options):
+    check(dataset, PROGRAMS[name], OPTIONS[options])
+
+
+@pytest.mark.parametrize("first", [0, pytest.param(12, marks=pytest.mark.slow)])
+def test_what_sql_decides_of_random_programs_has_a_proof(dataset, first):
+    decided = 0
+    for seed in range(first, 12 if not first else 300):
+        decided += check(dataset, made_up(seed), list(OPTIONS.values())[seed % len(OPTIONS)])[0]
+    assert decided
+
+
+@pytest.mark.parametrize(
+    "name", ["range", "ahead", "options", "steps", "walker", "view", "seen", "slow", "or", "two", "crossing"]
+)
+def test_sql_decides_what_it_can(dataset, name):
+    sure, left = check(dataset, SINGLE[name], OPTIONS["default"])
+    assert 2 * sure > left, (sure, left)
+
+
+@pytest.mark.parametrize("name", ["twice", "cancels", "turned", "shared"])
+def test_a_variable_that_is_used_twice_is_left_to_the_matcher(name):
+    assert not plan_of(SINGLE[name], OPTIONS["default"])[0].decision
+
+
+@pytest.mark.parametrize("name", ["ahead", "view", "crossing", "range"])
+def test_without_proofs_the_same_frames_match(dataset, name):
+    text = HEADER + SINGLE[name]
+    frames: list[list[str]] = []
+    for proofs in (True, False):
+        query = Query(dataset, Source("test.scenic", text), QueryOptions(MatchOptions(), proofs=proofs))
+        frames.append([each.frame for each in query.results() if isinstance(each.verdict, Match)])
+        assert query.funnel.matches == len(frames[-1])
+    assert frames[0] == frames[1] != []
