@@ -39,8 +39,13 @@ __all__ = ["sample"]
     default="",
     help="Built-in requirements that need not hold: visibility, containment, collision.",
 )
-@click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=PATIENCE_S,
-              help="Seconds of the processor for one scene.")
+@click.option(
+    "--timeout",
+    metavar="S",
+    type=click.FloatRange(0, min_open=True),
+    default=PATIENCE_S,
+    help="Seconds of the processor for one scene.",
+)
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
