@@ -14,6 +14,7 @@ import time
 from collections.abc import Generator
 from contextlib import contextmanager
 from contextvars import ContextVar, Token
+from dataclasses import dataclass
 
 __all__ = ["TimeIsUp", "clock", "leave_out", "limited", "look", "uncounted", "waiting"]
 
@@ -22,8 +23,21 @@ class TimeIsUp(Exception):
     """The label has taken all the time that it may; what is not decided stays unknown."""
 
 
-_UNTIL: ContextVar[float] = ContextVar("_UNTIL", default=math.inf)
-"""When the time is up, on the clock of this thread; what solvers took is taken off beforehand."""
+@dataclass(slots=True)
+class _Limit:
+    """When the time of a block is up.
+
+    Attributes:
+        until: On the clock of this thread; what solvers took is taken off beforehand.
+        not_before: By the wall: a thread never works faster than that.
+    """
+
+    until: float = math.inf
+    not_before: float = math.inf
+
+
+_ENDLESS = _Limit()
+_LIMIT: ContextVar[_Limit] = ContextVar("_LIMIT", default=_ENDLESS)
 
 
 _LEFT_OUT: ContextVar[float] = ContextVar("_LEFT_OUT", default=0.0)
@@ -44,7 +58,7 @@ class limited:  # noqa: N801 - read as a statement
     """Let what happens in the block take so long at most, or less where a block around it says so."""
 
     __slots__ = ("_seconds", "_token")
-    _token: Token[float]
+    _token: Token[_Limit]
 
     def __init__(self, seconds: float) -> None:
         """Take the time, which begins with the block.
@@ -56,11 +70,13 @@ class limited:  # noqa: N801 - read as a statement
 
     def __enter__(self) -> None:
         """Set the clock."""
-        self._token = _UNTIL.set(min(_UNTIL.get(), time.thread_time() + self._seconds))
+        outer, used_s = _LIMIT.get().until, time.thread_time()
+        left = min(outer - used_s, self._seconds)
+        self._token = _LIMIT.set(_Limit(used_s + left, time.perf_counter() + left))
 
     def __exit__(self, *_: object) -> None:
         """Go back to the clock of the block around."""
-        _UNTIL.reset(self._token)
+        _LIMIT.reset(self._token)
 
 
 def look() -> None:
@@ -69,8 +85,14 @@ def look() -> None:
     Raises:
         TimeIsUp: The time is used up.
     """
-    if time.thread_time() > _UNTIL.get():
+    limit = _LIMIT.get()
+    # the thread's clock takes ten times as long to read as the wall's
+    if time.perf_counter() <= limit.not_before:
+        return
+    left = limit.until - time.thread_time()
+    if left < 0:
         raise TimeIsUp
+    limit.not_before = time.perf_counter() + left
 
 
 @contextmanager
@@ -84,11 +106,13 @@ def waiting(seconds: float) -> Generator[float]:
         TimeIsUp: Nothing is left.
     """
     look()
-    began = clock()
+    limit, began = _LIMIT.get(), clock()
     try:
-        yield min(seconds, _UNTIL.get() - time.thread_time())
+        yield min(seconds, limit.until - time.thread_time())
     finally:
-        _UNTIL.set(_UNTIL.get() - (clock() - began))
+        waited = clock() - began
+        limit.until -= waited
+        limit.not_before -= waited
 
 
 @contextmanager

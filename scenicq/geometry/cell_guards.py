@@ -22,6 +22,8 @@ __all__ = ["Guard", "Nearer", "Off", "Within", "narrowed", "segment_distances"]
 
 _ROUNDING = 1e-7
 """Metres that a comparison of distances may be off before it excludes a point."""
+_LEAST = float(np.finfo(float).tiny)
+"""What a squared length is divided by at least."""
 
 Segments: TypeAlias = NDArray[np.float64]
 """Rows x0, y0, x1, y1 in metres, shape (n, 4)."""
@@ -60,10 +62,13 @@ Guard: TypeAlias = Nearer | Off | Within
 
 def segment_distances(xy: NDArray[np.float64], segments: Segments) -> NDArray[np.float64]:
     """Distances from points (..., 2) to segments (..., 4), broadcast together."""
-    start, along = segments[..., :2], segments[..., 2:] - segments[..., :2]
-    share = ((xy - start) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), np.finfo(float).tiny)
-    gap = xy - (start + np.clip(share, 0.0, 1.0)[..., None] * along)
-    return np.hypot(gap[..., 0], gap[..., 1])
+    # coordinate by coordinate: sums over an axis of two take most of the time where there are few points
+    x, y, from_x, from_y = xy[..., 0], xy[..., 1], segments[..., 0], segments[..., 1]
+    along_x, along_y = segments[..., 2] - from_x, segments[..., 3] - from_y
+    squares = np.maximum(along_x * along_x + along_y * along_y, _LEAST)
+    share = ((x - from_x) * along_x + (y - from_y) * along_y) / squares
+    share = np.minimum(np.maximum(share, 0.0), 1.0)
+    return np.hypot(x - (from_x + share * along_x), y - (from_y + share * along_y))
 
 
 def narrowed(guards: Sequence[Guard], bounds: Bounds) -> tuple[Guard, ...] | None:

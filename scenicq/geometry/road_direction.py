@@ -39,6 +39,8 @@ _DIGITS = 9
 """Of a radian, to which headings are one."""
 _ONE_HEADING = 1e-6
 """Radians by which a heading that was worked with may be off."""
+_GRID = 0.5
+"""Metres: boxes are grown to a grid of this width where it is remembered whether lanes cover them."""
 _LARGEST, _SMALLEST = 16.0, 2.0
 """Metres: sides of the squares that cover the surroundings of lanes, at first and where they are no longer split."""
 
@@ -250,6 +252,8 @@ class RoadDirection:
         """Squares over what lies off the lanes, split until one heading is left or they are small."""
         # a box without width would count as covered by the lanes that it touches
         west, south, east, north = bounds[0] - _MARGIN, bounds[1] - _MARGIN, bounds[2] + _MARGIN, bounds[3] + _MARGIN
+        if self._on_lanes(west, south, east, north):
+            return []
         columns, rows = (max(1, int(np.ceil(span / _LARGEST))) for span in (east - west, north - south))
         xs, ys = np.linspace(west, east, columns + 1).tolist(), np.linspace(south, north, rows + 1).tolist()
         todo = [(xs[i], ys[j], xs[i + 1], ys[j + 1]) for i in range(columns) for j in range(rows)]
@@ -269,6 +273,26 @@ class RoadDirection:
                 guarded += self._guarded(square, near)
         plain = [(heading, box) for heading, squares in found_in.items() for box in joined_boxes(squares)]
         return [FieldCell(_corners(box), heading, exact=True) for heading, box in plain] + guarded
+
+    @cached_property
+    def _covered(self) -> dict[Bounds, bool]:
+        """Of each box of the grid that was asked for, whether lanes cover it."""
+        return {}
+
+    def _on_lanes(self, west: float, south: float, east: float, north: float) -> bool:
+        """Whether lanes surely cover a box; of large ones nothing is said."""
+        if max(east - west, north - south) > _SMALLEST:
+            return False
+        # thousands of boxes that differ by little are asked for, as points are narrowed
+        low, high = np.floor(np.array((west, south)) / _GRID) * _GRID, np.ceil(np.array((east, north)) / _GRID) * _GRID
+        grown: Bounds = (*low.tolist(), *high.tolist())
+        known = self._covered.get(grown)
+        if known is None:
+            box = shapes.box(*grown)
+            lanes: list[int] = np.sort(shapes.tree_query(self._tree, box)).tolist()
+            known = bool(lanes) and shapes.difference(box, self._union(lanes)).area <= 0
+            self._covered[grown] = known
+        return known
 
     def _near(self, square: Bounds) -> list[_Candidate]:
         """The lanes that may be nearest to a point of a square off the lanes."""

@@ -102,6 +102,9 @@ def tree_pairs_within(
     tree: STRtree, geometries: NDArray[Any], distance: float | NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """All pairs (index of a geometry, index in the tree) within a distance of each other."""
+    if isinstance(distance, float):
+        # what has the shape of the geometries need not be brought to it, which takes longer than a query
+        distance = np.full(geometries.shape, distance)
     found = tree.query(geometries, predicate="dwithin", distance=distance)
     return cast("NDArray[np.intp]", found[0]), cast("NDArray[np.intp]", found[1])
 

@@ -18,9 +18,14 @@ from scenicq.store.labels import Label, LabelObject
 
 @pytest.fixture
 def start(monkeypatch):
-    """Starts a clock of the thread that goes on by ten seconds whenever it is looked at."""
+    """Starts clocks of the thread and of the wall that go on by ten seconds whenever one of them is looked at."""
     ticks = itertools.count(0, 10)
-    return lambda: monkeypatch.setattr(budget.time, "thread_time", lambda: float(next(ticks)))
+
+    def start() -> None:
+        for clock in ("thread_time", "perf_counter"):
+            monkeypatch.setattr(budget.time, clock, lambda: float(next(ticks)))
+
+    return start
 
 
 def _matcher(program: str, solver: object = None, **options: object) -> Matcher:
@@ -66,7 +71,8 @@ def test_an_inner_block_gives_no_more_than_an_outer_one(start):
 
 
 def test_what_a_solver_takes_counts(monkeypatch):
-    now = iter([0.0, 4.0])
+    # the block begins, the solver is asked, begins and ends; then the clock is looked at
+    now = iter([0.0, 0.0, 0.0, 4.0, 4.0])
     monkeypatch.setattr(budget.time, "thread_time", lambda: 0.0)
     monkeypatch.setattr(budget.time, "perf_counter", lambda: next(now))
     with budget.limited(3.0):
@@ -74,6 +80,14 @@ def test_what_a_solver_takes_counts(monkeypatch):
             assert left == 3.0
         with pytest.raises(budget.TimeIsUp):
             budget.look()
+
+
+def test_a_busy_machine_takes_no_time_from_a_block(monkeypatch):
+    wall = itertools.count(0, 100)
+    monkeypatch.setattr(budget.time, "thread_time", lambda: 0.0)
+    monkeypatch.setattr(budget.time, "perf_counter", lambda: float(next(wall)))
+    with budget.limited(3.0):
+        _look_often()
 
 
 @pytest.mark.parametrize("method", ["auto", "smt"])

@@ -36,10 +36,11 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.decide.compiled_expressions import (
     Columns,
     CompiledExpressions,
-    Exact,
+    CompiledVector,
     FloatColumn,
     Form,
     Get,
+    Scalar,
     UnclearError,
     clipped,
     spread,
@@ -266,7 +267,7 @@ def _each(position: Value) -> list[XY]:
 
 def _offset(item: Comparison) -> ClosedForm | None:
     formulas = CompiledExpressions({})
-    steps: list[tuple[bool, Exact]] = []
+    steps: list[tuple[CompiledVector | None, Scalar | None]] = []
     node = item.expression
     while not isinstance(node, VectorOf):
         match node:
@@ -275,10 +276,10 @@ def _offset(item: Comparison) -> ClosedForm | None:
                 known = next(((one, rest) for part, rest in sides if (one := formulas.exact(part))), None)
                 if known is None:
                     return None
-                steps.append((True, known[0]))
+                steps.append((cast(CompiledVector, known[0]), None))
                 node = known[1]
             case Rotate() if (angle := formulas.exact(node.angle)) is not None:
-                steps.append((False, angle))
+                steps.append((None, cast(Scalar, angle)))
                 node = node.vector
             case _:
                 return None
@@ -291,12 +292,12 @@ def _offset(item: Comparison) -> ClosedForm | None:
         px, py = cast(XY, get(index, "position"))
         margin, turn = options.tolerance.of(index, "position"), (1.0, 0.0)
         # into the frame of the offset
-        for shift, exact in steps:
-            if shift:
-                qx, qy = cast(XY, exact(get))
+        for shift, angle in steps:
+            if shift is not None:
+                qx, qy = shift(get)
                 px, py = px - qx, py - qy
-            else:
-                c, s = turned(cast(float, exact(get)))
+            elif angle is not None:
+                c, s = turned(angle(get))
                 px, py = px * c + py * s, py * c - px * s
                 turn = turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s
         a, b = x.known(get), y.known(get)

@@ -109,7 +109,8 @@ def clipped(value: float, low: float, high: float) -> float:
     if isinstance(value, np.ndarray):
         raised = np.where(np.greater(low, value), low, value)
         return cast(float, np.where(np.less(high, raised), high, raised))
-    return min(max(value, low), high)
+    raised = low if low > value else value
+    return high if high < raised else raised
 
 
 @dataclass(frozen=True, slots=True, eq=False)

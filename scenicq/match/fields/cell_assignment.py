@@ -145,6 +145,15 @@ def way_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssign
         else:
             headings[id(node)] = chosen
             memo[id(node)] = Constant(chosen, span=node.span)
+    # most cases fail here, where no expression is rewritten yet
+    pointing: list[tuple[DirectionAt, Bounds, list[FieldCell]]] = []
+    for node in network.choices:
+        near = None if isinstance(node, Index) else _cells(cases, number, node)
+        if near is None or isinstance(node, Index):
+            continue
+        if not near[1]:
+            return None
+        pointing.append((node, *near))
     items = conditioned(network.items, given, memo=memo)
     if any(isinstance(node, Constant) and not holds(c, node.value, seen, network.tolerance) for c, node, seen in items):
         return None
@@ -156,18 +165,12 @@ def way_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssign
     ]
     places: list[Node] = []
     sharp = True
-    for node in network.choices:
-        if isinstance(node, Index):
-            continue
+    for node, box, near in pointing:
         place = condition(condition(node.point, {}, given, memo), {}, None, pinned)
-        options = _cells(cases, number, node, affine_vector(place))
-        if options is None:
-            continue
-        if not options[0]:
-            return None
+        form = affine_vector(place)
         places.append(place)
-        cells.append(options[0])
-        sharp = sharp and options[1]
+        cells.append([[]] if form is None else [_within(form, cell, box) for cell in near])
+        sharp = sharp and form is not None and all(cell.exact for cell in near)
     limits = (-math.inf, math.inf)
     if shared in network.leaves:
         low, high = cases.ranges[shared][:, number].tolist()
@@ -197,30 +200,26 @@ def _pinned(cases: BoxSet, number: int, items: list[Item], cells: list[Alternati
     return pinned
 
 
-def _cells(
-    cases: BoxSet, number: int, node: DirectionAt, place: AffineVector | None
-) -> tuple[Alternative, bool] | None:
-    """Facts of which one set holds where a field points as chosen; None if it does wherever the point can be.
-
-    With them whether it does point so wherever one of the sets holds.
-    """
+def _cells(cases: BoxSet, number: int, node: DirectionAt) -> tuple[Bounds, list[FieldCell]] | None:
+    """The box of a field's point and where in it the field points as chosen; None if it does in all of it."""
     (x0, x1), (y0, y1) = cases.place(node)[:, :, number].tolist()
     box = (x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN)
     heading = float(cases.chosen[id(node)][:, number].mean())
     field = cast(VectorField, cast(Constant, node.field).value)
-    found: Alternative = []
-    sharp = True
+    found: list[FieldCell] = []
     for whole in field.cells_of(heading, box) if isinstance(field, Ranked | RoadDirection) else field.cells(box):
         cell = whole.part(box) if abs(whole.heading - heading) <= SAME and _meets(whole, box) else None
         if cell is None:
             continue
         if cell.exact and _covers(cell, box):
             return None
-        sharp = sharp and cell.exact
-        if place is not None:
-            around = (Row(place[0], box[0], box[2]), Row(place[1], box[1], box[3]))
-            found.append([*inside(place, cell.polygon), *around])
-    return (found, sharp) if place is not None else ([[]], False)
+        found.append(cell)
+    return box, found
+
+
+def _within(place: AffineVector, cell: FieldCell, box: Bounds) -> list[Row]:
+    """What holds of a place in a cell and a box."""
+    return [*inside(place, cell.polygon), Row(place[0], box[0], box[2]), Row(place[1], box[1], box[3])]
 
 
 def _middle(leaf: Leaf, cases: BoxSet, number: int) -> Value:

@@ -28,6 +28,8 @@ __all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position"]
 
 _MOST_CORNERS = 6
 """Random offsets of one position whose box is taken corner by corner."""
+_SIMILAR = 1e-12
+"""How far a matrix may be from a similarity, relative to its scale."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,17 +200,19 @@ def _from_region(
     if not isinstance(leaf.region, Constant):
         return _OPEN
     x, y = (leaf.identity, 0), (leaf.identity, 1)
-    matrix = np.array([[part.terms.get(v, 0.0) for v in (x, y)] for part in form])
-    size = math.sqrt(abs(float(np.linalg.det(matrix))))
-    if size == 0 or not np.allclose(matrix @ matrix.T, size * size * np.eye(2), rtol=1e-12, atol=1e-12):
+    (a, b), (c, d) = rows = [(part.terms.get(x, 0.0), part.terms.get(y, 0.0)) for part in form]
+    area = abs(a * d - b * c)
+    # the rows are orthogonal and of one length
+    residues = abs(a * a + b * b - area), abs(c * c + d * d - area), abs(a * c + b * d)
+    if area == 0 or max(residues) > _SIMILAR * (1 + area):
         return _OPEN
+    matrix, size = np.array(rows), math.sqrt(area)
     shape, radius = margin.around(observed)
     around = np.array(shapely.get_coordinates(shape))
     back = np.linalg.inv(matrix)
     offsets = np.array([_offset(form, scalars, corner) for corner in corners])
     places = ((around[:, None, :] - offsets[None, :, :]).reshape(-1, 2)) @ back.T
-    exact = len(places) == 1 and np.allclose(matrix, np.eye(2)) and not scalars
-    wanted = shapely.Point(places[0]) if exact else shapely.MultiPoint(places).convex_hull
+    wanted = shapely.Point(places[0]) if len(places) == 1 else shapely.MultiPoint(places).convex_hull
     region = cast(Region, leaf.region.value)
     answer = meets(region, wanted, radius / size)
     if not answer:
@@ -252,6 +256,6 @@ def _solve(
             if weight:
                 rest = wanted - columns @ values + column * values[i]
                 values[i] = min(max(float(column @ rest) / weight, low[i]), high[i])
-        if np.allclose(columns @ values, wanted, atol=1e-10):
+        if (abs(columns @ values - wanted) <= 1e-10 + 1e-5 * abs(wanted)).all():
             break
     return fixed | {identity: float(value) for (identity, _), value in zip(scalars, values, strict=True)}

@@ -97,8 +97,11 @@ def _solve(
     margin = len(variables)
     count = margin + strict
     model = highs.HighsLp()
-    starts, indices = [0], list[int]()
-    values, lows, highs_ = list[float](), list[float](), list[float]()
+    starts: list[int] = [0]
+    indices: list[int] = []
+    values: list[float] = []
+    lows: list[float] = []
+    highs_: list[float] = []
     for row in rows:
         sides = [(row.low, row.high, 0.0)]
         if row.strict:

@@ -15,12 +15,18 @@ __all__ = ["observe", "observe_params", "observed_names"]
 def observe(label_object: LabelObject) -> Mapping[str, Value]:
     """The properties that a label object has, by Scenic's names; what the source lacks is left out."""
     seen: dict[str, Value] = {"position": (label_object.x, label_object.y)}
-    for name in ("heading", "width", "length", "height"):
-        value = getattr(label_object, name)
-        if value is not None:
-            seen[name] = float(value)
-    motion = label_object.motion
-    velocity = label_object.velocity if label_object.velocity is not None or motion is None else motion.velocity
+    # one by one: all objects of all labels come here
+    if label_object.heading is not None:
+        seen["heading"] = float(label_object.heading)
+    if label_object.width is not None:
+        seen["width"] = float(label_object.width)
+    if label_object.length is not None:
+        seen["length"] = float(label_object.length)
+    if label_object.height is not None:
+        seen["height"] = float(label_object.height)
+    velocity, motion = label_object.velocity, label_object.motion
+    if velocity is None and motion is not None:
+        velocity = motion.velocity
     if velocity is not None:
         seen["velocity"] = (float(velocity[0]), float(velocity[1]))
         seen["speed"] = math.hypot(*velocity)

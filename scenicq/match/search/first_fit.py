@@ -40,6 +40,20 @@ _SCALARS = frozenset({"heading", "width", "length", "height"})
 T = TypeVar("T")
 Values: TypeAlias = "Value | FloatColumn | list[Value]"
 """Of many labels: one each, or the one that all have."""
+RowTruth: TypeAlias = "bool | list[bool]"
+"""Of many labels likewise."""
+
+
+class _Observed(dict[int, Mapping[str, Value]]):
+    """What is observed of the objects of a label, by their numbers; worked out when it is first asked for."""
+
+    def __init__(self, label: Label) -> None:
+        super().__init__()
+        self.label = label
+
+    def __missing__(self, number: int) -> Mapping[str, Value]:
+        seen = self[number] = observe(_label_object(self.label, number))
+        return seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,23 +64,17 @@ class LabelRow:
         number: Its number among the labels that were asked about.
         label: The label.
         candidates: Who may play whom.
+        observed: What is observed of each label object, by its number.
     """
 
     number: int
     label: Label
     candidates: Candidates
-    _seen: dict[int, Mapping[str, Value]] = field(default_factory=dict["int", "Mapping[str, Value]"])
+    observed: _Observed = field(init=False)
 
-    def label_object(self, number: int) -> LabelObject:
-        """The label object of a number; 0 is the label's ego."""
-        return self.label.objects[number - 1] if number else self.label.ego
-
-    def observed(self, number: int) -> Mapping[str, Value]:
-        """What is observed of it."""
-        seen = self._seen.get(number)
-        if seen is None:
-            seen = self._seen[number] = observe(self.label_object(number))
-        return seen
+    def __post_init__(self) -> None:
+        """Nothing is observed yet."""
+        object.__setattr__(self, "observed", _Observed(self.label))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,11 +130,11 @@ class FirstFit:
             depth = len(batch.numbers[0])
             for group in self.due[depth - 1]:
                 holds, fails = batch.decide(group, options, lookups)
-                if all(holds):
+                if holds is True:
                     continue
-                if any(fails):
+                if fails is not False:
                     todo += batch.where(fails).with_next_candidate()
-                if not any(holds):
+                if holds is False:
                     break
                 batch = batch.where(holds)
             else:
@@ -158,26 +166,24 @@ class _Batch:
     decisions: int = 0
     columns: Columns | None = None
 
-    def decide(
-        self, group: GroupPlan, options: MatchOptions, lookups: MapLookups
-    ) -> tuple[Sequence[bool], Sequence[bool]]:
+    def decide(self, group: GroupPlan, options: MatchOptions, lookups: MapLookups) -> tuple[RowTruth, RowTruth]:
         """For which labels a group surely holds, and for which it surely fails; keeps the witness."""
         form, size = group.closed_form, len(self.rows)
         assert form is not None
         self.decisions += 1
         if self.decisions > self.fit.most_decisions:
-            return [False] * size, [False] * size
+            return False, False
         if size == 1:
             holds, fails, self.values[group] = form.evaluate_one(self._get(0), options, lookups)
-            return [cast(bool, holds)], [cast(bool, fails)]
+            return cast(bool, holds), cast(bool, fails)
         if self.columns is None:
             self.columns = Columns(size, self._column)
         holds, fails, self.values[group] = form.evaluate_many(self._get, self.columns, options, lookups)
-        return _listed(holds, size), _listed(fails, size)
+        return _alike(_listed(holds, size)), _alike(_listed(fails, size))
 
-    def where(self, kept: Sequence[bool]) -> _Batch:
+    def where(self, kept: RowTruth) -> _Batch:
         """The labels of which something is true: at least one."""
-        if all(kept):
+        if isinstance(kept, bool):
             return self
         mask = np.array(kept, dtype=bool)
         values: dict[GroupPlan, Mapping[Identity, Values]] = {
@@ -197,35 +203,33 @@ class _Batch:
             # the columns of the roles before stay what they are
             self.numbers = numbers
             return [self]
-        found = self.where([not each for each in numbers]).with_next_candidate()
+        found = self.where(_alike([not each for each in numbers])).with_next_candidate()
         if any(numbers):
-            batch = self.where([bool(each) for each in numbers])
+            batch = self.where(_alike([bool(each) for each in numbers]))
             batch.numbers = [each for each in numbers if each]
             found.append(batch)
         return found
 
     def with_next_candidate(self) -> list[_Batch]:
         """The labels with the next free candidate for the newest role that has one left, by how many are filled."""
-        numbers = [self._next(row, taken) for row, taken in zip(self.rows, self.numbers, strict=True)]
+        order = self.fit.order
+        numbers = [_following(order, row.candidates, taken) for row, taken in zip(self.rows, self.numbers, strict=True)]
+        lengths = _alike([*map(len, numbers)])
+        if isinstance(lengths, int):
+            self.numbers, self.columns = numbers, None
+            return [self] if lengths else []
         found: list[_Batch] = []
-        for length in sorted({len(each) for each in numbers} - {0}):
-            batch = self.where([len(each) == length for each in numbers])
+        for length in sorted({*lengths} - {0}):
+            batch = self.where([each == length for each in lengths])
             batch.numbers, batch.columns = [each for each in numbers if len(each) == length], None
             found.append(batch)
         return found
 
-    def _next(self, row: LabelRow, numbers: tuple[int, ...]) -> tuple[int, ...]:
-        """Who plays the objects next; nobody, if all has been tried."""
-        for length in range(len(numbers) - 1, 0, -1):
-            options = row.candidates[self.fit.order[length]]
-            following = _with_first_free(numbers[:length], options[options.index(numbers[length]) + 1 :])
-            if following:
-                return following
-        return ()
-
     def filled(self) -> FilledBatch:
         """The labels with their witnesses."""
-        size, variables, columns = len(self.rows), list[Leaf](), list[Sequence[Value]]()
+        size = len(self.rows)
+        variables: list[Leaf] = []
+        columns: list[Sequence[Value]] = []
         for group in self.fit.plan.groups:
             found = self.values[group]
             for leaf in group.group.variables if found else ():
@@ -240,14 +244,15 @@ class _Batch:
         observed, numbers, ranks = self.rows[number].observed, self.numbers[number], self.fit.ranks
 
         def get(index: int, name: str) -> Value:
-            return observed(numbers[ranks[index]])[name]
+            return observed[numbers[ranks[index]]][name]
 
         return get
 
     def _column(self, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
         """The values of a property of the label objects that play an object."""
         rank = self.fit.ranks[index]
-        objects = [row.label_object(numbers[rank]) for row, numbers in zip(self.rows, self.numbers, strict=True)]
+        playing = zip(self.rows, self.numbers, strict=True)
+        objects = [_label_object(row.label, numbers[rank]) for row, numbers in playing]
         if name == "position":
             return np.array([each.x for each in objects]), np.array([each.y for each in objects])
         if name in _SCALARS:
@@ -255,11 +260,25 @@ class _Batch:
         raise UnclearError
 
 
+def _label_object(label: Label, number: int) -> LabelObject:
+    """The label object of a number; 0 is the label's ego."""
+    return label.objects[number - 1] if number else label.ego
+
+
+def _following(order: Sequence[int], candidates: Candidates, numbers: tuple[int, ...]) -> tuple[int, ...]:
+    """Who plays the first objects of an order next, after some have; nobody, if all has been tried."""
+    for length in range(len(numbers) - 1, 0, -1):
+        options, taken = candidates[order[length]], numbers[:length]
+        for one in options[options.index(numbers[length]) + 1 :]:
+            if one not in taken:
+                return (*taken, one)
+    return ()
+
+
 def _with_first_free(taken: tuple[int, ...], options: Sequence[int]) -> tuple[int, ...]:
     """Those who play objects and the first of some who does not; nobody, if all of them do."""
-    used = set(taken)
     for one in options:
-        if one not in used:
+        if one not in taken:
             return (*taken, one)
     return ()
 
@@ -269,6 +288,11 @@ def _kept(values: Values, mask: NDArray[np.bool_], kept: Sequence[bool]) -> Floa
     return (
         values[mask] if isinstance(values, np.ndarray) else list(itertools.compress(_listed(values, len(kept)), kept))
     )
+
+
+def _alike(values: list[T]) -> T | list[T]:
+    """The same, as one value where all have it."""
+    return values[0] if values.count(values[0]) == len(values) else values
 
 
 def _listed(values: FloatColumn | Sequence[T] | T, size: int) -> list[T]:
@@ -295,11 +319,12 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
     objects = label.objects
     numbers = {number for index, numbers in among.items() if index != ego for number in numbers}
     wanted = _union(relevant)
-    seen = {number: observed_names(objects[number - 1]) & wanted for number in numbers}
-    params = frozenset(observe_params(label)) if label.params else frozenset[str]()
+    seen = {number: observed_names(objects[number - 1]) for number in numbers}
+    known = {names & wanted for names in {*seen.values()}}
+    params: frozenset[str] = frozenset(observe_params(label)) if label.params else frozenset()
     own = observed_names(label.ego) & wanted
-    if len(set(seen.values())) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
-        return _signature(relevant, ego, own, next(iter(seen.values())), params)
+    if len(known) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
+        return _signature(relevant, ego, own, next(iter(known)), params)
     kinds: list[frozenset[str]] = []
     for index, names in enumerate(relevant):
         if index == ego:

@@ -53,7 +53,8 @@ class PlanCache:
             labels: Labels, each with what is known of who may play whom.
             given: Ids of label objects that are known to play objects, by the objects' names.
         """
-        options, found = self.options, dict[FirstFit, list[LabelRow]]()
+        options = self.options
+        found: dict[FirstFit, list[LabelRow]] = {}
         if options.method != "auto" or options.exact or options.ego != "label":
             return found
         for number, (label, among) in enumerate(labels):
