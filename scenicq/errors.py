@@ -68,7 +68,7 @@ CODES: dict[str, str] = {
     "target-busy": "another run writes to the target",
     "target-unwritable": "the target cannot be written",
     "resources-exhausted": "the system gives no more memory, files or processes",
-    "deadline-passed": "the time that a run may take was over before all frames were decided",
+    "deadline-passed": "the time that a run may take was over before all frames were decided, or a scene drawn",
     "predictions-invalid": "a predicted box has a value that makes no sense",
     "predictions-duplicate": "a predicted box or frame is there more than once",
     "predictions-missing": "a frame of the dataset has no predictions",
