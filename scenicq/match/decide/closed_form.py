@@ -167,15 +167,12 @@ def closed_form_of(group: Group, ego: int) -> ClosedForm | None:
     if len(group.constraints) != 1:
         return None
     item = group.constraints[0]
-    node = item.expression
-    found: ClosedForm | None = None
     if isinstance(item, Condition):
-        found = _condition(item)
-    elif item.object != PARAMS and item.property == "position":
-        found = _point(item, node, ego) if isinstance(node, PointIn) else _known_position(item) or _offset(item)
-    elif item.object != PARAMS and item.property == "heading":
-        found = _heading(item)
-    return found
+        return _condition(item)
+    if item.object != PARAMS and item.property == "position":
+        node = item.expression
+        return _point(item, node, ego) if isinstance(node, PointIn) else _known_position(item) or _offset(item)
+    return _heading(item) if item.object != PARAMS and item.property == "heading" else None
 
 
 def _condition(item: Condition) -> ClosedForm | None:
@@ -395,10 +392,9 @@ def _turn(angle: float, allowed: Sequence[float], half: float, sure: float) -> f
 
 def _asks_for_roads(node: DirectionAt) -> bool:
     """Whether a field is asked for the direction of roads at an observed position."""
-    field_, point = node.field, node.point
     return (
-        isinstance(field_, Constant)
-        and isinstance(field_.value, RoadDirection)
-        and isinstance(point, Feature)
-        and point.property == "position"
+        isinstance(node.field, Constant)
+        and isinstance(node.field.value, RoadDirection)
+        and isinstance(node.point, Feature)
+        and node.point.property == "position"
     )
