@@ -17,7 +17,7 @@ import click
 
 from scenicq import __version__
 from scenicq.errors import Diagnostic, ScenicqError
-from scenicq.garbage import seldom_collected
+from scenicq.garbage import seldom_collected, without_collector
 
 from .failures import refused_by_system
 from .interrupts import Interrupts
@@ -66,7 +66,8 @@ class Commands(click.Group):
         """Import a subcommand."""
         if cmd_name not in COMMANDS:
             return None
-        module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
+        with without_collector():
+            module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
         seldom_collected()
         command: click.Command = getattr(module, cmd_name)
         return command

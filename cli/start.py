@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 
@@ -32,6 +33,9 @@ def main() -> None:
         _end("interrupted", _INTERRUPTED)
     except BaseException as error:  # noqa: BLE001 - Python would exit with 1
         _end(_line(error), _ERROR)
+    finally:
+        # the system takes back all memory at once: Python need not look for cycles in it
+        gc.freeze()
 
 
 def _fill_streams() -> None:
