@@ -15,6 +15,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.annotations import Annotations, Frames, read_annotations
 from scenicq.evaluate.assignment import Centres, assign, find_pairs
 from scenicq.evaluate.ego_poses import EgoPoses
+from scenicq.evaluate.frame_of_reference import check_distance, check_fit
 from scenicq.evaluate.precision import ERRORS, Errors, box_errors
 from scenicq.evaluate.region_of_interest import RegionOfInterest
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions, Protocol
@@ -35,8 +36,6 @@ ERRORS_AT_M = 2.0
 
 _AT_ONCE = 200_000
 """Boxes that are compared at once: what lies between takes ten times their memory."""
-_ABSURD_M = 300.0
-"""No sensor sees so far: boxes whose median distance from the ego is larger are in another frame of reference."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +101,7 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
     if of_ego:
         predictions = _on_map(predictions, frame, frames, poses)
     spatial = protocol.spatial and _in_space(predictions, objects, frames)
-    _check_frame_of_reference(predictions, frame, frames)
+    check_distance(predictions, frame, frames)
     classes, object_class, prediction_class = _classes(objects, predictions)
     object_class = np.where(covered[objects.frame], object_class, -1).astype(np.int32)
     keep = np.ones(len(frame), dtype=np.bool_)
@@ -123,6 +122,10 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
         order = order[roi.holds(predictions.taken(order), frame[order])]
     predictions, frame, prediction_class = predictions.taken(order), frame[order], prediction_class[order]
     owner = _owners(predictions, frame, prediction_class, objects, object_class, spatial=spatial)
+    counted = np.flatnonzero(object_class >= 0)
+    labels = _centres(objects, counted, objects.frame, object_class[counted], spatial=False)
+    boxes = Centres(frame, prediction_class, predictions.x, predictions.y)
+    check_fit(predictions.name, boxes, owner[max(THRESHOLDS_M)], labels, poses, of_ego=of_ego)
     score: dict[float, Reals] = {}
     for threshold, mine in owner.items():
         score[threshold] = np.full(len(objects.frame), -math.inf)
@@ -205,15 +208,6 @@ def _in_space(predictions: Predictions, objects: Annotations, frames: Frames) ->
     """Whether all heights are known."""
     columns = (predictions.z, objects.z, frames.ego_z, frames.ego_pitch, frames.ego_roll)
     return all(bool(np.isfinite(values).all()) for values in columns)
-
-
-def _check_frame_of_reference(predictions: Predictions, frame: Numbers, frames: Frames) -> None:
-    if len(frame):
-        away = float(np.median(np.hypot(predictions.x - frames.ego_x[frame], predictions.y - frames.ego_y[frame])))
-        if away > _ABSURD_M:
-            message = f"{predictions.name}: half of the boxes lie more than {away:,.0f} m from the ego of their frame"
-            hint = "nuScenes and interchange: the frame of the map; Argoverse 2: the frame of the ego at that time"
-            raise DataError(Diagnostic("predictions-frame", message, hints=(hint,)))
 
 
 def _classes(objects: Annotations, predictions: Predictions) -> tuple[list[str], Numbers, Numbers]:

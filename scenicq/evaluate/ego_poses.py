@@ -51,6 +51,12 @@ class EgoPoses:
         x, y, z = self._origin[:, frame] + self.turned(frame, ahead, left, up)
         return x, y, z
 
+    def seen(self, frame: Numbers, x: Reals, y: Reals) -> tuple[Reals, Reals]:
+        """How far ahead and to the left of the origins places of the map lie, in the plane."""
+        dx, dy = x - self._origin[0, frame], y - self._origin[1, frame]
+        ahead, left = (dx * axis[0, frame] + dy * axis[1, frame] for axis in (self._ahead, self._left))
+        return ahead, left
+
     def turned(self, frame: Numbers, ahead: Reals, left: Reals, up: Reals) -> Reals:
         """Directions of the egos' frames in that of the map, shape (3, n)."""
         return ahead * self._ahead[:, frame] + left * self._left[:, frame] + up * self._up[:, frame]

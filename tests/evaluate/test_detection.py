@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -115,3 +116,39 @@ def test_datasets_and_files_may_be_empty(tmp_path: Path, most: int, count: int, 
         assert (one.matching, one.other) == (len(given), len(names) - len(given))
         assert 0 <= one.all_objects.share.missed <= one.all_objects.share.of
         assert one.all_objects.sentence
+
+
+@pytest.mark.parametrize("of_ego", [False, True])
+def test_boxes_of_the_other_frame_of_reference_are_refused(tmp_path: Path, *, of_ego: bool) -> None:
+    """Near the origin of a map the distance from the ego says nothing; where the boxes fit does."""
+    rng = np.random.default_rng(4)
+    labels, on_map, seen = [], [], []
+    for frame in range(12):
+        turn = 0.4 * frame - 2
+        ego = LabelObject("ego", "Car", "car", 100.0 - 15 * frame, 60.0, turn)
+        away = rng.uniform(-40, 40, (4, 2))
+        objects = [
+            LabelObject(f"o{number}", "Car", "car", ego.x + dx, ego.y + dy, 0.0, 2.0, 4.0)
+            for number, (dx, dy) in enumerate(away.tolist())
+        ]
+        labels.append(Label(f"r/{frame:02}", "r", frame, "none", ego, tuple(objects)))
+        on_map += [(each.x, each.y) for each in objects]
+        ahead, left = (-math.sin(turn), math.cos(turn)), (-math.cos(turn), -math.sin(turn))
+        seen += [(float(each @ ahead), float(each @ left)) for each in away]
+    write_dataset(tmp_path / "d", [Recording("r", "none", tuple(labels))], {}, name="d")
+    dataset = open_dataset(tmp_path / "d")
+    plain = boxes([label.frame for label in labels], rng, 48)
+    frame = np.repeat(np.arange(12), 4).astype(np.int32)
+    placed = {
+        which: replace(plain, frame=frame, category=np.zeros(48, dtype=np.int32), x=np.array(at)[:, 0],
+                       y=np.array(at)[:, 1], of_ego=of_ego)
+        for which, at in (("map", on_map), ("ego", seen))
+    }  # fmt: skip
+    right, wrong = ("ego", "map") if of_ego else ("map", "ego")
+    assert (detect(dataset, placed[right]).owner[0.5] >= 0).all()
+    with pytest.raises(DataError, match=f"were they in the frame of the {wrong}") as refused:
+        detect(dataset, placed[wrong])
+    assert refused.value.diagnostics[0].code == "predictions-frame"
+    # a model that finds nothing is no mistake of the file
+    lost = replace(placed[right], x=placed[right].x + 200.0)
+    assert (detect(dataset, lost).owner[4.0] < 0).mean() > 0.9
