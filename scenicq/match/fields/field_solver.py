@@ -51,9 +51,9 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
         tolerance: Per feature.
     """
     start = BoxSet.start(ConstraintNetwork([item for part in parts for item in part], tolerance), {}).narrowed()
-    if not start.size:
+    if not start.size and len(parts) == 1:
         return Refuted(parts[0][0][0])
-    witness = probed(start, tolerance)
+    witness = probed(start, tolerance) if start.size else None
     if witness is not None:
         return witness
     if shared is None or len(parts) == 1:
