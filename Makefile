@@ -88,6 +88,7 @@ fuzz: $(READY) ## Attack with hostile programs, datasets, sources and kills, MIN
 
 MUTATIONS ?= 200
 mutate: $(READY) ## Change the code in MUTATIONS=200 small ways and count which the fast tests notice
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev,mutation]'
 	$(BIN)/python tests/mutation/mutate.py --count $(MUTATIONS) --seed $(SEED)
 
 browser: ## Install the Chromium that the tests of reports are driven in, where the system has it

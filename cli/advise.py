@@ -12,7 +12,7 @@ from scenicq.query.execution.run import Query
 from .report import columns, count, plain
 
 if TYPE_CHECKING:  # takes long to load
-    from scenicq.query.explain.advice import Outlook
+    from scenicq.query.explain.advice import Outlook, ProgramChange
 
 __all__ = ["advise", "is_nearly_empty"]
 
@@ -49,19 +49,28 @@ def advise(query: Query, *, asked: bool) -> None:
     if found.first:
         what, frames = found.first[0]
         lines[0] += f"; {frames:,} fail first at `{plain(what)}`"
+    none = "no single change leaves a frame" if found.complete else "no change that was tried leaves a frame"
     if found.outlooks:
-        lines.append("with one change there would be:")
+        two = bool(found.outlooks[0].change.both)
+        lines.append(f"{none}; with two there would be:" if two else "with one change there would be:")
         shown = found.outlooks if asked else found.outlooks[:_LINES]
-        rows = [(_number(each), each.change.told, f"line {line}" if (line := _line(each)) else "") for each in shown]
-        lines += columns(rows, right=frozenset({0}))
+        rows = [(_number(each), each.change.told, _place(each.change)) for each in shown]
+        lines += columns(list(dict.fromkeys(rows)), right=frozenset({0}))
     else:
-        lines.append("no single change leaves a frame" if found.complete else "no change that was tried leaves a frame")
+        lines.append(none)
+    lines += [f"  = hint: {hint}" for hint in found.hints]
     if not asked:
         lines.append("  = hint: `--near 3` shows the frames that come closest"
                      + ("" if found.complete else ", `--advise` tries all changes"))  # fmt: skip
     click.echo("\n".join(lines), err=True)
 
 
-def _line(outlook: Outlook) -> int:
-    span = outlook.change.span
-    return 0 if span is None or span.source.name.startswith("<") else span.source.position(span.start)[0]
+def _place(change: ProgramChange) -> str:
+    """The lines that a change concerns, and what to write there."""
+    told: list[str] = []
+    for each in change.both or (change,):
+        span = each.span
+        if span is not None and not (span.source.name.startswith("<") and span.source.name.endswith(".scenic>")):
+            line = f"line {span.source.position(span.start)[0]}"
+            told.append(f"{line}: `{each.written}`" if each.written else line)
+    return ", ".join(dict.fromkeys(told))

@@ -20,7 +20,7 @@ from scenicq.lint.program import lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import ready
-from scenicq.query.execution.compiled_map import program_network, read_network
+from scenicq.query.execution.compiled_map import about_dataset, program_network, read_network
 from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.option_texts import VERSIONS
 from scenicq.query.execution.run import beside
@@ -135,6 +135,8 @@ def _found(
                 source, network, version=version, initial=initial, behaviors="ignore", loader=loader
             )
         except ScenarioError as error:
+            if asked.dataset is not None:
+                error = about_dataset(error, asked.dataset, network.name)
             codes = {diagnostic.code for diagnostic in error.diagnostics}
             (lacking if codes == {"map-lacks"} else errors).extend(error.diagnostics)
             continue
@@ -149,7 +151,8 @@ def _found(
             remarks = [*coverage(asked.dataset, scenarios, asked.options).warnings, *remarks]
         rest += [replace(each, severity="error") for each in remarks] if asked.strict else remarks
     else:
-        errors += lacking
+        # maps that all lack the same need not all be told
+        errors += {each.span: each for each in reversed(lacking)}.values()
     return lines, list(dict.fromkeys([*errors, *rest]))
 
 

@@ -58,8 +58,8 @@ _EXTENSIONS = {".json": "json"}
               "interchange format whose objects have a `score` (.jsonl or .parquet).")
 @click.option("--distance", metavar="M", type=click.Choice(["0.5", "1", "2", "4"]), default="2",
               help="Centre distance within which an object counts as found.")
-@click.option("--min-score", "least_score", metavar="S", type=float, default=0.0,
-              help="Score from which a detection counts, but for average precision.")
+@click.option("--min-score", "least_score", metavar="S", type=float,
+              help="Score from which a detection counts, but for average precision; all by default.")
 @click.option("--missing", type=click.Choice(["error", "empty", "skip"]), default="error",
               help="What a frame without detections is: an error, a frame in which nothing was found, or left out.")
 @click.option("--simulated", metavar="FILE", type=click.Path(path_type=Path),
@@ -72,7 +72,7 @@ _EXTENSIONS = {".json": "json"}
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures, too, the worst frames first: DIR/index.html.")
 @SENSORS
-def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, distance: str, least_score: float,
+def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, distance: str, least_score: float | None,
              missing: str, simulated: Path | None, seed: int, format_: str | None, output: Path | None,
              report: Path | None, sensors: Path | None) -> None:
     # fmt: on

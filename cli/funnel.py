@@ -19,22 +19,25 @@ def _steps(query: Query) -> list[tuple[str, str]]:
     stopped = "" if funnel.frames >= total else f" of {total:,} looked at (stopped at {limit})"
     filtered = "after the prefilter" if query.options.prefilter else "the prefilter is off"
     reasons = ", ".join(f"{number:,} {reason}" for reason, number in funnel.reasons.most_common())
+    over_time = funnel.over_time
+    of = f" of {count(over_time['recordings'], 'recording')}" if over_time else ""
+    matches, unknown = ("intervals that match", "intervals that are unknown") if over_time else ("matches", "unknown")
     return [
-        (f"{funnel.frames:,}", f"frames{stopped}"),
+        (f"{funnel.frames:,}", f"frames{of}{stopped}"),
         (f"{funnel.candidates:,}", filtered),
         *(_over_time(funnel) or [(f"{funnel.with_roles:,}", "with a label object for every role")]),
-        (f"{funnel.matches:,}", "matches"),
-        (f"{funnel.unknowns:,}", f"unknown{f': {reasons}' if reasons else ''}"),
+        (f"{funnel.matches:,}", matches),
+        (f"{funnel.unknowns:,}", f"{unknown}{f': {reasons}' if reasons else ''}"),
     ]
 
 
 def _over_time(funnel: Funnel) -> list[tuple[str, str]]:
-    """The steps of a query over time; none for one about frames."""
+    """The steps of a query over time between frames and intervals; none for one about frames."""
     told = {
-        "starts": "that match the initial scene", "recordings": "recordings looked at",
-        "bindings": "ways to give the objects tracks",
-        "cut off": "of these cut off: the recording or a track ends before the program",
-    }  # fmt: skip
+        "starts": "frames that match the initial scene",
+        "bindings": "ways to give the objects tracks from there on",
+        "cut off": "of these ways cut off: the recording or a track ends before the program",
+    }
     return [(f"{funnel.over_time[name]:,}", text) for name, text in told.items()] if funnel.over_time else []
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from scenicq.compiler.program import compile_scenario
-from scenicq.exporters.sample import sample_labels, sample_record, write_sample
+from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
 from scenicq.query.execution.option_texts import read_built_ins
 from scenicq.query.execution.run import beside
 
@@ -39,12 +39,19 @@ __all__ = ["sample"]
     default="",
     help="Built-in requirements that need not hold: visibility, containment, collision.",
 )
+@click.option(
+    "--timeout",
+    metavar="S",
+    type=click.FloatRange(0, min_open=True),
+    default=PATIENCE_S,
+    help="Seconds of the processor for one scene.",
+)
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
               help="Write an interchange folder with labels and map, to be ingested.")  # fmt: skip
 def sample(scenario: Path, dataset: str | None, *, map_file: Path | None, number: int, seed: int,
-           waive: str, scenic: str | None, initial: bool, output: Path | None) -> None:  # fmt: skip
+           waive: str, timeout: float, scenic: str | None, initial: bool, output: Path | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
 
     They have the distribution of the program, given that all requirements hold, those that Scenic adds included. On
@@ -55,7 +62,7 @@ def sample(scenario: Path, dataset: str | None, *, map_file: Path | None, number
     version = read_version(scenic)
     network = next(networks_of(dataset, map_file, source, version))
     compiled = compile_scenario(source, network, version=version, initial=initial, loader=beside(scenario))
-    labels = sample_labels(compiled, number, seed, read_built_ins(waive))
+    labels = sample_labels(compiled, number, seed, read_built_ins(waive), timeout_s=timeout)
     if output is not None:
         write_sample(labels, network, scenario.stem, output)
         return

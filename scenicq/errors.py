@@ -68,7 +68,7 @@ CODES: dict[str, str] = {
     "target-busy": "another run writes to the target",
     "target-unwritable": "the target cannot be written",
     "resources-exhausted": "the system gives no more memory, files or processes",
-    "deadline-passed": "the time that a run may take was over before all frames were decided",
+    "deadline-passed": "the time that a run may take was over before all frames were decided, or a scene drawn",
     "predictions-invalid": "a predicted box has a value that makes no sense",
     "predictions-duplicate": "a predicted box or frame is there more than once",
     "predictions-missing": "a frame of the dataset has no predictions",
@@ -87,6 +87,7 @@ CODES: dict[str, str] = {
     "no-tracks": "a program over time, and objects of which nothing says that they are the same in several labels",
     # what compiles but cannot be meant
     "angle-without-deg": "an angle of more than a full turn, which may be meant in degrees",
+    "exact-number": "a measured number that is compared with `==`",
     "range-reversed": "a range whose first end is above its second",
     "requirement-always": "a requirement that holds in every scene",
     "requirement-never": "a requirement that holds in no scene",

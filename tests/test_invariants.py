@@ -150,6 +150,8 @@ def test_every_path_that_the_map_names_exists():
     paths = re.findall(r"`((?:tests|scenicq|sample_data|cli)/[\w./]*[\w/])`", README)
     assert paths
     assert [path for path in paths if not (ROOT / path).exists()] == []
-    inside = re.findall(r"`((?:match|query|smt|forest|compiler|report|store|geometry)/[\w./]+\.py)`", README)
+    inside = re.findall(
+        r"`((?:match|query|smt|forest|compiler|report|store|geometry|temporal|syntax|importers)/[\w./]+\.py)`", README
+    )
     assert inside
     assert [path for path in inside if not (LIBRARY / path).exists()] == []

@@ -29,7 +29,7 @@ from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import ArithmeticOp, Constant, Node, PointIn
 from scenicq.geometry.angles import heading_of
-from scenicq.geometry.elements import Maneuver, NetworkElement
+from scenicq.geometry.elements import Lane, Maneuver, NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, orientation_of
 from scenicq.geometry.road_direction import along_lines
@@ -104,6 +104,15 @@ def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
         refused = unavailable_attribute(name, span)
         if refused is not None:
             return refused
+    if isinstance(value, Lane) and (side := _BESIDE.fullmatch(name)):
+        left = side[0].lower().find("left") >= 0
+        return fail(
+            "unknown-attribute",
+            f"{describe(value)} has no attribute `{name}`",
+            span,
+            "not found",
+            (f"`X.laneSection.laneTo{'Left' if left else 'Right'}` is the lane beside that of an object `X`",),
+        )
     close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
     hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
     shown = f"a {kind_of(cast(Node, value))}" if is_node(value) else describe(value)
@@ -112,6 +121,10 @@ def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
     return fail("unknown-attribute", f"{shown} has no attribute `{name}`", span, label, hints)
 
 
+_BESIDE = re.compile(
+    r"(?i)_?(left|right)_?(lane|neighbou?r)?|(lane|neighbou?r)_?(to_?)?(left|right)|laneTo(Left|Right)"
+)
+"""What people call the lane beside another."""
 _OWNER = re.compile(r"([A-Za-z_][\w.]{0,60})\.\Z")
 """The dotted name before an attribute."""
 

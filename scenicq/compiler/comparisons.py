@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import cast
 
 from scenicq.compiler import operators
@@ -124,7 +125,23 @@ def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> Mod
             return negated(_any_equal(left, items, span))
         check_weight(span, left, right, compared=True)
         return (hashed(left, span) in right if isinstance(right, dict | set) else left in items) == (op == "in")
-    raise fail("wrong-type", f"`{op}` needs a region or a list", span, f"this is {describe(right)}")
+    side = _SIDE.search(span.text)
+    hints: tuple[str, ...] = ()
+    if side:  # `in front of` is not an operator of Scenic's
+        hints = (
+            f"`{_PLACED[side[1]]}`, where an object is made, places it there",
+            "`X can see Y` asks for what is in view",
+        )
+    raise fail("wrong-type", f"`{op}` needs a region or a list", span, f"this is {describe(right)}",
+               hints)  # fmt: skip
+
+
+_SIDE = re.compile(r"\b(front|back|left|right)\s+of\b")
+_PLACED = {
+    "front": "ahead of X by Range(0, 20)", "back": "behind X by Range(0, 20)",
+    "left": "left of X by Range(0, 5)", "right": "right of X by Range(0, 5)",
+}  # fmt: skip
+"""What places an object at a side of another, by the word for the side."""
 
 
 def _is_special(value: ModelValue) -> bool:

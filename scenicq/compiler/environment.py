@@ -75,7 +75,7 @@ class Budget:
 _SYNONYMS = {
     "crosswalk": "crossing", "zebra": "crossing", "walkway": "sidewalk", "footpath": "sidewalk", "pavement": "sidewalk",
     "junction": "intersection", "crossroads": "intersection", "street": "road", "roadway": "road", "kerb": "curb",
-    "Person": "Pedestrian", "Walker": "Pedestrian", "Adult": "Pedestrian", "Bike": "Bicycle", "Cyclist": "Bicycle",
+    "Person": "Pedestrian", "Walker": "Pedestrian", "Bike": "Bicycle", "Cyclist": "Bicycle",
     "Bicyclist": "Bicycle", "Motorbike": "Motorcycle", "Motorcyclist": "Motorcycle", "Lorry": "Truck",
 }  # fmt: skip
 """What people call what the driving model has."""

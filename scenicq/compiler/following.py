@@ -18,7 +18,8 @@ from scenicq.compiler.values import Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.bounds import scalar_bounds
-from scenicq.forest.nodes import ArithmeticOp, Node, Select
+from scenicq.forest.nodes import ArithmeticOp, Constant, Node, Select
+from scenicq.geometry.network import Network
 
 __all__ = ["follow"]
 
@@ -31,6 +32,7 @@ MOST_KNOWN = 2_000
 class _Reader(Protocol):
     version: int
     budget: Budget
+    network: Network
 
 
 def follow(run: _Reader, field: ModelValue, start: ModelValue, distance: ModelValue, span: Span) -> Instance:
@@ -49,8 +51,14 @@ def follow(run: _Reader, field: ModelValue, start: ModelValue, distance: ModelVa
     point, length = to_vector(start, span), to_scalar(distance, span)
     fewest, most = _steps(length, run.version, span)
     run.budget.step(span, sum(range(fewest, most + 1)) // 4)
-    position, heading = _ways(field, point, length, fewest, most, span)
+    position, heading = _ways(field, _later(run, field), point, length, fewest, most, span)
     return oriented(position, heading)
+
+
+def _later(run: _Reader, field: ModelValue) -> ModelValue:
+    """The field as it counts after the first step: steps along the road may leave it."""
+    along_road = isinstance(field, Constant) and field.value is run.network.roadDirection
+    return build.constant(run.network.followedDirection, field.span) if along_road else field
 
 
 def _steps(length: Node, version: int, span: Span) -> tuple[int, int]:
@@ -70,9 +78,11 @@ def _count(length: float) -> int:
     return max(FEWEST, math.ceil(length / LONGEST)) if math.isfinite(length) else FEWEST
 
 
-def _ways(field: ModelValue, start: Node, length: Node, fewest: int, most: int, span: Span) -> tuple[Node, Node]:
+def _ways(
+    field: ModelValue, later: ModelValue, start: Node, length: Node, fewest: int, most: int, span: Span
+) -> tuple[Node, Node]:
     """Position and heading at the end, by the number of steps that the distance has."""
-    ways = [_way(field, start, length, count, span) for count in range(fewest, most + 1)]
+    ways = [_way(field, later, start, length, count, span) for count in range(fewest, most + 1)]
     if len(ways) == 1:
         return ways[0]
     index = StepCount(length, fewest, most).index(span)
@@ -82,11 +92,12 @@ def _ways(field: ModelValue, start: Node, length: Node, fewest: int, most: int, 
     )
 
 
-def _way(field: ModelValue, start: Node, length: Node, count: int, span: Span) -> tuple[Node, Node]:
+def _way(field: ModelValue, later: ModelValue, start: Node, length: Node, count: int, span: Span) -> tuple[Node, Node]:
     """Position and heading after a number of steps of equal length."""
     step = build.arithmetic(ArithmeticOp.DIV, length, build.constant(float(count)), span=span)
     ahead = build.vector(build.constant(0.0), step, span)
     point = start
-    for _ in range(count):
-        point = build.vector_sum(point, build.rotate(ahead, direction_at(field, point, span), span), span)
+    for number in range(count):
+        heading = direction_at(field if number == 0 else later, point, span)
+        point = build.vector_sum(point, build.rotate(ahead, heading, span), span)
     return point, direction_at(field, point, span)

@@ -199,7 +199,13 @@ class Interpreter:
     ) -> Instance:
         is_object = cls.derives_from("Object")
         around = Surroundings(
-            self.version, self.ego, lambda: self.workspace, self.budget, self.excluded.may_lack, is_object=is_object
+            self.version,
+            self.ego,
+            lambda: self.workspace,
+            self.budget,
+            self.network,
+            self.excluded.may_lack,
+            is_object=is_object,
         )
         kept = [node for node in specifiers if not self._is_dynamic(node)]
         bound = tuple(bind(node, lambda part: evaluate(self, part, scope), around) for node in kept)

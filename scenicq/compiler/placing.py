@@ -23,6 +23,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import Feature, Index, Node, PointIn, RegionDifference, Select
+from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 
 __all__ = ["Surroundings", "bind"]
@@ -38,19 +39,21 @@ class Surroundings:
         ego: Gives the ego, or fails where there is none yet.
         workspace: The workspace's region.
         budget: What the program may still use.
+        network: The road network.
         may_lack: Whether some option of the choice with an index lacks a part that the program asked for.
         is_object: Whether an object, rather than a point, is being placed.
     """
 
     def __init__(
         self, version: int, ego: Callable[[Span], Instance], workspace: Callable[[], Node], budget: Budget,
-        may_lack: Callable[[Node], bool], *, is_object: bool,
+        network: Network, may_lack: Callable[[Node], bool], *, is_object: bool,
     ) -> None:  # fmt: skip
         """Take what the interpreter knows."""
         self.version = version
         self.ego = ego
         self.workspace = workspace
         self.budget = budget
+        self.network = network
         self.may_lack = may_lack
         self.is_object = is_object
 

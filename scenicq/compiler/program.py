@@ -289,9 +289,10 @@ def _names(objects: list[Instance]) -> list[str]:
     return names
 
 
-_SCALARS = frozenset(
-    ("heading", "width", "length", "height", "speed", "angularSpeed", "acceleration", "visibleDistance", "viewAngle")
-)
+_SCALARS = frozenset({
+    "heading", "width", "length", "height", "speed", "angularSpeed", "acceleration", "visibleDistance", "viewAngle",
+    "mutationScale", "positionStdDev", "headingStdDev",
+})  # fmt: skip
 
 
 def _property(name: str, value: ModelValue, span: Span | None) -> Node | None:

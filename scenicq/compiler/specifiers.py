@@ -7,14 +7,14 @@ explicit specifiers, optional ones and class defaults in an order in which every
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
 from scenicq.compiler.choices import make_choice
 from scenicq.compiler.coerce import to_node
 from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, ScenicClass, fail
-from scenicq.errors import Note, Span
+from scenicq.errors import Diagnostic, Note, ScenarioError, Span
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Constant, DirectionAt, Feature, Index, Node
 
 __all__ = ["BoundSpecifier", "SpecifierEvaluator", "construct"]
@@ -147,7 +147,11 @@ def construct(
         specifier = chosen[name]
         if name in instance.properties:
             continue
-        for given, value in specifier.evaluate(instance).items():
+        try:
+            values = specifier.evaluate(instance)
+        except ScenarioError as error:
+            raise error if specifier.explicit or instance.span is None else _by_default(error, instance, name) from None
+        for given, value in values.items():
             if chosen.get(given) is specifier:
                 instance.properties[given] = value
                 instance.spans[given] = specifier.span
@@ -157,6 +161,23 @@ def construct(
         replaced = specifier.modifies and chosen[specifier.modifies] is not specifier
         if specifier.condition is not None and specifier.span is not None and (replaced or not specifier.modifies):
             evaluator.demand(partial(specifier.condition, instance), specifier.span)
+
+
+_FREELY = {"position": "in everywhere, facing Range(0, 360) deg", "heading": "facing Range(0, 360) deg"}
+"""What a program writes for a property that may have any value."""
+
+
+def _by_default(error: ScenarioError, instance: Instance, name: str) -> ScenarioError:
+    """What the map lacks for a class's default, told where the program makes the object."""
+    told: list[Diagnostic] = []
+    for each in error.diagnostics:
+        if each.code == "map-lacks":
+            notes = (*each.notes, Note(each.span, "the default")) if each.span is not None else each.notes
+            label = f"the default `{name}` of `{instance.cls.name}` needs it"
+            anything = f"`{_FREELY[name]}` asks nothing of the map" if name in _FREELY else f"`with {name} ...` sets it"
+            each = replace(each, span=instance.span, label=label, hints=(anything,), notes=notes)  # noqa: PLW2901
+        told.append(each)
+    return ScenarioError(told)
 
 
 def _either(name: str, given: BoundSpecifier, default: BoundSpecifier) -> BoundSpecifier:

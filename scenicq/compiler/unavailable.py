@@ -7,7 +7,7 @@ from scenicq.errors import ScenarioError, Span
 
 __all__ = ["unavailable_attribute", "unavailable_name"]
 
-_NAMES: dict[str, tuple[str, str]] = {
+_NAMES: dict[str, tuple[str, ...]] = {
     "Shape MeshShape BoxShape CylinderShape ConeShape SpheroidShape": (
         "labels are matched in 2D",
         "give objects a `width` and a `length` instead of a shape",
@@ -35,6 +35,11 @@ _NAMES: dict[str, tuple[str, str]] = {
         "out of a scenario's reach",
         "scenarios are data: they reach neither files nor the Python interpreter",
     ),
+    "objects vehicles cars pedestrians others agents actors": (
+        "a program names the objects that it asks for",
+        "`new Vehicle` asks for one vehicle, which every requirement may speak of",
+        "that there are no others can only be asked of all together, with `--exact`",
+    ),
     "divmod iter next slice ord chr bin hex oct ascii repr format bytes bytearray complex property staticmethod "
     "classmethod": (
         "not part of the Python subset",
@@ -43,7 +48,7 @@ _NAMES: dict[str, tuple[str, str]] = {
 }
 _REASONS = {name: reason for names, reason in _NAMES.items() for name in names.split()}
 
-_ATTRIBUTES: dict[str, tuple[str, str]] = {
+_ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "orientation pitch roll": ("labels are matched in 2D", "use `heading`"),
     "onSurface topSurface bottomSurface leftSurface rightSurface frontSurface backSurface surface occupiedSpace "
     "boundingBox boundingPolygon inradius onDirection": (
@@ -73,7 +78,7 @@ def unavailable_attribute(name: str, span: Span) -> ScenarioError | None:
     return _refusal(_ATTRIBUTE_REASONS.get(name), name, span)
 
 
-def _refusal(reason: tuple[str, str] | None, name: str, span: Span) -> ScenarioError | None:
+def _refusal(reason: tuple[str, ...] | None, name: str, span: Span) -> ScenarioError | None:
     if reason is None:
         return None
-    return fail("unsupported-construct", f"`{name}` is not supported", span, reason[0], (reason[1],))
+    return fail("unsupported-construct", f"`{name}` is not supported", span, reason[0], reason[1:])

@@ -105,7 +105,8 @@ class Evaluation:
         dataset: The dataset and its version, as `name_origin` says it.
         predictions: Name of the file.
         distance_m: Centre distance within which an object counts as found.
-        least_score: Score from which a prediction counts, but for average precision.
+        least_score: Score from which a prediction counts, but for average precision; 0, or that of the least, where
+            all count.
         scenarios: One for each file of results.
         warnings: What the user should know.
         detection: Labels and predictions, for pictures.
@@ -126,7 +127,7 @@ def evaluate(
     predictions: Predictions | Path | str,
     *,
     distance_m: float = 2.0,
-    least_score: float = 0.0,
+    least_score: float | None = None,
     missing: Missing = "error",
     simulated: Path | str | None = None,
     seed: int = 0,
@@ -138,17 +139,20 @@ def evaluate(
         dataset: The dataset that the results are of.
         predictions: What the model has detected, or a file of it.
         distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4.
-        least_score: Score from which a prediction counts, but for average precision.
+        least_score: Score from which a prediction counts, but for average precision; all by default.
         missing: What a frame without predictions is: an error, a frame in which nothing was found, or left out.
         simulated: A CSV file of simulated runs; see `read_simulated`.
         seed: Of the resamples: the same figures come from the same seed.
 
     Raises:
-        DataError: A file cannot be read or does not fit the others; option-invalid for another distance.
+        DataError: A file cannot be read or does not fit the others; option-invalid for another distance, or a score
+            that is no number.
     """
     if distance_m not in THRESHOLDS_M:
         hint = f"known are {', '.join(f'{known:g}' for known in THRESHOLDS_M)}"
         raise DataError(Diagnostic("option-invalid", f"no centre distance of {distance_m:g} m", hints=(hint,)))
+    if least_score is not None and not math.isfinite(least_score):
+        raise DataError(Diagnostic("option-invalid", f"{least_score} is no score from which predictions count"))
     runs = None if simulated is None else read_simulated(Path(simulated), seed)
     named: Mapping[str, Results] = (
         cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}
@@ -157,6 +161,8 @@ def evaluate(
     detection = detect(
         dataset, predictions if isinstance(predictions, Predictions) else read_predictions(Path(predictions)), missing
     )
+    if least_score is None:
+        least_score = float(detection.predictions.score.min(initial=0.0))
     rng = np.random.default_rng(seed)
     judge = _Judge(detection, distance_m, least_score, rng)
     doubts: list[Diagnostic] = []

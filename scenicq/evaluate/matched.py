@@ -138,9 +138,9 @@ def _frames_of(name: str, each: Mapping[str, Any], frames: Frames, recordings: M
         if number is None:
             raise _lacking(name, f"frame {each['frame']}")
         return [number]
-    recording = recordings.get(each["recording"])
+    recording = recordings.get(each.get("recording", ""))
     if recording is None:
-        raise _lacking(name, f"recording {each['recording']}")
+        raise _lacking(name, f"recording {each.get('recording')}")
     start, end = each.get("start_us"), each.get("end_us")
     if not isinstance(start, int) or not isinstance(end, int):
         message = f"results of {name}: an interval of {each['recording']} lacks `start_us` or `end_us`"

@@ -7,6 +7,7 @@ import random
 from collections.abc import Iterable, Iterator, Set
 from pathlib import Path
 
+from scenicq.budget import TimeIsUp, limited
 from scenicq.errors import DataError, Diagnostic, Note, ScenarioError
 from scenicq.exporters.interchange import label_record, write_map
 from scenicq.forest.improvise import Improviser, Scene
@@ -17,10 +18,12 @@ from scenicq.geometry.network import Network
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["sample_labels", "sample_record", "write_sample"]
+__all__ = ["PATIENCE_S", "sample_labels", "sample_record", "write_sample"]
 
 ATTEMPTS = 20_000
 """Failures for one scene after which the acceptance rate counts as hopeless."""
+PATIENCE_S = 60.0
+"""Seconds of the processor that one scene may take."""
 
 
 _MACHINERY = frozenset({
@@ -57,7 +60,12 @@ def _object(scenario: Scenario, scene: Scene, index: int) -> LabelObject:
 
 
 def sample_labels(
-    scenario: Scenario, count: int, seed: int, waive: Set[BuiltIn] = frozenset(), attempts: int = ATTEMPTS
+    scenario: Scenario,
+    count: int,
+    seed: int,
+    waive: Set[BuiltIn] = frozenset(),
+    attempts: int = ATTEMPTS,
+    timeout_s: float = PATIENCE_S,
 ) -> Iterator[Label]:
     """Labels of scenes drawn from a scenario, the same for the same seed; objects are called as in the program.
 
@@ -67,20 +75,38 @@ def sample_labels(
         seed: Of the random numbers.
         waive: Built-in requirements that need not hold.
         attempts: Failures for one scene after which the acceptance rate counts as hopeless.
+        timeout_s: Seconds of the processor that one scene may take.
 
     Raises:
-        ScenarioError: impossible-requirement, where no scene comes up.
+        ScenarioError: impossible-requirement, where no scene comes up; deadline-passed, where none does in the time.
     """
     rng = random.Random(seed)
     improviser = Improviser(scenario, frozenset(BuiltIn) - waive)
     for number in range(count):
-        scene = improviser.draw(rng, attempts)
+        try:
+            with limited(timeout_s):
+                scene = improviser.draw(rng, attempts)
+        except TimeIsUp:
+            raise _late(scenario, improviser, number, timeout_s) from None
         if scene is None:
             raise _hopeless(scenario, improviser, number)
         members = [_object(scenario, scene, owner.index) for owner in scenario.objects]
         ego = members.pop(scenario.ego)
         params = {name: value for name, value in scene.params.items() if isinstance(value, str | float | bool)}
         yield Label(f"scene-{number:04}", "sample", number, scenario.map, ego, tuple(members), params)
+
+
+def _late(scenario: Scenario, improviser: Improviser, drawn: int, timeout_s: float) -> ScenarioError:
+    """What to say where the time for a scene is over: what rejected most until then."""
+    after = f", after {drawn:,} that came up" if drawn else ""
+    message = f"no scene came up on map `{scenario.map}` in {timeout_s:g} s{after}"
+    hint = "give it more time with `--timeout`, weaken the requirements, or say with specifiers what they ask for"
+    times = improviser.times_rejected()
+    if not times:
+        return ScenarioError(Diagnostic("deadline-passed", message, hints=(hint,)))
+    worst, most = times[0]
+    label = f"{worst.text} failed in {most:,} of {sum(count for _, count in times):,} attempts"
+    return ScenarioError(Diagnostic("deadline-passed", message, worst.span, label, hints=(hint,)))
 
 
 def _hopeless(scenario: Scenario, improviser: Improviser, drawn: int) -> ScenarioError:

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 
+from scenicq.budget import look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.containment_pruning import shrink_regions
 from scenicq.forest.draw_schedule import DrawSchedule, lay_out
@@ -83,6 +84,9 @@ class Improviser:
         Args:
             rng: Source of randomness; the same scenes come from the same state of it and of the improviser.
             attempts: Failures to endure.
+
+        Raises:
+            TimeIsUp: The time that the caller allows (`budget.limited`) is over.
         """
         # once a scene, not once an attempt: the requirement then holds in a share p of the scenes, or more
         waived = {
@@ -98,6 +102,7 @@ class Improviser:
             if self._step(place, values, rng) or number in waived:
                 place += 1
                 continue
+            look()
             failures += 1
             if failures > attempts:
                 return None

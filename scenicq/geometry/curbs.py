@@ -19,12 +19,23 @@ from shapely.geometry import LineString
 
 from scenicq.geometry import shapes
 from scenicq.geometry.elements import Lane, keeps_left
+from scenicq.geometry.road_direction import DirectedLane, RoadDirection
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["right_edges", "side_edges"]
+__all__ = ["along_lanes", "right_edges", "side_edges"]
 
 _CORNER = np.cos(np.radians(60))
 """A boundary that turns away from the direction of travel by more than this is a lane's end, not its side."""
+
+
+def along_lanes(lanes: Sequence[Lane]) -> RoadDirection | None:
+    """The direction of traffic on some lanes alone, whatever else lies there; None if none has a centreline."""
+    directed = [
+        DirectedLane(lane.polygon, tuple(shapes.coordinates(line) for line in lane.centerline.lines))
+        for lane in lanes
+        if lane.centerline is not None
+    ]
+    return RoadDirection(tuple(directed)) if directed else None
 
 
 def right_edges(lanes: Sequence[Lane], intersections: Sequence[Shape]) -> tuple[LineString, ...]:

@@ -19,7 +19,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
 from scenicq.geometry.centerlines import direction_along, road_direction
-from scenicq.geometry.curbs import right_edges
+from scenicq.geometry.curbs import along_lanes, right_edges
 from scenicq.geometry.elements import (
     Curb,
     Intersection,
@@ -34,6 +34,7 @@ from scenicq.geometry.elements import (
 )
 from scenicq.geometry.features import MapFeature, dangling, read_geojson
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.followed_direction import FollowedDirection
 from scenicq.geometry.network_builder import link
 from scenicq.geometry.regions import SLACK, DeferredPolylines, PolygonSet, PolylineSet, Region
 from scenicq.geometry.road_direction import along_lines
@@ -102,6 +103,13 @@ class Network:
         """Name and size."""
         return f"Network({self.name!r}, {len(self.features)} features)"
 
+    @cached_property
+    def followedDirection(self) -> FollowedDirection:
+        """The direction of traffic for the steps of a way along it: off the road there is one more."""
+        kinds = ("lane", "road", "intersection", "shoulder", "drivable")
+        paved = tuple(feature.shape for feature in self.features if feature.kind in kinds)
+        return FollowedDirection(self.roadDirection.lanes, base=self.roadDirection, paved=paved)
+
     # --- regions
 
     def curbs_of(self, group: LaneGroup) -> list[LineString]:
@@ -116,7 +124,8 @@ class Network:
     def _curb_lines(self) -> dict[LaneGroup | None, list[LineString]]:
         found: dict[LaneGroup | None, list[LineString]] = {}
         for curb in self.curbs:
-            found.setdefault(curb.group, []).append(self.roadDirection.forward(curb.line))
+            traffic = self.roadDirection if curb.group is None else along_lanes(curb.group.lanes) or self.roadDirection
+            found.setdefault(curb.group, []).append(traffic.forward(curb.line))
         return found
 
     @cached_property

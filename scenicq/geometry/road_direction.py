@@ -25,7 +25,7 @@ from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
-__all__ = ["DirectedLane", "RoadDirection", "along_lines"]
+__all__ = ["ONE_HEADING", "DirectedLane", "RoadDirection", "along_lines"]
 
 REACH = 20.0
 """Metres within which a point off all lanes takes the direction of the nearest one."""
@@ -37,7 +37,7 @@ _MARGIN = 0.01
 """Metres by which a box of cells is grown."""
 _DIGITS = 9
 """Of a radian, to which headings are one."""
-_ONE_HEADING = 1e-6
+ONE_HEADING = 1e-6
 """Radians by which a heading that was worked with may be off."""
 _GRID = 0.5
 """Metres: boxes are grown to a grid of this width where it is remembered whether lanes cover them."""
@@ -238,7 +238,7 @@ class RoadDirection:
         gap = segment_distances(np.array([(west + east) / 2, (south + north) / 2]), segments)
         near = gap <= gap.min() + math.hypot(east - west, north - south) + _TIE
         if heading is not None:
-            near &= np.abs(headings[starts[lane] : starts[lane + 1]] - heading) <= _ONE_HEADING
+            near &= np.abs(headings[starts[lane] : starts[lane + 1]] - heading) <= ONE_HEADING
         for index in np.nonzero(near)[0].tolist():
             found = self._cells_of.get((lane, index))
             if found is None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
+from scenicq.budget import look
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction, rotate
 from scenicq.geometry.membership import bounds, contains
@@ -95,7 +96,12 @@ def sampler(region: Region) -> Callable[[random.Random], XY]:
 
 
 def _tried(proposal: _Proposal, rng: random.Random, tries: int) -> XY | None:
-    return next((point for _ in range(tries) if (point := proposal.draw(rng)) is not None), None)
+    for _ in range(tries):
+        point = proposal.draw(rng)
+        if point is not None:
+            return point
+        look()
+    return None
 
 
 def _cut_to_window(region: Region) -> Region | None:

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+import numpy as np
+
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import InvalidError, check_characters, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
-from scenicq.store.columns import RecordingColumns
+from scenicq.store.columns import MemberColumns, RecordingColumns
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.wkb import FARTHEST_M
 
@@ -176,14 +178,15 @@ class Labels:
         self._taken = taken
         self._frames: set[str] = set()
 
-    def accept(self, name: str, map_name: str, frames: Sequence[str]) -> bool:
-        """Take the labels of a recording that are sound in themselves, if no name is used twice.
+    def accept(self, recording: RecordingColumns) -> bool:
+        """Take a recording whose labels are sound in themselves, if no name is used twice and all is on a map.
 
         Args:
-            name: Of the recording.
-            map_name: Of the map of all its labels.
-            frames: Names of the labels.
+            recording: The recording.
         """
+        name, map_name, frames = recording.name, recording.map, recording.frames
+        if not (_are_places(recording.egos) and _are_places(recording.objects)):
+            return False
         unique = set(frames)
         if len(unique) < len(frames) or unique & self._frames or any((name, frame) in self._taken for frame in frames):
             return False
@@ -254,7 +257,13 @@ class Labels:
 
 
 def _is_place(member: LabelObject) -> bool:
-    return abs(member.x) <= FARTHEST_M and abs(member.y) <= FARTHEST_M
+    z = None if member.out_of_plane is None else member.out_of_plane.z
+    return all(abs(part) <= FARTHEST_M for part in (member.x, member.y, z or 0.0))
+
+
+def _are_places(members: MemberColumns) -> bool:
+    parts = (members.x, members.y, *(() if members.z is None else (members.z,)))
+    return not any(bool((np.abs(part) > FARTHEST_M).any()) for part in parts)
 
 
 def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict[str, tuple[MapFeature, ...]]:

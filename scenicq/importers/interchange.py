@@ -120,7 +120,7 @@ class LineReader:
             columns = None
             if self.columnar:
                 columns = read_columns([text for text, _ in lines], name, self.classes, yaw=self.yaw)
-            if columns is not None and labels.accept(name, columns.map, columns.frames):
+            if columns is not None and labels.accept(columns):
                 yield columns
                 continue
             reader = _LabelReader(ClassNames(self.classes, report), turn, report)

@@ -121,7 +121,7 @@ class SceneReader:
             ids = set(columns.objects.id)
             sound = len(ids) == len(columns.objects.id) and "ego" not in ids
             sound = sound and 0 < len(columns.frames) == len(set(columns.times_us))
-            if sound and labels.accept(scene.name, scene.location, columns.frames):
+            if sound and labels.accept(columns):
                 yield columns
                 continue
             places = [instant.place for instant in scene.instants if instant.pose is not None]

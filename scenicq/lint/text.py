@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import math
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -17,6 +18,7 @@ __all__ = ["lint_text"]
 
 _FULL_TURN = math.tau * (1 + 1e-9)
 _ANGLE_PROPERTIES = frozenset({"heading", "yaw", "roadDeviation", "viewAngle", "parentOrientation"})
+_MEASURED = frozenset({"speed", "width", "length", "height", "x", "y", "acceleration", "angularSpeed"})
 _ANGLES = (ast.RelativeHeading, ast.ApparentHeading, ast.Angle)
 _ORDERS = frozenset({"<", "<=", ">", ">=", "==", "!="})
 _RANGES = frozenset({"Range", "DiscreteRange", "TruncatedNormal"})
@@ -44,6 +46,7 @@ def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[
     for node in nodes:
         yield from _angles(node)
         yield from _range(node)
+        yield from _exact(node)
     yield from _unused(nodes)
     if properties:
         yield from _unknown_properties(nodes)
@@ -127,6 +130,38 @@ def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
                     "angle-without-deg", f"`{text}` is an angle of {abs(value) / math.tau:.1f} full turns", term.span,
                     "angles are in radians", f"write `{text} deg` for degrees",
                 )  # fmt: skip
+
+
+# --- numbers that labels measure
+
+
+def _is_measured(node: ast.SyntaxNode) -> bool:
+    match node:
+        case ast.Attribute(name=name):
+            return name in _ANGLE_PROPERTIES | _MEASURED
+        case ast.Call(function=ast.Name(id="abs")) if node.arguments:
+            return _is_measured(node.arguments[0].value)
+        case _:
+            return isinstance(node, (*_ANGLES, ast.DistanceOperator))
+
+
+def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
+    """Measured numbers that are asked to be a number exactly."""
+    if not isinstance(node, ast.ComparisonChain):
+        return
+    sides = [node.left, *(each.right for each in node.comparisons)]
+    for (left, right), link in zip(itertools.pairwise(sides), node.comparisons, strict=True):
+        if link.operator != "==" or _is_measured(left) == _is_measured(right):
+            continue
+        measured, number = (left, right) if _is_measured(left) else (right, left)
+        if _number(number) is not None:
+            near = measured.span.text if _number(number) == 0 else f"({measured.span.text}) - {number.span.text}"
+            within = "5 deg" if _is_angle(measured) else "0.5"
+            yield _warning(
+                "exact-number", f"`==` asks for exactly {number.span.text}, which what is measured hardly ever is",
+                node.span, "no tolerance holds in requirements",
+                f"`abs({near}) < {within}` asks for what is near it",
+            )  # fmt: skip
 
 
 # --- ranges

@@ -240,7 +240,7 @@ class Matches(Sequence[FrameResult]):
         predictions: str | Path,
         *,
         distance_m: float = 2.0,
-        least_score: float = 0.0,
+        least_score: float | None = None,
         missing: Missing = "error",
         simulated: str | Path | None = None,
         seed: int = 0,
@@ -250,13 +250,14 @@ class Matches(Sequence[FrameResult]):
         Args:
             predictions: A file of what the model has detected.
             distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4.
-            least_score: Score from which a prediction counts.
+            least_score: Score from which a prediction counts; all by default.
             missing: What a frame without predictions is; see `scenicq.evaluate.evaluation.evaluate`.
             simulated: A CSV file of simulated runs.
             seed: The same figures come from the same seed.
 
         Raises:
-            DataError: A file cannot be read or does not fit the dataset; option-invalid for another distance.
+            DataError: A file cannot be read or does not fit the dataset; option-invalid for another distance, or a
+                score that is no number.
         """
         name = Path(self.query.source.name.strip("<>")).stem
         results = {name: [each.result for each in self._all()]}

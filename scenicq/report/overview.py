@@ -87,14 +87,15 @@ def funnel_section(funnel: Funnel, total: int) -> str:
         funnel: Of a query whose results were taken.
         total: Frames of the dataset.
     """
-    steps = [("frames", funnel.frames), ("after the prefilter", funnel.candidates)]
+    recordings = funnel.over_time["recordings"]
+    of = f" of {recordings:,} recording{'' if recordings == 1 else 's'}" if funnel.over_time else ""
+    steps = [(f"frames{of}", funnel.frames), ("after the prefilter", funnel.candidates)]
     counted: list[tuple[str, int]] = []  # what is no frame, so that it has no share of them
     if funnel.over_time:
-        steps.append(("that match the initial scene", funnel.over_time["starts"]))
+        steps.append(("frames that match the initial scene", funnel.over_time["starts"]))
         counted = [
-            ("recordings looked at", funnel.over_time["recordings"]),
-            ("ways to give the objects tracks", funnel.over_time["bindings"]),
-            ("of these cut off: the recording or a track ends before the program", funnel.over_time["cut off"]),
+            ("ways to give the objects tracks from there on", funnel.over_time["bindings"]),
+            ("of these ways cut off: the recording or a track ends before the program", funnel.over_time["cut off"]),
             ("intervals that match", funnel.matches),
             ("intervals that are unknown", funnel.unknowns),
         ]

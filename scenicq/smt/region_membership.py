@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeAlias, cast
 
 import numpy as np
@@ -194,6 +194,37 @@ def inside_region(region: Node, point: TermVector, around: Box, code: Callable[[
     Raises:
         UnsupportedError: The region is a sector of random angle.
     """
+    known: dict[int, Formula] = {}
+    todo = [region]
+    while todo:
+        node = todo[-1]
+        parts = _parts(node)
+        missing = [part for part in parts if id(part) not in known]
+        if missing:
+            todo += reversed(missing)
+            continue
+        todo.pop()
+        known[id(node)] = _inside(node, [known[id(part)] for part in parts], point, around, code)
+    return known[id(region)]
+
+
+def _parts(region: Node) -> tuple[Node, ...]:
+    """The regions that a region is made of."""
+    match region:
+        case RegionUnion() | RegionIntersection():
+            return region.parts
+        case RegionDifference():
+            return region.removed, region.base
+        case Select():
+            return region.options
+        case _:
+            return ()
+
+
+def _inside(
+    region: Node, parts: Sequence[Formula], point: TermVector, around: Box, code: Callable[[Node], object]
+) -> Formula:
+    """A point in a region, given whether it is in the regions that this one is made of."""
     match region:
         case Constant(value=Undefined()):
             return FALSE
@@ -212,17 +243,14 @@ def inside_region(region: Node, point: TermVector, around: Box, code: Callable[[
             sizes = [cast(Term, code(part)) for part in (region.heading, region.width, region.length)]
             return _rectangle(*offset, *sizes)
         case RegionUnion():
-            return disjunction(inside_region(part, point, around, code) for part in region.parts)
+            return disjunction(parts)
         case RegionIntersection():
-            return conjunction(inside_region(part, point, around, code) for part in region.parts)
+            return conjunction(parts)
         case RegionDifference():
-            removed = inside_region(region.removed, point, around, code)
-            return conjunction([inside_region(region.base, point, around, code), negation(removed)])
+            removed, base = parts
+            return conjunction([base, negation(removed)])
         case Select():
             index = cast("Term | Formula", code(region.index))
-            return disjunction(
-                conjunction([picked(index, number), inside_region(option, point, around, code)])
-                for number, option in enumerate(region.options)
-            )
+            return disjunction(conjunction([picked(index, number), part]) for number, part in enumerate(parts))
         case _:
             raise UnsupportedError(f"a region given as {type(region).__name__}")

@@ -1,4 +1,4 @@
-"""Measures queries over time on invented recordings of 20 s at 10 Hz: processor seconds by number of frames.
+"""Measures queries over time on invented recordings of 20 s at 10 Hz: processor seconds and memory by number of frames.
 
     python tests/bench/intervals.py [--frames 100000 1000000] [--jobs 2]
 

@@ -60,6 +60,22 @@ def test_too_little_memory_never_means_that_nothing_matched(command, crossroads)
     assert "resources-exhausted" in done.stderr
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of open files are those of Linux")
+@pytest.mark.parametrize("files", [6, 8, 12])
+def test_too_few_files_never_mean_that_nothing_matched(command, tmp_path, files):
+    code = (
+        f"import os, resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files})); "
+        "os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    source = PROGRAM.parents[1] / "crossroads"
+    words = [sys.executable, "-c", code, command, "ingest", str(source), str(tmp_path / "made"), "-q"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 2), done.stderr
+    assert done.stderr.startswith("error[") == (done.returncode == 2)
+    assert (tmp_path / "made").exists() == (done.returncode == 0)
+    assert "internal error" not in done.stderr
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")
 def test_linear_algebra_takes_its_memory_before_it_can_end_the_process_with_1():
     code = (

@@ -130,3 +130,20 @@ def test_boxes_are_told_to_be_in_regions_of_every_kind(run, tmp_path):
     places = [json.loads(line)["ego"]["position"] for line in found.stdout.splitlines()]
     assert all(y > 1.0 and abs(x) < y for x, y in places)
     assert all(max(abs(x), abs(y - 2)) > 0.5 for x, y in places)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "require ego.position.x > 1.5 or ego.position.x * ego.position.x > 2",
+        "new Object on CircularRegion((0, 0), 1).intersect(CircularRegion((ego.position.x + 1.9999, 0), 1))",
+    ],
+)
+def test_a_scene_that_takes_long_ends_by_name(run, tmp_path, line):
+    program = tmp_path / "long.scenic"
+    program.write_text(f"ego = new Object at (Range(0, 1), 0)\n{line}\n")
+    found = run("sample", program, "--timeout", "1e-9")
+    assert found.exit_code == 2
+    assert "error[deadline-passed]" in found.stderr
+    assert "no scene came up on map `street` in 1e-09 s" in found.stderr
+    assert "`--timeout`" in found.stderr

@@ -21,6 +21,11 @@ REFUSED = {
     "new Car at 9 @ 9, with mood 10**400": "runtime-error",
     "x = 10**400 == Range(0, 1) @ 2": "runtime-error",
     "x = Discrete({1: 10**400})": "runtime-error",
+    "new Car at 9 @ 9, with mutationScale (1, 2)": "wrong-type",
+    "new Car at 9 @ 9, with mutationScale None": "wrong-type",
+    "new Car at 9 @ 9, with mutationScale 'much'\nmutate": "wrong-type",
+    "new Car at 9 @ 9, with positionStdDev 'much'\nmutate": "wrong-type",
+    "new Car at 9 @ 9, with mutationScale 10**400": "wrong-value",
     'param x = "\\ud800"': "wrong-value",
     'x = f"\\udfff{1}"': "wrong-value",
     "a = 'a' * 100000\nb = a.join(a)": "budget-exceeded",
@@ -60,6 +65,9 @@ def test_a_program_ends_where_its_steps_take_too_long(monkeypatch):
         "new Car beyond ego by Range(-1e308, 1e308)",
         "new Car at Range(-1e308, 1e308) @ Range(-1e308, 1e308)",
         "mutate ego by 1e308",
+        "new Car at 9 @ 9, with mutationScale Range(-1, 1)",
+        "new Car at 9 @ 9, with mutationScale -1",
+        "x = Uniform(*network.lanes)\nnew Car on x, with lane x",
     ],
 )
 def test_numbers_near_the_end_of_all_numbers_break_nothing(text, run, tmp_path, crossroads):

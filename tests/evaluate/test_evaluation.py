@@ -104,6 +104,26 @@ def test_the_score_that_counts(street: Dataset, results: list[Result], predictio
     assert max(each.average_precision[0] for each in strict.classes) > 0.5
 
 
+def test_scores_may_be_below_zero(street: Dataset, results: list[Result], predictions: Predictions) -> None:
+    """Logits say what probabilities do."""
+    plain = evaluate({"a": results}, street, predictions)
+    logits = evaluate({"a": results}, street, replace(predictions, score=predictions.score - 7))
+    assert logits.scenarios[0].roles == plain.scenarios[0].roles
+    for one, other in zip(logits.scenarios[0].classes, plain.scenarios[0].classes, strict=True):
+        assert (one.recall, one.precision, one.average_precision) == (
+            other.recall, other.precision, other.average_precision
+        )  # fmt: skip
+        assert {name: found[0] for name, found in one.errors.items()} == pytest.approx(
+            {name: found[0] for name, found in other.errors.items()}
+        )
+    assert plain.least_score == 0
+    assert logits.least_score == pytest.approx(predictions.score.min() - 7, abs=0.5)
+    for wrong in (math.nan, -math.inf, math.inf):
+        with pytest.raises(DataError) as refused:
+            evaluate({"a": results}, street, predictions, least_score=wrong)
+        assert refused.value.diagnostics[0].code == "option-invalid"
+
+
 def test_a_perfect_model(street: Dataset, results: list[Result], predictions: Predictions) -> None:
     perfect = [
         {

@@ -12,7 +12,6 @@ import random
 import shutil
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -34,10 +33,15 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "conformance"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "generate"))
 from examining import drawn_labels, shuffled
 from random_programs import compose
+from rounds import Round, cpu_seconds
 
 STREET = street()
 PATIENCE_S = 3.0
 """For one label."""
+DRAWING_S = 1.0
+"""For one scene."""
+MONOLITHIC_EVERY = 4
+"""How often one formula for the whole label is tried: it costs as much as all other ways together."""
 PROCESSES_EVERY = 20
 """How often two processes are tried: they take as long to start as all else."""
 
@@ -53,7 +57,8 @@ def ways(number: int) -> Iterator[tuple[str, QueryOptions]]:
     yield "usual", usual
     yield "no prefilter", replace(usual, prefilter=False)
     yield "smt", replace(usual, match=replace(plain, method="smt"))
-    yield "monolithic", replace(usual, match=replace(plain, method="monolithic"))
+    if number % MONOLITHIC_EVERY == 0:
+        yield "monolithic", replace(usual, match=replace(plain, method="monolithic"))
     scoped = parse_tolerance("Object.position=0.3,Object.heading=0.1")
     yield "scoped tolerance", replace(usual, match=replace(plain, tolerance=scoped))
     for solver in SOLVERS:
@@ -71,17 +76,19 @@ SOLVERS = (
 
 
 def labels_of(text: str, chance: random.Random) -> list[Label]:
-    """Scenes of a program among distractors, as they are and with something pushed.
+    """Scenes of a program among distractors, as they are and with something pushed, but those that no dataset may hold.
 
     Raises:
         ScenicqError: The program has no scene.
     """
     scenario = compile_scenario(Source("random.scenic", text), STREET)
     found: list[Label] = []
-    for label in drawn_labels(scenario, 2, chance.randrange(2**32))[0]:
-        for far in (0.0, 0.4, 3.0):
+    for label in drawn_labels(scenario, 2, chance.randrange(2**32), DRAWING_S)[0]:
+        for far in (0.0, chance.choice((0.4, 3.0))):
             one = shuffled(label, chance, 2)
             things = [_pushed(each, far, chance) for each in (one.ego, *one.objects)]
+            if any((size or 0.0) < 0.0 for each in things for size in (each.width, each.length, each.height)):
+                continue
             frame = f"frame-{len(found):02}"
             found.append(replace(one, frame=frame, recording="r", timestamp_us=len(found), ego=things[0],
                                  objects=tuple(things[1:])))  # fmt: skip
@@ -104,19 +111,18 @@ def verdicts(dataset: Dataset, text: str, options: QueryOptions) -> dict[str, bo
     return found
 
 
-def contradictions(text: str, number: int, folder: Path, counts: Counter[str]) -> list[str]:
-    """What two ways say of the same frame that cannot both be true.
-
-    Raises:
-        ScenicqError: The program is refused, or has no scene.
-    """
-    labels = labels_of(text, random.Random(text))
+def contradictions(text: str, labels: list[Label], number: int, folder: Path, counts: Counter[str]) -> list[str]:
+    """What two ways say of the same frame that cannot both be true, and which ways refuse a program that has scenes."""
     write_dataset(folder, iter([Recording("r", STREET.name, tuple(labels))]), {STREET.name: STREET.features}, name="t")
     dataset = open_dataset(folder)
     told: list[str] = []
     first: dict[str, bool | None] = {}
     for name, options in ways(number):
-        found = verdicts(dataset, text, options)
+        try:
+            found = verdicts(dataset, text, options)
+        except ScenicqError as error:
+            told.append(f"{name} refuses: {error}")
+            continue
         for frame, matches in found.items():
             counts[f"{name}: {'unknown' if matches is None else 'match' if matches else 'no match'}"] += 1
             if first.get(frame) is None:
@@ -134,24 +140,33 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=600.0)
     options = parser.parse_args()
     counts: Counter[str] = Counter()
-    tried, refused, wrong, until = 0, 0, 0, time.monotonic() + 60 * options.minutes
-    number = 0
-    while tried < options.programs and time.monotonic() < until:
+    tried, refused, wrong, number = 0, 0, 0, 0
+
+    def figures() -> str:
+        lines = [f"{count:8,}  {name}" for name, count in sorted(counts.items())]
+        told = (
+            f"{tried} programs ({refused} without a scene), {wrong} with a contradiction, in {cpu_seconds():.0f} CPU s"
+        )
+        return "\n".join([told, *lines])
+
+    attack = Round(options.minutes, figures)
+    while attack.goes_on(tried < options.programs):
         number += 1
-        text = compose(f"{options.seed}-{number}")
+        text, began = compose(f"{options.seed}-{number}"), cpu_seconds()
+        try:
+            labels = labels_of(text, random.Random(text))
+        except ScenicqError:
+            labels = []
+        if not labels:
+            refused += 1
+            continue
         with tempfile.TemporaryDirectory() as name:
-            try:
-                told = contradictions(text, tried, Path(name) / "d", counts)
-            except ScenicqError:
-                refused += 1
-                continue
+            told = contradictions(text, labels, tried, Path(name) / "d", counts)
         tried += 1
+        attack.took(cpu_seconds() - began)
         if told:
             wrong += 1
             print(f"--- program {options.seed}-{number}", text, *told, sep="\n", flush=True)
-    print(f"{tried} programs ({refused} without a scene), {wrong} with a contradiction")
-    for name, count in sorted(counts.items()):
-        print(f"{count:8,}  {name}")
     sys.exit(wrong > 0)
 
 

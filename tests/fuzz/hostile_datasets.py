@@ -9,18 +9,20 @@ import hashlib
 import json
 import os
 import random
+import resource
 import shutil
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+from rounds import Round, cpu_seconds
 
 ROOT = Path(__file__).parents[2]
 Damage = Callable[[Path], None]
@@ -216,9 +218,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--minutes", type=float, default=60)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--limit", type=float, default=30.0, help="seconds after which a run counts as hanging")
+    parser.add_argument("--limit", type=float, default=30.0, help="CPU seconds of a run that hangs")
     options = parser.parse_args()
-    chance, until = random.Random(options.seed), time.monotonic() + 60 * options.minutes
+    chance = random.Random(options.seed)
     command = str(Path(sys.executable).with_name("scenicq"))
     outcomes: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as name:
@@ -229,29 +231,41 @@ def main() -> None:
         kinds = damages()
         todo = [[kind] for kind in kinds]
         chance.shuffle(todo)
-        while time.monotonic() < until:
+        attack = Round(
+            options.minutes,
+            lambda: f"{outcomes.total()} runs, {len(kinds)} kinds of damage, {len(todo)} not reached: {dict(outcomes)}",
+        )
+        while attack.goes_on():
             chosen = todo.pop() if todo else chance.sample(sorted(kinds), 2)
             folder = work / "hostile"
             if make_hostile(sound, folder, *(kinds[kind] for kind in chosen)):
                 names = commands(folder, work)
                 # what the checker lets through goes through all of them; else one more shows that it is always there
                 for what in [*names][:1] if outcomes.total() % 3 else chance.sample(sorted(names), 2):
+                    began = cpu_seconds()
                     outcomes[_run([command, *names[what]], environment, options.limit, f"{chosen} {what}")] += 1
+                    attack.took(cpu_seconds() - began)
             shutil.rmtree(folder, ignore_errors=True)
             shutil.rmtree(work / "report", ignore_errors=True)
-    print(f"{outcomes.total()} runs, {len(kinds)} kinds of damage, {len(todo)} not reached:", dict(outcomes))
     sys.exit(any(outcomes[bad] for bad in ("internal error", "signal", "hang")))
 
 
 def _run(command: list[str], environment: dict[str, str], limit: float, what: str) -> str:
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 1))
+
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, timeout=limit, check=False)
+        done = subprocess.run(command, env=environment, capture_output=True, timeout=60 * limit, check=False,
+                              preexec_fn=limited)  # fmt: skip
     except subprocess.TimeoutExpired:
         outcome = "hang"
     else:
         told = done.stderr.decode(errors="replace")
         internal = "internal error" in told or "Traceback" in told
-        outcome = "internal error" if internal else "signal" if done.returncode < 0 else f"exit {done.returncode}"
+        late, killed = done.returncode == -signal.SIGXCPU, done.returncode < 0
+        outcome = (
+            "internal error" if internal else "hang" if late else "signal" if killed else f"exit {done.returncode}"
+        )
     if not outcome.startswith("exit"):
         print(f"{outcome}: {what}", flush=True)
     return outcome

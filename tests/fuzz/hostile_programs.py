@@ -10,10 +10,11 @@ import re
 import resource
 import signal
 import sys
-import time
 import traceback
 from collections import Counter
 from pathlib import Path
+
+from rounds import Round, cpu_seconds
 
 ROOT = Path(__file__).parents[2]
 _TOKEN = re.compile(r"\s+|\w+|\"[^\"]*\"|'[^']*'|[^\w\s]")
@@ -143,17 +144,19 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
-    chance, until, known = random.Random(options.seed), time.monotonic() + 60 * options.minutes, sources()
+    chance, known = random.Random(options.seed), sources()
     outcomes: Counter[str] = Counter()
+    attack = Round(options.minutes, lambda: f"{outcomes.total()} programs: {dict(outcomes.most_common())}")
 
     def late(*_: object) -> None:
         raise Hang
 
     # seconds of the processor: other work on the machine makes no program hang
     signal.signal(signal.SIGVTALRM, late)
-    while time.monotonic() < until:
+    while attack.goes_on():
         text = generated(chance) if chance.random() < 0.5 else mutated(chance.choice(known), known, chance)
         signal.setitimer(signal.ITIMER_VIRTUAL, 70)
+        began = cpu_seconds()
         try:
             outcomes[attempt(text)] += 1
         except (Exception, Hang) as error:
@@ -164,9 +167,7 @@ def main() -> None:
             print(f"--- {name}\n{text}\n{traceback.format_exc(limit=-3)}", flush=True)
         finally:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-    print(f"{outcomes.total()} programs:", dict(outcomes.most_common()))
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-    print(f"at most {most} MB")
+            attack.took(cpu_seconds() - began)
     sys.exit(any(name.startswith("BAD") for name in outcomes))
 
 

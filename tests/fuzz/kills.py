@@ -12,8 +12,12 @@ import time
 from collections import Counter
 from pathlib import Path
 
+from rounds import Round, cpu_seconds
+
 ROOT = Path(__file__).parents[2]
 PROGRAM = str(ROOT / "sample_data/scenarios/02_crossing_cars.scenic")
+_HANGS_S = 1800.0
+"""After so long a run hangs, on however busy a machine."""
 
 
 def writers(work: Path, sound: Path) -> dict[str, tuple[list[str], Path]]:
@@ -35,9 +39,13 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=60)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    chance, until = random.Random(options.seed), time.monotonic() + 60 * options.minutes
+    chance = random.Random(options.seed)
     command = str(Path(sys.executable).with_name("scenicq"))
     outcomes: Counter[str] = Counter()
+    ended: Counter[str] = Counter()
+    attack = Round(
+        options.minutes, lambda: f"{outcomes.total()} kills: {dict(outcomes)}, of which ended before: {dict(ended)}"
+    )
     with tempfile.TemporaryDirectory() as name:
         base = Path(name)
         environment = {**os.environ, "XDG_STATE_HOME": str(base / "state")}
@@ -45,27 +53,29 @@ def main() -> None:
         subprocess.run([command, "ingest", str(ROOT / "sample_data/crossroads"), str(sound), "-q"], check=True,
                        env=environment)  # fmt: skip
         took: dict[str, float] = {}
-        while time.monotonic() < until:
+        while attack.goes_on():
             work = base / "work"
             work.mkdir()
             shutil.copytree(sound, work / "copy")
             words, target = chance.choice(sorted(writers(work, sound).values()))
             kind = words[0] if words[0] != "match" else target.name
-            began = time.monotonic()
+            began, cost = time.monotonic(), cpu_seconds()
             running = subprocess.Popen([command, *words], env=environment, stdout=subprocess.DEVNULL,
                                        stderr=subprocess.DEVNULL)  # fmt: skip
             try:
-                running.wait(chance.uniform(0.0, took.get(kind, 5.0)))
+                # the first of a kind goes on to its end, which shows how long there is to kill the others
+                running.wait(chance.uniform(0.0, took[kind]) if kind in took else _HANGS_S)
                 took[kind] = time.monotonic() - began
+                ended[kind] += 1
             except subprocess.TimeoutExpired:
                 running.send_signal(signal.SIGKILL)
                 running.wait()
             outcome = _after(command, words, target, environment)
+            attack.took(cpu_seconds() - cost)
             outcomes[outcome] += 1
             if outcome != "mended":
                 print(f"{outcome}: {kind}", flush=True)
             shutil.rmtree(work)
-    print(f"{outcomes.total()} kills:", dict(outcomes))
     sys.exit(outcomes.total() != outcomes["mended"])
 
 
@@ -74,7 +84,7 @@ def _after(command: str, words: list[str], target: Path, environment: dict[str, 
     more = ["--force"] if words[0] == "ingest" else []
     if words[0] == "match" and "--export" in words and target.exists():
         shutil.rmtree(target)  # it is there completely, and is not written over
-    done = subprocess.run([command, *words, *more], env=environment, capture_output=True, text=True, timeout=300,
+    done = subprocess.run([command, *words, *more], env=environment, capture_output=True, text=True, timeout=_HANGS_S,
                           check=False)  # fmt: skip
     if done.returncode != 0:
         return f"exit {done.returncode} {done.stderr[:200]}"

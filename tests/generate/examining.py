@@ -11,7 +11,7 @@ from examples import Example
 from outside import TooManyError, outside
 
 from scenicq.errors import ScenarioError
-from scenicq.exporters.sample import sample_labels
+from scenicq.exporters.sample import PATIENCE_S, sample_labels
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -47,11 +47,13 @@ class Outcome:
     faults: list[str] = field(default_factory=list)
 
 
-def drawn_labels(scenario: Scenario, count: int, seed: int) -> tuple[list[Label], frozenset[BuiltIn]]:
+def drawn_labels(
+    scenario: Scenario, count: int, seed: int, timeout_s: float = PATIENCE_S
+) -> tuple[list[Label], frozenset[BuiltIn]]:
     """Labels with as many built-in requirements as allow for any; with those that were waived."""
     for waived in _WAIVED:
         try:
-            return list(sample_labels(scenario, count, seed, waived, ATTEMPTS)), waived
+            return list(sample_labels(scenario, count, seed, waived, ATTEMPTS, timeout_s)), waived
         except ScenarioError:
             if waived == _WAIVED[-1]:
                 raise

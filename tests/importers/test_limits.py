@@ -128,3 +128,29 @@ def test_a_damaged_file_of_the_map_cache_is_made_again(tmp_path):
     made.write_text("made, and then half of it lo")
     assert convert().read_text() == "made\n"
     assert (tmp_path / "runs").read_text() == "run\nrun\n"
+
+
+@pytest.mark.parametrize(
+    ("table", "change"),
+    [
+        ("ego_pose", lambda row: row["translation"].__setitem__(1, 2**63)),
+        ("ego_pose", lambda row: row["translation"].__setitem__(2, -1e8)),
+        ("sample_annotation", lambda row: row["translation"].__setitem__(0, 5e151)),
+    ],
+)
+def test_nothing_of_nuscenes_is_at_no_place_on_a_map(tmp_path, table, change):
+    source = Path(shutil.copytree(SOURCE.with_name("nuscenes_tiny"), tmp_path / "source"))
+    (file,) = source.rglob(f"{table}.json")
+    rows = json.loads(file.read_text())
+    for row in rows:
+        change(row)
+    rows[0]["translation"] = [1.0, 1.0, 1.0]
+    file.write_text(json.dumps(rows))
+    try:
+        summary = ingest(source, tmp_path / "made")
+        told = summary.diagnostics
+        open_dataset(tmp_path / "made")
+    except DataError as error:
+        told = error.diagnostics
+    assert any("at no place on a map" in each.message for each in told)
+    assert all(each.code != "dataset-invalid" for each in told)

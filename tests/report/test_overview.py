@@ -17,7 +17,7 @@ def rows(markup):
 
 
 def test_of_frames_it_counts_frames():
-    funnel = Funnel(frames=40, candidates=20, cast=10, matches=4, unknowns=1)
+    funnel = Funnel(frames=40, candidates=20, with_roles=10, matches=4, unknowns=1)
     assert rows(funnel_section(funnel, 40)) == [
         ("frames", "40", True),
         ("after the prefilter", "20", True),
@@ -33,12 +33,11 @@ def test_over_time_it_counts_what_intervals_come_from():
     funnel = Funnel(frames=40, candidates=20, matches=1, over_time=counted, broken=broken)
     markup = funnel_section(funnel, 40)
     assert rows(markup) == [
-        ("frames", "40", True),
+        ("frames of 2 recordings", "40", True),
         ("after the prefilter", "20", True),
-        ("that match the initial scene", "9", True),
-        ("recordings looked at", "2", False),
-        ("ways to give the objects tracks", "5", False),
-        ("of these cut off: the recording or a track ends before the program", "3", False),
+        ("frames that match the initial scene", "9", True),
+        ("ways to give the objects tracks from there on", "5", False),
+        ("of these ways cut off: the recording or a track ends before the program", "3", False),
         ("intervals that match", "1", False),
         ("intervals that are unknown", "0", False),
     ]

@@ -1,5 +1,5 @@
 # Further road users and props, with the default sizes of Scenic's model for the CARLA simulator where a blueprint
-# has none on record.
+# has none on record; and what datasets have labels of besides, so that a class that a dataset lists can be written.
 
 class Truck(Vehicle):
     width: 2.5
@@ -23,6 +23,44 @@ class Bicycle(Vehicle):
 class Trailer(Vehicle):
     width: 3
     length: 10
+
+class ConstructionVehicle(Vehicle):
+    width: 2.5
+    length: 7
+
+class EmergencyVehicle(Vehicle):
+    pass
+
+class Ambulance(EmergencyVehicle):
+    length: 6
+
+class PoliceCar(EmergencyVehicle):
+    pass
+
+class FireEngine(EmergencyVehicle):
+    width: 2.5
+    length: 8
+
+class Adult(Pedestrian):
+    pass
+
+class Child(Pedestrian):
+    pass
+
+class ConstructionWorker(Pedestrian):
+    pass
+
+class PoliceOfficer(Pedestrian):
+    pass
+
+class PersonalMobility(Pedestrian):
+    pass
+
+class Wheelchair(Pedestrian):
+    pass
+
+class Stroller(Pedestrian):
+    pass
 
 class Prop(DrivingObject):
     regionContainedIn: road
@@ -51,6 +89,13 @@ class Trash(Prop):
 
 class Garbage(Trash):
     pass
+
+class PushablePullable(Prop):
+    pass
+
+class BicycleRack(Prop):
+    width: 2
+    length: 2
 
 class VendingMachine(Prop):
     pass

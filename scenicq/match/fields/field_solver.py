@@ -23,6 +23,7 @@ from scenicq.match.fields.cell_assignment import HeadingAssignment, solved, way_
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.heading_propagation import LimitError, directed, halved, settled
+from scenicq.match.fields.probing import probed
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.problem.evaluation import holds
@@ -49,6 +50,12 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
         shared: The random number that they share, if there are several parts.
         tolerance: Per feature.
     """
+    start = BoxSet.start(ConstraintNetwork([item for part in parts for item in part], tolerance), {}).narrowed()
+    if not start.size:
+        return Refuted(parts[0][0][0])
+    witness = probed(start, tolerance)
+    if witness is not None:
+        return witness
     if shared is None or len(parts) == 1:
         return _whole(parts[0], tolerance)
     first = parts[0][0][0]

@@ -1,8 +1,8 @@
 """Groups that are affine: linear programs, one per combination of map cells and whole turns.
 
 A random point in a region becomes one alternative per convex cell near where the point can be; on a curb one per
-segment, in a list of points one per point. Discs are taken between two polygons: what the outer one excludes is out,
-what the inner one allows is in, and the rest is left to a solver.
+segment, in a list of points one per point. Discs, also those that sectors are cut from, are taken between two polygons:
+what the outer one excludes is out, what the inner one allows is in, and the rest is left to a solver.
 """
 
 from __future__ import annotations
@@ -34,7 +34,17 @@ from scenicq.forest.proximity_pruning import close_boxes
 from scenicq.forest.walk import conjuncts, leaves
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
-from scenicq.geometry.regions import Disc, IntersectionOf, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
+from scenicq.geometry.regions import (
+    Disc,
+    IntersectionOf,
+    PointSet,
+    PolygonSet,
+    PolylineSet,
+    Rectangle,
+    Region,
+    Sector,
+    UnionOf,
+)
 from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.linear.linear_program import LinearSystem, NotSolved, Row
@@ -260,14 +270,17 @@ class _Problem:
     def _add_place(self, region: Region, place: AffineVector, box: Box | None) -> None:
         """Keep a point in a region: cells, segments or points, possibly cut to discs."""
         met = region.parts if isinstance(region, IntersectionOf) else (region,)
-        others = [part for part in met if not isinstance(part, Disc)]
+        others = [part for part in met if not isinstance(part, Disc | Sector)]
         if len(others) > 1:
             raise NotLinear
         x, y = place
         for part in met:
-            if isinstance(part, Disc):
+            if isinstance(part, Disc | Sector):
                 cx, cy = part.center
-                self.discs.append((x.plus(Affine(-cx, {})), y.plus(Affine(-cy, {})), part.radius))
+                away = x.plus(Affine(-cx, {})), y.plus(Affine(-cy, {}))
+                self.discs.append((*away, part.radius))
+                if isinstance(part, Sector):
+                    self.alternatives.append(_opening(away, part))
         if others:
             west, south, east, north = region_bounds(region)
             (x0, x1), (y0, y1) = box or ((west, east), (south, north))
@@ -302,6 +315,28 @@ class _Problem:
         except NotSolved:
             raise NotLinear from None
         return found
+
+
+def _opening(away: AffineVector, sector: Sector) -> Alternative:
+    """Rows that keep a vector from the apex between the edges of a sector; two sets of them beyond half a turn."""
+    if sector.angle >= math.tau:
+        return [[]]
+    if sector.angle < 0:
+        return []
+    x, y = away
+
+    def along(heading: float) -> Affine:
+        return x.times(-math.sin(heading)).plus(y, math.cos(heading))
+
+    half, turn = sector.angle / 2, math.pi / 2
+    # left of the right edge, right of the left edge
+    edges = [
+        Row(along(sector.heading - half + turn), 0.0, math.inf),
+        Row(along(sector.heading + half - turn), 0.0, math.inf),
+    ]
+    return (
+        [[*edges, Row(along(sector.heading), 0.0, math.inf)]] if sector.angle <= math.pi else [[row] for row in edges]
+    )
 
 
 def _places(region: Region, limits: tuple[float, float, float, float], place: AffineVector) -> Alternative:

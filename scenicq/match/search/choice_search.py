@@ -41,6 +41,8 @@ __all__ = ["decide_with_choices"]
 
 _MOST_TRIES = 20_000
 """Outcomes of choices that are tried for one group of one label."""
+_DEEPEST = 16
+"""Searches inside one another: of alternatives that are met only in what an alternative leads to."""
 
 Decide = Callable[[list[Item]], Outcome]
 """Decides constraints that hold no choices."""
@@ -55,6 +57,7 @@ def decide_with_choices(
     tolerance: Tolerance,
     decide: Decide,
     ask: Ask | None = None,
+    depth: int = 0,
 ) -> Outcome | None:
     """Decide a group that random choices are part of; None if there are none.
 
@@ -63,6 +66,7 @@ def decide_with_choices(
         tolerance: Per feature.
         decide: Decides what is left when all choices have come out.
         ask: The same by a solver, where nothing else decides it.
+        depth: In how many other searches it is asked for.
 
     Raises:
         TimeIsUp: See `scenicq.budget`.
@@ -74,13 +78,15 @@ def decide_with_choices(
         return Undecided(items[0][0], "budget")
     if not any(part.trees for part in found):
         return None
+    if depth > _DEEPEST:
+        return Undecided(items[0][0], "budget")
     for part in found:
         if any(not tree.results for tree in part.trees.values()):
             return Refuted(part.item[0])
     for constraint, node, seen in parts:
         if isinstance(node, Constant) and not holds(constraint, node.value, seen, tolerance):
             return Refuted(constraint, ground_cause((constraint, node, seen)))
-    return _ChoiceSearch(list(items), found, tolerance, decide, ask).solve()
+    return _ChoiceSearch(list(items), found, tolerance, decide, ask, depth).solve()
 
 
 class _ChoiceSearch:
@@ -93,6 +99,7 @@ class _ChoiceSearch:
         tolerance: Tolerance,
         decide: Decide,
         ask: Ask | None,
+        depth: int,
     ) -> None:
         self.items = items
         self.constraints = [constraint for constraint, _, _ in items]
@@ -100,6 +107,7 @@ class _ChoiceSearch:
         self.tolerance = tolerance
         self.decide = decide
         self.ask = ask
+        self.depth = depth
         self.asking = False
         self.blamed: tuple[int, Refuted] | None = None
         self.doubt: Undecided | None = None
@@ -293,7 +301,7 @@ class _ChoiceSearch:
         left = [item for item in left if not isinstance(item[1], Constant)]
         if not left:
             return Satisfied({})
-        found = decide_with_choices(left, self.tolerance, decide) or decide(left)
+        found = decide_with_choices(left, self.tolerance, decide, depth=self.depth + 1) or decide(left)
         if isinstance(found, Satisfied) or found.constraint in self.constraints:
             return found
         return replace(found, constraint=self.items[0][0] if not parts else parts[0].item[0])

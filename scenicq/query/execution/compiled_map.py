@@ -95,8 +95,9 @@ def about_dataset(error: ScenarioError, dataset: Dataset, map_name: str) -> Scen
             map_, option = ("map", "FILE") if map_name == "none" else (f"map `{map_name}`", f"{map_name}=FILE")
             message = f"dataset {dataset.name} has no {map_}, and the program needs one"
             hint = f"`scenicq ingest SOURCE DATASET --map {option}` makes a dataset with a map"
-            free = "what is `in everywhere, facing Range(0, 360) deg` needs no map"
-            told.append(replace(each, message=message, label="needs a map", hints=(hint, free)))
+            free = "`in everywhere, facing Range(0, 360) deg` places what needs no map"
+            hints = (hint, *each.hints) if each.notes else (hint, free)
+            told.append(replace(each, message=message, label=each.label if each.notes else "needs a map", hints=hints))
         else:
             where = f"dataset {dataset.name}" if map_name in each.message else f"map `{map_name}` of {dataset.name}"
             told.append(replace(each, message=f"{each.message} ({where})"))

@@ -1,16 +1,18 @@
-"""What keeps nearly all frames from matching, and how many there would be with one change.
+"""What keeps nearly all frames from matching, and how many there would be with one change, or with two.
 
 A change drops one requirement or the comparison of one feature, widens one part of the tolerance, or takes a wider
 class. The prefilter of the changed program counts what it leaves, over a sample where the dataset is large; the matcher
 then decides these, as long as there is time, so that the number is one of matches and not only a bound. The sample is
-read into memory once, for all changes.
+read into memory once, for all changes. Where no change leaves a frame, pairs of those that drop something are tried.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -39,6 +41,8 @@ _MOST_FRAMES = 5_000
 """Frames of a dataset beyond which a sample is looked at."""
 _MOST_CHANGES, _FEW_CHANGES = 24, 5
 """Changes that are tried; the second where advice must be brief."""
+_MOST_PAIRED, _FEW_PAIRED = 6, 4
+"""Changes of which pairs are tried."""
 _MOST_DECIDED, _FEW_DECIDED = 300, 16
 """Frames that the matcher decides for one change."""
 _MOST_RUNS, _FEW_RUNS = 8, 3
@@ -47,6 +51,14 @@ _MOST_MAPS, _FEW_MAPS = 16, 4
 """Maps whose frames are looked at."""
 _ANYWHERE = {"position": 1e5, "heading": math.pi}
 """Sizes of a tolerance by which a feature is as good as not compared."""
+_WRITTEN = {"position": "in everywhere", "heading": "facing Range(0, 360) deg"}
+"""What the program says where a property may have any value, in place of a class's default."""
+_AT_A_SIDE = re.compile(r"(ahead of|behind|left of|right of) (\w+) by (?!.*@)")
+_AREAS = {
+    "ahead of": "Range(-2, 2) @ Range(3, 30)", "behind": "Range(-2, 2) @ Range(-30, -3)",
+    "left of": "Range(-6, -1) @ Range(-5, 5)", "right of": "Range(1, 6) @ Range(-5, 5)",
+}  # fmt: skip
+"""Areas at a side of an object, from centre to centre."""
 _WIDER = (("position", 1.0), ("position", 4.0), ("heading", math.radians(20)), ("heading", math.radians(45)))
 """Parts of the tolerance that are tried, in metres and radians."""
 _WIDER_NUMBER = 0.5
@@ -61,23 +73,30 @@ class ProgramChange:
 
     Attributes:
         told: The change, in the words of the program and of the options.
-        about: What it changes, as the funnel names what excludes frames; empty for what concerns many features.
+        about: What it changes, as the funnel names what excludes frames; a property where it concerns many objects.
         span: The place in the program.
         requirement: Place of the requirement that is dropped among the scenario's; -1 where none is.
         unset: Object and property that are not compared.
         category: Object and the class that it is given.
         tolerance: The tolerance, where it is another one.
         ignored: A parameter that is not compared.
+        written: What to write for it, where the change is one of words.
+        both: The two changes that this one is, if it is two.
+        widened: Place among the tolerances that are tried one after the other for the same property; 0 for what drops
+            something.
     """
 
     told: str
-    about: str = ""
+    about: str
     span: Span | None = None
     requirement: int = -1
     unset: tuple[int, str] | None = None
     category: tuple[int, str] | None = None
     tolerance: Tolerance | None = None
     ignored: str = ""
+    written: str = ""
+    both: tuple[ProgramChange, ...] = ()
+    widened: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,13 +127,16 @@ class Advice:
 
     Attributes:
         first: What excludes most frames, with how many.
-        outlooks: The changes that may leave frames, those that are known to leave most first.
-        complete: Whether all changes were looked at within the time.
+        outlooks: The changes that may leave frames, those that are known to leave most first; pairs of changes only
+            where no single one does.
+        complete: Whether all single changes were looked at within the time.
+        hints: What the program may mean instead.
     """
 
     first: tuple[tuple[str, int], ...]
     outlooks: tuple[Outlook, ...]
     complete: bool
+    hints: tuple[str, ...] = ()
 
 
 class _Clock:
@@ -162,7 +184,12 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
         return Advice(tuple(excluded[:3]), (), complete=True)
     rank = {what: place for place, (what, _) in enumerate(excluded)}
     scenario = next(iter(worlds.values())).scenario
-    changes = sorted(_changes(scenario, query.options.match), key=lambda each: rank.get(each.about, len(rank)))
+    for what in tuple(rank):
+        # a wider tolerance is tried after the first feature that it concerns
+        rank.setdefault(what.rpartition(".")[2], rank[what])
+    changes = sorted(
+        _changes(scenario, query.options.match), key=lambda each: (rank.get(each.about, len(excluded)), each.widened)
+    )
     most, decided = (_FEW_CHANGES, _FEW_DECIDED) if brief else (_MOST_CHANGES, _MOST_DECIDED)
     found: list[Outlook] = []
     complete = len(changes) <= most
@@ -177,8 +204,34 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
             outlook = _outlook(query.options.match, sample, change, clock, solver, decided)
             if outlook.most > query.funnel.matches:
                 found.append(outlook)
+        if not found and query.funnel.matches == 0:
+            paired = _pairs(changes[:most], _FEW_PAIRED if brief else _MOST_PAIRED)
+            for change in itertools.takewhile(lambda _: not clock.is_over, paired):
+                outlook = _outlook(query.options.match, sample, change, clock, solver, decided)
+                if outlook.most > 0:
+                    found.append(outlook)
     found.sort(key=lambda each: (-each.least, -each.most))
-    return Advice(tuple(excluded[:3]), tuple(found), complete)
+    return Advice(tuple(excluded[:3]), tuple(found), complete, tuple(_lines_meant(scenario, excluded)))
+
+
+def _lines_meant(scenario: Scenario, excluded: Sequence[tuple[str, int]]) -> Iterator[str]:
+    """Hints for objects at a side of another, which leaves them a line, where their position excludes most."""
+    for owner in scenario.objects:
+        given = owner.properties.get("position")
+        if given is None or not given.explicit or given.span is None or not excluded:
+            continue
+        placed = _AT_A_SIDE.match(" ".join(given.span.text.split()))
+        if placed and excluded[0][0] == f"{owner.name}.position":
+            side, other = placed.groups()
+            yield (f"`{side} {other} by` a number leaves a line; "
+                   f"`at {other} offset by {_AREAS[side]}` is an area")  # fmt: skip
+
+
+def _pairs(changes: Sequence[ProgramChange], most: int) -> Iterator[ProgramChange]:
+    """Two changes at once, of the first that drop something."""
+    dropping = [each for each in changes if not each.widened]
+    for one, other in itertools.combinations(dropping[:most], 2):
+        yield ProgramChange(f"{one.told}, and {other.told}", one.about, both=(one, other))
 
 
 def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int, maps: int) -> _Sample:
@@ -215,7 +268,8 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChang
             if name in _ANYWHERE and name not in owner.mutated:
                 rules = (*options.tolerance.rules, (owner.name, name, _ANYWHERE[name]))
                 wide = replace(options.tolerance, rules=rules)
-                yield ProgramChange(f"`{what}` not compared", what, given.span, tolerance=wide)
+                span, written = (given.span, "") if given.explicit else (owner.span, _WRITTEN[name])
+                yield ProgramChange(f"`{what}` not compared", what, span, tolerance=wide, written=written)
             elif given.explicit and name not in _ANYWHERE:
                 yield ProgramChange(f"`{what}` not compared", what, given.span, unset=(owner.index, name))
                 if kind_of(given.value) == "scalar":
@@ -227,8 +281,8 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChang
     for name in numbers:
         if options.tolerance.of(0, name).size < _WIDER_NUMBER:
             wide = replace(options.tolerance, rules=(*options.tolerance.rules, ("", name, _WIDER_NUMBER)))
-            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
-    for name, size in _WIDER:
+            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", name, tolerance=wide, widened=1)
+    for number, (name, size) in enumerate(_WIDER, 1):
         disc = name != "position" or options.tolerance.x is None
         if disc and getattr(options.tolerance, name) < size:
             wide = (
@@ -236,36 +290,46 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChang
                 if name == "position"
                 else replace(options.tolerance, heading=size)
             )
-            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", tolerance=wide)
+            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", name, tolerance=wide, widened=number)
 
 
-def _changed(scenario: Scenario, change: ProgramChange) -> Scenario:
-    requirements, objects = list(scenario.requirements), list(scenario.objects)
-    if change.requirement >= 0:
-        del requirements[change.requirement]
-    if change.unset is not None:
-        index, name = change.unset
-        given = objects[index].properties[name]
-        properties = {**objects[index].properties, name: replace(given, explicit=False)}
-        objects[index] = replace(objects[index], properties=properties)
-    if change.category is not None:
-        index, category = change.category
-        objects[index] = replace(objects[index], category=category)
+def _changed(scenario: Scenario, changes: Sequence[ProgramChange]) -> Scenario:
+    objects = list(scenario.objects)
+    dropped = {change.requirement for change in changes}
+    requirements = [each for number, each in enumerate(scenario.requirements) if number not in dropped]
+    for change in changes:
+        if change.unset is not None:
+            index, name = change.unset
+            given = objects[index].properties[name]
+            properties = {**objects[index].properties, name: replace(given, explicit=False)}
+            objects[index] = replace(objects[index], properties=properties)
+        if change.category is not None:
+            index, category = change.category
+            objects[index] = replace(objects[index], category=category)
     return replace(scenario, requirements=tuple(requirements), objects=tuple(objects))
+
+
+def _changed_options(options: MatchOptions, changes: Sequence[ProgramChange]) -> MatchOptions:
+    before = len(options.tolerance.rules)
+    for change in changes:
+        if change.tolerance is not None:
+            rules = (*options.tolerance.rules, *change.tolerance.rules[before:])
+            options = replace(options, tolerance=replace(change.tolerance, rules=rules))
+        if change.ignored:
+            options = replace(options, ignore_params=options.ignore_params | {change.ignored})
+    return options
 
 
 def _outlook(
     options: MatchOptions, sample: _Sample, change: ProgramChange, clock: _Clock, solver: LazySolver, most: int
 ) -> Outlook:
     """Count the frames that a change leaves, and decide at most so many of them while there is time."""
-    if change.tolerance is not None:
-        options = replace(options, tolerance=change.tolerance)
-    if change.ignored:
-        options = replace(options, ignore_params=options.ignore_params | {change.ignored})
+    changes = change.both or (change,)
+    options = _changed_options(options, changes)
     left = matched = decided = 0
     for name, connection in sample.held.items():
         world = sample.worlds[name]
-        world = CompiledMap.of(_changed(world.scenario, change), world.network, options, prefilter=True)
+        world = CompiledMap.of(_changed(world.scenario, changes), world.network, options, prefilter=True)
         missed = run_plan(connection, world.plan)
         count = int(np.count_nonzero(missed < 0))
         left += count

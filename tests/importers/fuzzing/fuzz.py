@@ -37,6 +37,9 @@ from scenicq.importers.ingest import ingest
 from scenicq.query.execution.run import Query
 from scenicq.store.dataset import open_dataset
 
+sys.path.insert(0, str(Path(__file__).parents[2] / "fuzz"))
+from rounds import Round
+
 REPOSITORY = Path(__file__).resolve().parents[3]
 SAMPLES = REPOSITORY / "sample_data"
 FORMATS = {
@@ -55,7 +58,7 @@ FORMATS = {
 LONGEST_S = 20.0
 MOST_BYTES = 1 << 30
 # Processor time is what counts: a machine may be busy.
-PATIENCE_S = 60
+PATIENCE_S = 1800
 EXPORTS = ("interchange", "openlabel", "paths")
 
 
@@ -241,10 +244,15 @@ def main() -> int:
     options = parser.parse_args()
     samples = [options.sample] if options.sample else list(FORMATS)
     ends: Counter[tuple[str, str]] = Counter()
-    slowest, largest, crashes = 0.0, 0, 0
-    until = time.monotonic() + 60 * options.minutes
+    crashes = 0
     number = options.first if options.only is None else options.only
-    while time.monotonic() < until:
+
+    def figures() -> str:
+        lines = [f"{name:20} {end:8} {count}" for (name, end), count in sorted(ends.items())]
+        return "\n".join([f"{ends.total()} cases, {crashes} crashes", *lines])
+
+    attack = Round(options.minutes, figures)
+    while attack.goes_on():
         name = samples[number % len(samples)]
         folder = Path(os.path.realpath(tempfile.mkdtemp(prefix="fuzz-")))
         (folder / "outside.txt").write_text('{"outside": 1}')
@@ -253,7 +261,7 @@ def main() -> int:
             _child(name, folder, f"{options.seed}:{number}")
         status, usage, hung = _attend(child)
         spent = usage.ru_utime + usage.ru_stime
-        slowest, largest = max(slowest, spent), max(largest, usage.ru_maxrss)
+        attack.took(spent)
         said = (folder / "said.txt").read_text(errors="replace")
         why = "hang" if hung or spent > LONGEST_S else "memory" if usage.ru_maxrss * 1024 > MOST_BYTES else ""
         if why or status != 0:
@@ -270,9 +278,6 @@ def main() -> int:
             break
         shutil.rmtree(folder)
         number += 1
-    for (name, end), count in sorted(ends.items()):
-        print(f"{name:20} {end:8} {count}")
-    print(f"{ends.total()} cases, {crashes} crashes, slowest {slowest:.1f} s, largest {largest / 1024:.0f} MB")
     return bool(crashes)
 
 

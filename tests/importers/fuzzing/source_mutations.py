@@ -289,7 +289,9 @@ def _columns(table: pa.Table, random: random.Random) -> pa.Table:
 
 def _feather(content: bytes, random: random.Random) -> bytes:
     sink = pa.BufferOutputStream()
-    table = _columns(pa.ipc.open_file(content).read_all(), random)
+    table = pa.ipc.open_file(content).read_all()
+    table.validate(full=True)  # what was damaged before would end this process
+    table = _columns(table, random)
     feather.write_feather(table, sink, compression=random.choice(["uncompressed", "lz4", "zstd"]))
     return sink.getvalue().to_pybytes()
 

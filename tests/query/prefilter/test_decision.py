@@ -120,7 +120,7 @@ def test_what_sql_decides_of_random_programs_has_a_proof(dataset, first):
 
 
 @pytest.mark.parametrize(
-    "name", ["range", "ahead", "options", "steps", "walker", "view", "seen", "slow", "or", "two", "crossing"]
+    "name", ["range", "ahead", "options", "steps", "walker", "view", "seen", "or", "two", "crossing"]
 )
 def test_sql_decides_what_it_can(dataset, name):
     sure, left = check(dataset, SINGLE[name], OPTIONS["default"])

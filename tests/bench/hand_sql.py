@@ -1,0 +1,234 @@
+"""Questions to a fleet (`fleet.py`) as Scenic programs and as SQL written by hand over the columns of its store."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from fleet import NEEDLE, fleet_map
+
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import EXACT, Tolerance
+
+__all__ = ["MACROS", "QUESTIONS", "Question"]
+
+SCENARIOS = Path(__file__).parents[2] / "sample_data" / "scenarios"
+SAMPLE = MatchOptions(classes="coarse", radius=50.0)
+WIDE = MatchOptions()
+"""The default tolerance: 0.25 m and 5 degrees."""
+NARROW = MatchOptions(tolerance=EXACT)
+SPEED = MatchOptions(tolerance=Tolerance(other=0.1))
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A question.
+
+    Attributes:
+        program: In Scenic.
+        options: How it is matched.
+        sql: Names the frames that match.
+    """
+
+    program: str
+    options: MatchOptions
+    sql: str
+
+
+VEHICLES = "('Car', 'Truck', 'Bicycle')"
+"""Classes of the fleet that `--classes coarse` takes for cars."""
+DRIVABLE = "('lane', 'road', 'intersection', 'drivable')"
+MACROS = (
+    f"CREATE MACRO turned(a, b) AS least(abs(a - b) % {math.tau}, {math.tau} - abs(a - b) % {math.tau})",
+    "CREATE MACRO along(heading, directions, away) AS "
+    "len(list_filter(directions, lambda d: turned(heading, d) <= away)) > 0",
+    # metres from a point to a rectangle whose sides are parallel to the axes
+    "CREATE MACRO off(x, y, x0, x1, y0, y1) AS "
+    "sqrt(greatest(x0 - x, x - x1, 0) ** 2 + greatest(y0 - y, y - y1, 0) ** 2)",
+)
+
+
+def _near(frame: str, object_: str, kinds: str, reach: float = 0.25) -> str:
+    """That an object is in a region, or within reach of it."""
+    return (
+        f"EXISTS (FROM memberships m WHERE m.frame = {frame} AND m.object = {object_} AND m.kind IN {kinds} "
+        f"AND m.distance <= {reach})"
+    )
+
+
+EGO = f"""
+ego AS (SELECT * FROM labels l WHERE along(ego_heading, ego_road_directions, radians({{}}))
+        AND {_near("l.frame", "'ego'", "{}")})"""
+DRIVER = EGO.format(5, DRIVABLE)
+"""An ego that is a car as the world model has it: on a road, along it."""
+SAMPLE_EGO = EGO.format(20, "('lane', 'intersection')")
+CROSSINGS = ", ".join(str(each.shape.bounds) for each in fleet_map() if each.kind == "intersection")
+"""The fleet's intersections are rectangles."""
+
+
+def _sample(name: str, sql: str) -> Question:
+    return Question((SCENARIOS / f"{name}.scenic").read_text(), SAMPLE, sql)
+
+
+def _driving(program: str, rest: str, options: MatchOptions = WIDE) -> Question:
+    """A program of the driving world, with an ego as that has it."""
+    return Question(f"model scenic.domains.driving.model\nego = new Car\n{program}\n", options, f"WITH {DRIVER}{rest}")
+
+
+QUESTIONS = {
+    "01_pedestrian_facing_ego": _sample(
+        "01_pedestrian_facing_ego",
+        f"""
+WITH {SAMPLE_EGO}
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+JOIN memberships m ON m.frame = a.frame AND m.object = a.id
+WHERE a.class = 'Adult' AND a.ego_distance <= 50 AND abs(a.relative_heading) > radians(70)
+AND m.kind IN ('lane', 'intersection') AND m.distance <= 0.25""",
+    ),
+    "02_crossing_cars": _sample(
+        "02_crossing_cars",
+        f"""
+WITH {SAMPLE_EGO},
+crossing(x0, y0, x1, y1) AS (VALUES {CROSSINGS}),
+car AS (SELECT a.* FROM objects a JOIN ego USING (frame) JOIN memberships m ON m.frame = a.frame AND m.object = a.id
+        WHERE a.class IN {VEHICLES} AND a.ego_distance <= 50 AND m.kind = 'intersection' AND m.distance <= 0.25),
+near AS (SELECT frame FROM ego WHERE EXISTS (FROM crossing WHERE off(ego_x, ego_y, x0, x1, y0, y1) < 10))
+SELECT DISTINCT l.frame FROM car l JOIN car r USING (frame) JOIN near USING (frame)
+WHERE l.relative_heading BETWEEN radians(45) AND radians(140)
+AND -r.relative_heading BETWEEN radians(45) AND radians(140) AND turned(l.heading, r.heading) > radians(100)""",
+    ),
+    "03_against_traffic": _sample(
+        "03_against_traffic",
+        f"""
+WITH ego AS (
+    SELECT * FROM labels l
+    WHERE len(list_filter(ego_road_directions, lambda d: turned(ego_heading, d) >= radians(85))) > 0
+    AND {_near("l.frame", "'ego'", DRIVABLE)})
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+JOIN memberships m ON m.frame = a.frame AND m.object = a.id
+WHERE a.class IN {VEHICLES} AND a.ego_distance < 10 AND along(a.heading, a.road_directions, radians(20))
+AND m.kind IN {DRIVABLE} AND m.distance <= 0.25
+AND abs(a.ego_right) * cos(radians(67.5)) - a.ego_ahead * sin(radians(67.5)) <= 0.25""",
+    ),
+    "04_two_lane_traffic": _sample(
+        "04_two_lane_traffic",
+        f"""
+WITH {SAMPLE_EGO},
+car AS (SELECT a.*, ego.ego_length FROM objects a JOIN ego USING (frame)
+        WHERE a.class IN {VEHICLES} AND a.ego_distance <= 50),
+follower AS (SELECT * FROM car WHERE along(heading, road_directions, radians(20))),
+leader AS (SELECT * FROM follower
+           WHERE off(ego_right, ego_ahead, -1, 1, (ego_length + length) / 2, (ego_length + length) / 2 + 40) <= 0.25),
+oncoming AS (SELECT * FROM car
+             WHERE off(ego_right, ego_ahead, -10, -1, 0, 50) <= 0.25 AND turned(relative_heading, pi()) <= radians(45))
+SELECT DISTINCT o.frame FROM oncoming o JOIN follower s ON s.frame = o.frame AND s.id <> o.id
+JOIN leader l ON l.frame = o.frame AND l.id <> o.id AND l.id <> s.id
+WHERE off((s.x - o.x) * cos(o.heading) + (s.y - o.y) * sin(o.heading),
+          (s.y - o.y) * cos(o.heading) - (s.x - o.x) * sin(o.heading),
+          -1, 1, (o.length + s.length) / 2, (o.length + s.length) / 2 + 40) <= 0.25""",
+    ),
+    "05_cut_in_from_right": _sample(
+        "05_cut_in_from_right",
+        f"""
+WITH ego AS (
+    SELECT * FROM labels l WHERE along(ego_heading, ego_road_directions, radians(20))
+    AND EXISTS (FROM memberships m WHERE m.frame = l.frame AND m.object = 'ego' AND m.distance <= 0.25
+                AND m.region IN (SELECT id FROM lanes WHERE "right" IS NOT NULL)))
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class IN {VEHICLES} AND a.ego_distance <= 50 AND off(a.ego_right, a.ego_ahead, 0, 4, 0, 5) <= 0.25
+AND len(list_filter(a.road_directions, lambda d: turned(a.heading, d) BETWEEN radians(10) AND radians(35))) > 0""",
+    ),
+    "needle": Question(
+        NEEDLE,
+        WIDE,
+        f"""
+WITH {DRIVER}
+SELECT DISTINCT a.frame FROM objects a JOIN ego l USING (frame)
+WHERE a.class = 'Truck'
+AND len(list_filter(a.road_directions, lambda d: turned(a.heading - radians(90), d) <= radians(15))) > 0
+AND off(a.ego_right, a.ego_ahead, 0, 0, (l.ego_length + a.length) / 2 + 4,
+        (l.ego_length + a.length) / 2 + 8) <= 0.25""",
+    ),
+    "a car ahead": _driving(
+        "lead = new Car ahead of ego by Range(5, 15)",
+        """
+SELECT DISTINCT a.frame FROM objects a JOIN ego e USING (frame)
+WHERE a.class = 'Car' AND along(a.heading, a.road_directions, radians(5))
+AND off(a.ego_right, a.ego_ahead, 0, 0, (e.ego_length + a.length) / 2 + 5,
+        (e.ego_length + a.length) / 2 + 15) <= 0.25""",
+    ),
+    "an oncoming car": _driving(
+        "other = new Car offset by (Range(-10, 10), Range(20, 40)), facing Range(170, 190) deg relative to ego.heading",
+        """
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Car' AND turned(a.relative_heading, pi()) <= radians(15)
+AND off(a.ego_right, a.ego_ahead, -10, 10, 20, 40) <= 0.25""",
+    ),
+    "a cone in the way": _driving(
+        "cone = new Cone ahead of ego by (Range(-3, 3), Range(5, 30)), facing Range(-180, 180) deg",
+        """
+SELECT DISTINCT a.frame FROM objects a JOIN ego e USING (frame)
+WHERE a.class = 'Cone'
+AND off(a.ego_right, a.ego_ahead, -3, 3, (e.ego_length + a.length) / 2 + 5,
+        (e.ego_length + a.length) / 2 + 30) <= 0.25""",
+    ),
+    "a truck to the left": _driving(
+        "truck = new Truck left of ego by Range(0.5, 4)",
+        """
+SELECT DISTINCT a.frame FROM objects a JOIN ego e USING (frame)
+WHERE a.class = 'Truck' AND along(a.heading, a.road_directions, radians(5))
+AND off(a.ego_right, a.ego_ahead, -(e.ego_width + a.width) / 2 - 4,
+        -(e.ego_width + a.width) / 2 - 0.5, 0, 0) <= 0.25""",
+    ),
+    "a platoon": _driving(
+        "first = new Car ahead of ego by Range(1, 20)\nsecond = new Car ahead of first by Range(1, 20)",
+        """,
+car AS (SELECT a.*, e.ego_length FROM objects a JOIN ego e USING (frame)
+        WHERE a.class = 'Car' AND along(a.heading, a.road_directions, radians(5))),
+first AS (SELECT * FROM car WHERE off(ego_right, ego_ahead, 0, 0, (ego_length + length) / 2 + 1,
+                                      (ego_length + length) / 2 + 20) <= 0.25)
+SELECT DISTINCT f.frame FROM first f JOIN car s ON s.frame = f.frame AND s.id <> f.id
+WHERE off((s.x - f.x) * cos(f.heading) + (s.y - f.y) * sin(f.heading),
+          (s.y - f.y) * cos(f.heading) - (s.x - f.x) * sin(f.heading),
+          0, 0, (f.length + s.length) / 2 + 1, (f.length + s.length) / 2 + 20) <= 0.25""",
+    ),
+    "a bicycle beside": _driving(
+        "bike = new Bicycle on road\nrequire (distance to bike) < 25\nrequire abs(relative heading of bike) < 30 deg",
+        f"""
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Bicycle' AND along(a.heading, a.road_directions, radians(5)) AND a.ego_distance < 25
+AND abs(a.relative_heading) < radians(30) AND {_near("a.frame", "a.id", DRIVABLE)}""",
+    ),
+    "a walker beside a car": _driving(
+        "car = new Car on road\nwalker = new Pedestrian on sidewalk, facing Range(-180, 180) deg\n"
+        "require (distance from car to walker) < 6\nrequire (distance to car) < 30",
+        f""",
+car AS (SELECT a.* FROM objects a JOIN ego USING (frame) WHERE a.class = 'Car' AND a.ego_distance < 30
+        AND along(a.heading, a.road_directions, radians(5)) AND {_near("a.frame", "a.id", DRIVABLE)}),
+walker AS (SELECT a.* FROM objects a JOIN ego USING (frame) WHERE a.class = 'Adult'
+           AND {_near("a.frame", "a.id", "('sidewalk')")})
+SELECT DISTINCT c.frame FROM car c JOIN walker w ON w.frame = c.frame
+AND sqrt((w.x - c.x) ** 2 + (w.y - c.y) ** 2) < 6""",
+    ),
+    "a standing car": _driving(
+        "other = new Car on road, with speed Range(0, 0.5)\nrequire (distance to other) < 15",
+        f"""
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Car' AND along(a.heading, a.road_directions, radians(5)) AND a.ego_distance < 15
+AND sqrt(a.motion_vx ** 2 + a.motion_vy ** 2) <= 0.6 AND {_near("a.frame", "a.id", DRIVABLE)}""",
+        SPEED,
+    ),
+    "a walker in view": Question(
+        "model scenic.domains.driving.model\nego = new Car with visibleDistance 40, with viewAngle 90 deg,\n"
+        "    facing Range(-20, 20) deg relative to roadDirection\n"
+        "walker = new Pedestrian on visible sidewalk, facing Range(-180, 180) deg\n",
+        NARROW,
+        f"""
+WITH {EGO.format(20.0573, DRIVABLE).replace("0.25", "0.001")}
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Adult' AND a.ego_distance <= 40.001 AND {_near("a.frame", "a.id", "('sidewalk')", 0.001)}
+AND abs(a.ego_right) * cos(radians(45)) - a.ego_ahead * sin(radians(45)) <= 0.001""",
+    ),
+    "any car on a road": _driving("", "\nSELECT frame FROM ego"),
+}

@@ -1,0 +1,138 @@
+"""What the commands say of first drafts, word for word, over the sample data."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+CROSSING = "02_crossing_cars.scenic"
+SLIPS = """model scenic.domains.driving.model
+ego = new Car
+other = new Car facing 90
+lorry = new Truck with width 9, with length 300
+spare = 3
+new Bicycle ahead of ego by Range(10, 5)
+require lorry in road
+require other.speed == 0
+require (distance from ego to other) >= 0
+require ego.position.x > 100000
+require abs(relative heading of other) < 30
+new Car with spede 3
+"""
+NEVER = """model scenic.domains.driving.model
+ego = new Car on road
+other = new Car on road, with spede Range(50, 60), with passengers 2, with speed Range(0, 20)
+"""
+EMPTY = """model scenic.domains.driving.model
+roadway = network.laneRegion.union(network.intersectionRegion)
+ego = new Car on roadway
+walker = new Pedestrian on sidewalk, facing Range(0, 360) deg
+require (distance to walker) < 2
+"""
+BESIDE = """model scenic.domains.driving.model
+ego = new Car on road
+bike = new Bicycle right of ego by Range(0, 2)
+require bike.speed > 5
+"""
+
+
+@pytest.fixture
+def said(run, crossroads, scenarios, tmp_path, monkeypatch):
+    """What a command says of a program that stands in the working folder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / CROSSING).write_text((scenarios / CROSSING).read_text())
+
+    def ask(command, program, *args, text=""):
+        if text:
+            (tmp_path / program).write_text(text)
+        done = run(command, program, crossroads, *args)
+        told = re.sub(r"in [\d.]+ s$", "in ... s", f"{done.stderr}{done.stdout}", flags=re.MULTILINE)
+        return f"$ {' '.join(('scenicq', command, program, 'town', *args))}\n{told}exit code {done.exit_code}\n\n"
+
+    return ask
+
+
+def test_what_is_never_compared(said, golden):
+    """Matching, explaining and checking name it; with `--strict` it is an error."""
+    match = ("match", "never.scenic", "--format", "ids", "--limit", "3")
+    golden(
+        said(*match, text=NEVER)
+        + said(*match, "--strict")
+        + said("check", "never.scenic")
+        + said("explain", "never.scenic", "05-two-lane-traffic/00")
+    )
+
+
+def test_tolerances_in_the_summary(said, golden):
+    """The default, one of the programs' own scopes, and that of generated labels."""
+    match = ("match", CROSSING, "--format", "ids", "--summary", "--jobs", "1")
+    scoped = "leftward.position=0.5,Car.heading=15deg,speed=0.5"
+    golden(said(*match) + said(*match, "--tolerance", scoped) + said(*match, "--tolerance", "exact"))
+
+
+def test_separate_minima(said, golden):
+    """The least tolerance of a frame; of two conditions what each alone needs, and both together."""
+    golden(
+        said("explain", CROSSING, "03-busy-intersection/08")
+        + said("explain", CROSSING, "03-busy-intersection/05")
+        + said("match", CROSSING, "--near", "3", "--format", "table")
+    )
+
+
+def test_the_advised_tolerance_alone_is_enough(said):
+    """What `explain` advises for a frame lets it in, and a little less does not."""
+    told = said("explain", CROSSING, "03-busy-intersection/08")
+    advised = re.search(r"--tolerance position=([\d.]+)\n", told)
+    assert advised
+    for size, enough in ((float(advised[1]), True), (float(advised[1]) - 0.002, False)):
+        found = said("match", CROSSING, "--format", "ids", "--tolerance", f"position={size:.3f},heading=5deg")
+        assert ("03-busy-intersection/08\n" in found) is enough
+
+
+def test_advice(said, golden):
+    """Single changes, two where none helps, and a line that was meant as an area."""
+    golden(
+        said("match", "empty.scenic", "--advise", text=EMPTY) + said("match", "beside.scenic", "--advise", text=BESIDE)
+    )
+
+
+def test_what_cannot_be_meant(said, golden):
+    """Every warning of a program's text and of what it is on a map; coarse classes; missing commas."""
+    comma = "model scenic.domains.driving.model\nego = new Car on road facing 5 deg\n"
+    golden(
+        said("check", "slips.scenic", text=SLIPS)
+        + said("check", "slips.scenic", "--classes", "coarse")
+        + said("check", "comma.scenic", text=comma)
+    )
+
+
+def test_an_explained_match(said, golden):
+    """Every feature and requirement of a match with its values and what is to spare."""
+    golden(said("explain", CROSSING, "03-busy-intersection/11"))
+
+
+FIRST_DRAFTS = {
+    "crosswalk": "new Pedestrian on crosswalk",
+    "in front of": "other = new Car\nrequire other in front of ego",
+    "lane beside": "new Car on ego.lane.leftLane",
+    "absence": "require all([(distance from ego to each) > 20 for each in vehicles])",
+    "no model": "",
+}
+
+
+def test_names_that_people_expect(said, golden):
+    """What is not Scenic's, with what is."""
+    told = ""
+    for name, lines in FIRST_DRAFTS.items():
+        model = "model scenic.domains.driving.model\n" if lines else ""
+        told += said("check", f"{name.replace(' ', '_')}.scenic", text=f"{model}ego = new Car on road\n{lines}\n")
+    golden(told)
+
+
+def test_classes_that_datasets_list_can_be_written(said):
+    """Each class of the tree is one of the driving model's."""
+    names = "Adult Child ConstructionWorker PoliceOfficer Stroller Wheelchair PersonalMobility ConstructionVehicle"
+    for name in f"{names} EmergencyVehicle Ambulance PoliceCar FireEngine PushablePullable BicycleRack Animal".split():
+        text = f"model scenic.domains.driving.model\nego = new Car\nother = new {name}\n"
+        assert f"other: {name})" in said("check", "one.scenic", text=text)
