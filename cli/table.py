@@ -119,7 +119,7 @@ def fitted(rows: list[Row], width: int, short: Callable[[str], str]) -> list[str
         ids = _cut([part.partition("=")[2] for row in rows for part in row[_OBJECTS].split()])
         table = [(*row[:_OBJECTS], _with_ids(row[_OBJECTS], ids)) for row in table]
     for dispensable in (_TIME, _RECORDING):
-        if dispensable in kept and _narrowest(table, kept) > width:
+        if dispensable in kept and not _fits(head, table, kept, width) and _narrowest(table, kept) > width:
             kept.remove(dispensable)
     return _wrapped([tuple(head), *table], kept, width)
 

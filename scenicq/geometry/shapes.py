@@ -221,7 +221,7 @@ def grown(shape: Shape, width: float) -> Shape:
 
 
 def band(shape: Shape, width: float) -> Shape:
-    """The polygon of what lies within `width` metres of a line."""
+    """The polygon of what lies within `width` metres of a shape."""
     return cast(Shape, shapely.buffer(shape, width, quad_segs=2))
 
 

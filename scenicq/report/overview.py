@@ -107,7 +107,7 @@ def funnel_section(funnel: Funnel, total: int) -> str:
     stopped = f"Stopped after {funnel.frames:,} of {total:,} frames (--limit)." if funnel.frames < total else ""
     told = [f"{each.message}{f' ({each.span.place})' if each.span is not None else ''}" for each in funnel.warnings]
     told += [
-        f"`{what}` is missing in {count:,} frames of the dataset, and not compared there"
+        f"`{what}` is missing in {count:,} frame{'' if count == 1 else 's'} of the dataset, and not compared there"
         for what, count in sorted(funnel.missing.items())
     ]
     warnings = [element("li", escape(each)) for each in told]

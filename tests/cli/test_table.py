@@ -48,6 +48,31 @@ def test_it_is_no_wider_than_the_terminal_and_breaks_no_word(width, made):
     assert len(shown) == len({part for row in table for part in row[4].split()})
 
 
+def tokens(count=4):
+    for number in range(count):
+        yield (
+            f"{number * 7919:032x}", "scene-0553", f"2018-08-28 20:48:2{number}.44", "match",
+            f"walker={number * 104729:032x}", "samples/CAM_FRONT/n008.jpg",
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_tables_look_so(width, golden):
+    """Names of frames and of objects as nuScenes and Argoverse have them."""
+    tables = []
+    for made in (rows, dated, tokens):
+        table = list(made(4))
+        beginnings = {
+            row[0]: "/".join(part[:10] if "/" in row[0] else part[-6:] for part in row[0].split("/")) for row in table
+        }
+        tables.append("\n".join(fitted(table, width, beginnings.__getitem__)))
+    golden("\n\n".join(tables) + "\n")
+
+
+def test_what_fits_is_not_left_out():
+    assert "20:48:20.44" in fitted(list(tokens()), 85, lambda frame: frame[-6:])[1]
+
+
 def test_a_date_that_all_share_stands_in_the_head():
     lines = fitted(list(dated()), 80, lambda frame: frame[-6:])
     assert "2018-09-18" in lines[0]

@@ -87,6 +87,16 @@ def test_curbs_of_lane_groups() -> None:
     assert town(dangling).problems == ("`group` of curb `stray`: `nowhere` is not in the map",)
 
 
+def test_a_curb_runs_as_the_lanes_of_its_group_do_although_others_lie_there_too() -> None:
+    # the middle of the curb lies on a lane across, which runs the other way
+    own = MapFeature("edge of road", "curb", LineString([(7.9, 0), (7.9, 40)]), {"group": "north"})
+    across = area("across", "lane", (7, 15, 9, 25), centerline=[[[8, 25], [8, 15]]])
+    crossed = Network("town", [across, *town(own).features])
+    group = crossed.elements["north"]
+    assert isinstance(group, LaneGroup)
+    assert [list(line.coords) for line in crossed.curbs_of(group)] == [[(7.9, 0.0), (7.9, 40.0)]]
+
+
 def lane(network: Network, name: str) -> Lane:
     found = network.elements[name]
     assert isinstance(found, Lane)

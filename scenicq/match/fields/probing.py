@@ -46,7 +46,7 @@ _DRAWS = 96
 _BEST = 8
 """Of these, how many the next ones are drawn around."""
 _ROUNDS = 12
-_CLOSER = 0.3
+_CLOSER = 0.45
 """The share of the spread of one round that the next one has."""
 _PROGRESS = 0.7
 """A round that leaves more than this share of what is missing, twice in a row, is the last."""

@@ -61,8 +61,13 @@ class BlockExecutor:
         """End all processes."""
         self._open.__exit__(*error)
 
-    def decide(self, blocks: Sequence[Block]) -> Iterator[Decided]:
-        """Decide blocks; each is to be taken before the next is asked for."""
+    def decide(self, blocks: Sequence[Block], told: Callable[[Any], None] | None = None) -> Iterator[Decided]:
+        """Decide blocks; each is to be taken before the next is asked for.
+
+        Args:
+            blocks: In the order of the store.
+            told: Called with what other processes tell of the blocks that they decide.
+        """
         alone = self.jobs <= 1 or not (self._asked or self._started)
         done, began = 0, time.monotonic()
         while alone and done < len(blocks):
@@ -72,11 +77,13 @@ class BlockExecutor:
             alone = self.jobs <= 1 or left_s < _PAYS_S
         if done < len(blocks):
             self._started = True
-            yield from self._elsewhere(blocks[done:])
+            yield from self._elsewhere(blocks[done:], told)
 
-    def _elsewhere(self, blocks: Iterable[Block], tries: int = _TRIES) -> Iterator[Decided]:
+    def _elsewhere(
+        self, blocks: Iterable[Block], told: Callable[[Any], None] | None = None, tries: int = _TRIES
+    ) -> Iterator[Decided]:
         """Decide blocks side by side, a bounded number ahead."""
-        for block, found in self._workers.run(blocks, tries=tries):
+        for block, found in self._workers.run(blocks, told, tries=tries):
             yield from self._halves(block) if isinstance(found, Lost) else (found,)
 
     def _halves(self, block: Block) -> Iterator[Decided]:

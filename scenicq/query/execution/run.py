@@ -23,6 +23,7 @@ from scenicq.match.verdict import Cause, Match, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
 from scenicq.query.execution.compiled_map import about_dataset, map_remark, program_remarks
+from scenicq.query.execution.frames_ahead import FramesAhead, telling
 from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.results import Funnel, Result
@@ -344,7 +345,7 @@ class Query:
         """
         worlds = self._worlds()
         self._warn(worlds)
-        left, progress = self.options.limit, progress or _ignore
+        left, ahead = self.options.limit, FramesAhead(progress)
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
             setup = (self.dataset.address, self.source, self.options, self.file)
@@ -354,7 +355,7 @@ class Query:
                 if not self._frames(name):
                     continue
                 if isinstance(world, Diagnostic):
-                    yield from self._lacking(name, world, progress)
+                    yield from self._lacking(name, world, ahead.taken)
                     continue
                 cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1)
                 merge = partial(merge_frames, every=self.options.every)
@@ -362,7 +363,7 @@ class Query:
                     with closing(self.dataset.connect()) as connection:
                         cut = whole_recordings(self.dataset, connection, cut)
                     merge = partial(merge_intervals, every=self.options.every)
-                with closing(merge(world.plan, hands.decide(cut), self.funnel, progress)) as merged:
+                with closing(merge(world.plan, hands.decide(cut, ahead.told), self.funnel, ahead.taken)) as merged:
                     for result in merged:
                         yield result
                         if isinstance(result.verdict, Match) and left is not None:
@@ -383,18 +384,15 @@ class Query:
         progress(self._frames(map_name))
 
 
-def _ignore(frames: int) -> None:
-    """No progress is shown."""
-
-
 def _start_worker(
     dataset: str, source: Source, options: QueryOptions, file: Path | None
 ) -> Callable[[Block, Callable[[object], None]], Decided]:
     """What a worker process keeps between blocks."""
     decider = Query(open_dataset(dataset, check=False), source, options, file=file).decider(threads=1)
 
-    def work(block: Block, _tell: Callable[[object], None]) -> Decided:
+    def work(block: Block, tell: Callable[[object], None]) -> Decided:
         decided = decider.decide(block)
-        return replace(decided, found=list(until_deadline(decided.found, Funnel())))
+        found = telling(decided.found, decided.missed, (block.first, block.end), tell)
+        return replace(decided, found=list(until_deadline(found, Funnel())))
 
     return work

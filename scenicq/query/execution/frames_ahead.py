@@ -1,0 +1,69 @@
+"""Progress of blocks that other processes decide: frames count when they are decided, not when their block arrives."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FramesAhead", "telling"]
+
+_EVERY_S = 0.3
+"""Seconds between what a process tells."""
+
+Told = tuple[int, int, int]
+"""First and last frame of a block, and how many of its frames are decided."""
+
+_Verdicts = TypeVar("_Verdicts")
+
+
+class FramesAhead:
+    """Passes frames on to who shows progress, each once: when it is told ahead, else when its result is taken."""
+
+    def __init__(self, progress: Callable[[int], None] | None) -> None:
+        """Take who shows it, if anybody: called with the number of frames decided since the last call."""
+        self._progress = progress
+        self._told: dict[tuple[int, int], int] = {}
+        self._ahead = 0
+
+    def told(self, told: Told) -> None:
+        """Count what another process has decided; a block that is begun again counts once."""
+        first, end, frames = told
+        more = frames - self._told.get((first, end), 0)
+        if more > 0:
+            self._told[first, end] = frames
+            self._ahead += more
+            self._show(more)
+
+    def taken(self, frames: int) -> None:
+        """Count frames whose results are taken."""
+        covered = min(frames, self._ahead)
+        self._ahead -= covered
+        if frames > covered:
+            self._show(frames - covered)
+
+    def _show(self, frames: int) -> None:
+        if self._progress is not None:
+            self._progress(frames)
+
+
+def telling(
+    found: Iterable[_Verdicts], missed: NDArray[np.int16], block: tuple[int, int], tell: Callable[[Told], None]
+) -> Iterator[_Verdicts]:
+    """The verdicts of a block's candidates as they come, telling now and then how far they are.
+
+    Args:
+        found: Of each frame that the prefilter leaves.
+        missed: Of each frame of the block the step of the prefilter that excludes it, negative where none does.
+        block: First and last frame.
+        tell: Takes it to whoever shows progress.
+    """
+    last = time.monotonic()
+    for place, verdicts in zip(np.flatnonzero(missed < 0).tolist(), found, strict=False):
+        yield verdicts
+        if time.monotonic() - last > _EVERY_S:
+            last = time.monotonic()
+            tell((*block, place + 1))
