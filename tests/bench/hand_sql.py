@@ -154,7 +154,7 @@ AND off(a.ego_right, a.ego_ahead, 0, 0, (l.ego_length + a.length) / 2 + 4,
         "lead = new Car ahead of ego by Range(5, 15)",
         """
 SELECT DISTINCT a.frame FROM objects a JOIN ego e USING (frame)
-WHERE a.class = 'Car' AND along(a.heading, a.road_directions, radians(5))
+WHERE a.class = 'Car' AND abs(a.relative_heading) <= radians(5)
 AND off(a.ego_right, a.ego_ahead, 0, 0, (e.ego_length + a.length) / 2 + 5,
         (e.ego_length + a.length) / 2 + 15) <= 0.25""",
     ),
@@ -177,19 +177,19 @@ AND off(a.ego_right, a.ego_ahead, -3, 3, (e.ego_length + a.length) / 2 + 5,
         "truck = new Truck left of ego by Range(0.5, 4)",
         """
 SELECT DISTINCT a.frame FROM objects a JOIN ego e USING (frame)
-WHERE a.class = 'Truck' AND along(a.heading, a.road_directions, radians(5))
+WHERE a.class = 'Truck' AND abs(a.relative_heading) <= radians(5)
 AND off(a.ego_right, a.ego_ahead, -(e.ego_width + a.width) / 2 - 4,
         -(e.ego_width + a.width) / 2 - 0.5, 0, 0) <= 0.25""",
     ),
     "a platoon": _driving(
         "first = new Car ahead of ego by Range(1, 20)\nsecond = new Car ahead of first by Range(1, 20)",
         """,
-car AS (SELECT a.*, e.ego_length FROM objects a JOIN ego e USING (frame)
-        WHERE a.class = 'Car' AND along(a.heading, a.road_directions, radians(5))),
-first AS (SELECT * FROM car WHERE off(ego_right, ego_ahead, 0, 0, (ego_length + length) / 2 + 1,
-                                      (ego_length + length) / 2 + 20) <= 0.25)
+car AS (SELECT a.*, e.ego_length FROM objects a JOIN ego e USING (frame) WHERE a.class = 'Car'),
+first AS (SELECT * FROM car WHERE abs(relative_heading) <= radians(5)
+          AND off(ego_right, ego_ahead, 0, 0, (ego_length + length) / 2 + 1, (ego_length + length) / 2 + 20) <= 0.25)
 SELECT DISTINCT f.frame FROM first f JOIN car s ON s.frame = f.frame AND s.id <> f.id
-WHERE off((s.x - f.x) * cos(f.heading) + (s.y - f.y) * sin(f.heading),
+WHERE turned(s.heading, f.heading) <= radians(5)
+AND off((s.x - f.x) * cos(f.heading) + (s.y - f.y) * sin(f.heading),
           (s.y - f.y) * cos(f.heading) - (s.x - f.x) * sin(f.heading),
           0, 0, (f.length + s.length) / 2 + 1, (f.length + s.length) / 2 + 20) <= 0.25""",
     ),
