@@ -13,11 +13,12 @@ LIBRARY = ROOT / "scenicq"
 FILES = sorted(LIBRARY.rglob("*.py"))
 README = (LIBRARY / "README.md").read_text()
 
-PASSES = ("forest/", "match/", "query/prefilter/")
+PASSES = ("forest/", "match/", "query/prefilter/", "temporal/")
 """Where expressions are gone through. Syntax and compiler recurse over the program's text, which the parser limits."""
 RECURSIVE = {
     "match/decide/cascade.py": "the discrete variables and truth values of a group, at most a stated number of them",
     "match/decide/decomposition.py": "each part has fewer constraints, or fewer distances of hidden points",
+    "match/search/choice_search.py": "choices met only in what another choice leads to, to a stated depth",
 }
 """Files with functions that call themselves, and what bounds the depth."""
 DATASETS = re.compile(r"nuscenes|argoverse|waymo|lyft|kitti|interaction dataset|boston", re.IGNORECASE)
@@ -48,7 +49,7 @@ def functions(scope: ast.AST, prefix: str = "", owner: str = "") -> Iterator[tup
 
 
 def calls(name: str, owner: str, function: ast.AST, known: set[str]) -> set[str]:
-    """Functions of the same file that a function calls by their plain name, or as methods of `self`."""
+    """Functions of the file that a function calls by their plain name, or as methods of `self` or of a new object."""
     found: set[str] = set()
     for node in ast.walk(function):
         match node:
@@ -57,6 +58,8 @@ def calls(name: str, owner: str, function: ast.AST, known: set[str]) -> set[str]
                 around = [name[:end] for end, sign in enumerate(name) if sign == "."]
                 scopes = [f"{each}." for each in (name, *reversed(around)) if each in known]
                 found.update(next(([f"{s}{called}"] for s in (*scopes, "") if f"{s}{called}" in known), []))
+            case ast.Call(func=ast.Attribute(value=ast.Call(func=ast.Name(id=made)), attr=called)):
+                found.add(f"{made}.{called}")
             case ast.Call(func=ast.Attribute(value=ast.Name(id="self" | "cls"), attr=called)):
                 found.add(f"{owner}{called}")
             case _:
@@ -94,8 +97,9 @@ def test_recursion_is_found(tmp_path):
         "def direct(x):\n    return direct(x)\n\n"
         "class Some:\n    def one(self):\n        return self.two()\n    def two(self):\n        return self.one()\n"
         "    def plain(self):\n        return plain(self)\n"
+        "class Made:\n    def run(self):\n        return begin()\n\ndef begin():\n    return Made().run()\n"
     )
-    assert recursive(file) == {"direct", "Some.one", "Some.two"}
+    assert recursive(file) == {"direct", "Some.one", "Some.two", "Made.run", "begin"}
 
 
 def test_the_library_never_prints_exits_or_reads_the_environment():
