@@ -159,3 +159,62 @@ def test_every_path_that_the_map_names_exists():
     )
     assert inside
     assert [path for path in inside if not (LIBRARY / path).exists()] == []
+
+
+SECTIONS = dict(zip(*[iter(re.split(r"^## (.*)$", README, flags=re.MULTILINE)[1:])] * 2, strict=True))
+MOST_HOPS = 3
+QUESTIONS = {
+    "Where is position tolerance applied?", "What happens to a random lane?", "Why was this frame no match?",
+    "Where would a new distribution go?", "Where is a requirement turned into SQL?",
+    "What runs when nothing is hidden?",
+}  # fmt: skip
+
+
+def defined(file: Path) -> set[str]:
+    """Names of functions, classes, methods and values of a file."""
+    found: set[str] = set()
+    for node in ast.walk(tree(file)):
+        match node:
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                found.add(name)
+            case ast.Name(id=name, ctx=ast.Store()):
+                found.add(name)
+            case _:
+                pass
+    return found
+
+
+def rows(section: str) -> list[list[str]]:
+    """The rows of a section's table, without its head."""
+    lines = [line for line in SECTIONS[section].splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
+def test_each_question_of_a_stranger_is_answered_in_three_files_at_most():
+    asked: set[str] = set()
+    for question, path in rows("Where to look"):
+        asked.add(question)
+        hops = re.findall(r"`([\w/]+\.py)`(?: \(([^)]*)\))?", path)
+        assert 1 <= len(hops) <= MOST_HOPS, question
+        for file, told in hops:
+            assert (LIBRARY / file).exists(), file
+            assert set(re.findall(r"`(\w+)`", told)) <= defined(LIBRARY / file), (question, file)
+    assert asked >= QUESTIONS
+
+
+def test_every_step_of_matching_names_its_file():
+    assert [file for _, file, *_ in rows("Steps of matching") if not (LIBRARY / file.strip("`")).exists()] == []
+
+
+def test_every_name_in_the_map_is_one_of_the_code():
+    known: set[str] = set()
+    for file in (*FILES, *(ROOT / "cli").rglob("*.py")):
+        known |= {*file.relative_to(ROOT).parts, file.stem}
+        for node in ast.walk(tree(file)):
+            for field in ("name", "id", "attr", "arg"):
+                known.add(str(getattr(node, field, "")))
+    text = "".join(text for title, text in SECTIONS.items() if title != "Decisions")
+    named_ = {name for name in re.findall(r"`([^`]+)`", text) if re.fullmatch(r"[\w./]+", name)}
+    missing = {name for name in named_ if not known.issuperset(re.split(r"[./]", name.strip("/")))}
+    # files and commands that are no code of the library
+    assert {name for name in missing if not (ROOT / name).exists() and not re.search(r"\.py$", name)} == {"scenicq_cli"}
