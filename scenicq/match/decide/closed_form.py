@@ -75,6 +75,7 @@ class Evaluated(NamedTuple):
 
 
 _UNCLEAR = Evaluated(False, False, {})
+_FAILS = Evaluated(False, True, {})
 Evaluate: TypeAlias = Callable[[Get, MatchOptions, MapLookups], Evaluated]
 
 
@@ -205,7 +206,7 @@ def _known_position(item: Comparison) -> ClosedForm | None:
 
 def _close(dx: float, dy: float, margin: Margin) -> tuple[bool, bool]:
     """Whether a position that is off by a vector is surely within tolerance, or surely not; of columns, each."""
-    off = _length(dx, dy)
+    off = math.hypot(dx, dy) if isinstance(dx, float) else _length(dx, dy)
     return off <= margin.sure, (off > margin.reach + SLACK) & (off < math.inf)
 
 
@@ -225,6 +226,14 @@ def _apart(middle: XY, half: XY, turn: XY, margin: Margin) -> bool:
         | (abs(u * c - v * s) > abs(c) * w + abs(s) * h + across)
         | (abs(u * s + v * c) > abs(s) * w + abs(c) * h + along)
     )
+
+
+def _composed(turns: Sequence[XY]) -> XY:
+    """Cosine and sine of the sum of angles, from theirs; of columns, columns."""
+    turn = (1.0, 0.0)
+    for c, s in turns:
+        turn = turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s
+    return turn
 
 
 def _length(x: float, y: float) -> float:
@@ -287,7 +296,7 @@ def _offset(item: Comparison) -> ClosedForm | None:
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         px, py = cast(XY, get(index, "position"))
-        margin, turn = options.tolerance.of(index, "position"), (1.0, 0.0)
+        margin, turns = options.tolerance.of(index, "position"), list[XY]()
         # into the frame of the offset
         for shift, angle in steps:
             if shift is not None:
@@ -296,15 +305,15 @@ def _offset(item: Comparison) -> ClosedForm | None:
             elif angle is not None:
                 c, s = turned(angle(get))
                 px, py = px * c + py * s, py * c - px * s
-                turn = turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s
+                turns.append((c, s))
         a, b = x.known(get), y.known(get)
         u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
         holds, fails = _close(u - px, v - py, margin)
         if margin.kind == "box" and holds is not True and fails is not True:
             middle = a + (x.low + x.high) / 2 - px, b + (y.low + y.high) / 2 - py
-            fails |= _apart(middle, ((x.high - x.low) / 2, (y.high - y.low) / 2), turn, margin)
+            fails |= _apart(middle, ((x.high - x.low) / 2, (y.high - y.low) / 2), _composed(turns), margin)
         if holds is False:
-            return Evaluated(holds, fails, {})
+            return _FAILS if fails is True else Evaluated(holds, fails, {})
         return Evaluated(holds, fails, spread(x, u - a) | spread(y, v - b))
 
     return ClosedForm(item, evaluate)

@@ -338,7 +338,11 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
         case Feature():
             index, name = node.object, node.property
             fits = name in (_VECTORS if node.kind == "vector" else _NUMBERS)
-            return (lambda get: cast(float, get(index, name))) if fits else None
+
+            def observed(get: Get) -> Value:
+                return get(index, name)
+
+            return cast(Exact, observed) if fits else None
         case _ if any(arg is None for arg in args):
             return None
         case Arithmetic():

@@ -40,7 +40,7 @@ _SCALARS = frozenset({"heading", "width", "length", "height"})
 T = TypeVar("T")
 Values: TypeAlias = "Value | FloatColumn | list[Value]"
 """Of many labels: one each, or the one that all have."""
-RowTruth: TypeAlias = "bool | list[bool]"
+RowTruth: TypeAlias = "bool | Sequence[bool]"
 """Of many labels likewise."""
 
 
@@ -169,13 +169,12 @@ class _Batch:
     def decide(self, group: GroupPlan, options: MatchOptions, lookups: MapLookups) -> tuple[RowTruth, RowTruth]:
         """For which labels a group surely holds, and for which it surely fails; keeps the witness."""
         form, size = group.closed_form, len(self.rows)
-        assert form is not None
         self.decisions += 1
-        if self.decisions > self.fit.most_decisions:
+        if form is None or self.decisions > self.fit.most_decisions:
             return False, False
         if size == 1:
             holds, fails, self.values[group] = form.evaluate_one(self._get(0), options, lookups)
-            return cast(bool, holds), cast(bool, fails)
+            return holds, fails
         if self.columns is None:
             self.columns = Columns(size, self._column)
         holds, fails, self.values[group] = form.evaluate_many(self._get, self.columns, options, lookups)
@@ -213,6 +212,11 @@ class _Batch:
     def with_next_candidate(self) -> list[_Batch]:
         """The labels with the next free candidate for the newest role that has one left, by how many are filled."""
         order = self.fit.order
+        if len(self.rows) == 1:
+            # most of the moves of a label by itself
+            following = _following(order, self.rows[0].candidates, self.numbers[0])
+            self.numbers, self.columns = [following], None
+            return [self] if following else []
         numbers = [_following(order, row.candidates, taken) for row, taken in zip(self.rows, self.numbers, strict=True)]
         lengths = _alike([*map(len, numbers)])
         if isinstance(lengths, int):
