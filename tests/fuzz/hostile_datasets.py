@@ -32,6 +32,8 @@ from scenicq.store.dataset import open_dataset
 
 ROOT = Path(__file__).parents[2]
 _COMMAND = str(Path(sys.executable).with_name("scenicq"))
+_FRAME = "03-busy-intersection/09"
+"""One of the sample data."""
 _MOST_KIB = 2 << 20
 """Memory that no run may take."""
 Damage = Callable[[Path], None]
@@ -208,15 +210,14 @@ def make_hostile(sound: Path, target: Path, *applied: Damage) -> bool:
 def commands(folder: Path, scratch: Path) -> dict[str, list[str]]:
     """Every command that reads a dataset."""
     program = str(ROOT / "sample_data/scenarios/02_crossing_cars.scenic")
-    frame = json.loads((folder / "dataset.json").read_text()).get("name", "x")
     return {
         "match": ["match", program, str(folder), "--all", "--format", "jsonl"],
         "bare": ["match", program, str(folder), "--no-prefilter", "--method", "smt"],
         "report": ["match", program, str(folder), "--report", str(scratch / "report")],
-        "check": ["check", program, "--dataset", str(folder)],
+        "check": ["check", program, str(folder)],
         "info": ["info", str(folder), "--verify"],
-        "show": ["show", str(folder), str(frame)],
-        "explain": ["explain", program, str(folder), str(frame)],
+        "show": ["show", str(folder), _FRAME],
+        "explain": ["explain", program, str(folder), _FRAME],
         "sample": ["sample", program, str(folder), "-n", "1"],
         "index": ["index", str(folder)],
     }
