@@ -201,7 +201,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--work", type=Path, default=Path(".conformance/traces"), help="folder of maps and recordings")
     parser.add_argument("--seeds", type=int, default=2, help="traces of each program")
     parser.add_argument("--formulas", type=int, default=10_000, help="random temporal formulas to compare with rv_ltl")
-    parser.add_argument("--only", default="", metavar="TEXT", help="programs whose name has this in it")
+    parser.add_argument("--only", default="", metavar="PATTERN", help="programs in whose name this is found")
     return parser.parse_args()
 
 
@@ -216,7 +216,7 @@ def main() -> int:
     print(HEADING)
     try:
         for name, path, chart in programs(arguments):
-            if arguments.only not in name:
+            if not re.search(arguments.only, name):
                 continue
             if chart not in originals:
                 originals[chart] = Original(python, chart, arguments.work / chart.stem, "simulate.py")
