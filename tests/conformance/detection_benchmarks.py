@@ -6,9 +6,9 @@
 
 PYTHON has nuscenes-devkit (1.2.0) or av2 (0.3.6) in an environment of its own. Detections are made from the labels:
 moved, turned, resized, some of another class, fewer the farther away, with boxes where nothing is; half of the runs
-have few different scores. DATAROOT is a nuScenes folder; where its labels have no attributes they get some. FOLDER
-holds logs of Argoverse 2, or the `detections*.feather` and `labels.feather` of the tests of its API. All figures of all
-classes must be equal to `LARGEST`.
+have few different scores. DATAROOT is a nuScenes folder; labels without attributes or numbers of points get some.
+FOLDER holds logs of Argoverse 2, or the `detections*.feather` and `labels.feather` of the tests of its API. All figures
+of all classes must be equal to `LARGEST`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.feather as feather
 
 from scenicq.evaluate.classes import class_figures
@@ -121,6 +122,7 @@ def of_nuscenes(root: Path, python: str, version: str, work: Path) -> Iterator[b
         # the devkit wants the files of the masks to be there
         (source / each["filename"]).parent.mkdir(parents=True, exist_ok=True)
         (source / each["filename"]).touch()
+    plant_points(tables, rng)
     plant_attributes(tables, rng)
     (source / version / "sample_annotation.json").write_text(json.dumps(tables["sample_annotation"]))
     ingest(source, work / "dataset")
@@ -137,6 +139,14 @@ def of_nuscenes(root: Path, python: str, version: str, work: Path) -> Iterator[b
             boxes = sum(map(len, results.values()))
             title = f"{split}, {f'{steps} different scores' if steps else 'all scores different'}"
             yield compared(title, ours(dataset, file), theirs(python, "nuscenes", source, version, split, file), boxes)
+
+
+def plant_points(tables: Mapping[str, list[dict[str, Any]]], rng: random.Random) -> None:
+    """Give numbers of points, some of which are 0, to labels that have none."""
+    for each in tables["sample_annotation"]:
+        for name in ("num_lidar_pts", "num_radar_pts"):
+            if each[name] is None:
+                each[name] = rng.choice((0, 0, 1, 5))
 
 
 def plant_attributes(tables: Mapping[str, list[dict[str, Any]]], rng: random.Random) -> None:
@@ -283,18 +293,19 @@ def argoverse2_boxes(labels: pa.Table, rng: np.random.Generator, steps: int) -> 
 
 
 def of_fixtures(folder: Path, python: str, work: Path) -> Iterator[bool]:
-    """Compare with the API on what its own tests evaluate: boxes of one log, whose ego stays where it is."""
+    """Compare with the API on what its own tests evaluate: boxes of logs whose ego stays where it is."""
     labels = feather.read_table(folder / "labels.feather").replace_schema_metadata()
-    (log,) = set(labels["log_id"].to_pylist())
-    target = work / "logs" / "val" / log
-    (target / "map").mkdir(parents=True)
-    feather.write_feather(labels.drop_columns(["log_id", "score"]), target / "annotations.feather")
-    times = sorted(set(labels["timestamp_ns"].to_pylist()))
-    still = {"timestamp_ns": times, **{name: [float(name == "qw")] * len(times) for name in
-             ("qw", "qx", "qy", "qz", "tx_m", "ty_m", "tz_m")}}  # fmt: skip
-    feather.write_feather(pa.table(still), target / "city_SE3_egovehicle.feather")
-    nothing = {"lane_segments": {}, "drivable_areas": {}, "pedestrian_crossings": {}}
-    (target / "map" / f"log_map_archive_{log}____PIT_city_0.json").write_text(json.dumps(nothing))
+    for log in sorted(set(labels["log_id"].to_pylist())):
+        target = work / "logs" / "val" / log
+        (target / "map").mkdir(parents=True)
+        mine = labels.filter(pc.equal(labels["log_id"], log))
+        feather.write_feather(mine.drop_columns(["log_id", "score"]), target / "annotations.feather")
+        times = sorted(set(mine["timestamp_ns"].to_pylist()))
+        still = {"timestamp_ns": times, **{name: [float(name == "qw")] * len(times) for name in
+                 ("qw", "qx", "qy", "qz", "tx_m", "ty_m", "tz_m")}}  # fmt: skip
+        feather.write_feather(pa.table(still), target / "city_SE3_egovehicle.feather")
+        nothing = {"lane_segments": {}, "drivable_areas": {}, "pedestrian_crossings": {}}
+        (target / "map" / f"log_map_archive_{log}____PIT_city_0.json").write_text(json.dumps(nothing))
     ingest(work / "logs", work / "dataset")
     dataset = open_dataset(work / "dataset")
     for file in sorted(folder.glob("detections*.feather")):
