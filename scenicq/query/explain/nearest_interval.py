@@ -1,9 +1,9 @@
 """The recordings that do not match over time but come closest, and what would let each through.
 
-What would do is either a tolerance, widened by so many metres in the sense of `nearest_miss`, under which an interval
-matches; or one number of the program, changed by so much in its own unit, where a binding misses a requirement over
-time or the end of the program. A recording's distance is the smaller of both. Whatever is told has been tried: with it
-the recording matches.
+What would do is a tolerance, widened by so many metres in the sense of `nearest_miss`, under which an interval matches;
+or one number of the program, changed by so much in its own unit, where a binding misses a requirement over time or the
+end of the program; or a shorter least duration. A recording's distance is the smallest of these. Whatever is told has
+been tried: with it the recording matches.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
             missed.setdefault(each.recording, []).append(each)
     furthest = sorted(missed.values(), key=lambda mine: -max(map(_length, mine)))
     for mine in furthest[:MOST_RECORDINGS]:
-        _keep(near, _by_number(every, sorted(mine, key=_length, reverse=True)[:_PER_RECORDING]))
+        longest = sorted(mine, key=_length, reverse=True)
+        _keep(near, _by_number(every, longest[:_PER_RECORDING]))
+        _keep(near, _by_duration(every, longest[0]))
     seen = set(matching)
     for widening_m in LADDER_M:
         nearer = _bound(near, count)
@@ -149,6 +151,26 @@ def _by_number(query: Query, results: Iterable[Result]) -> _Near | None:
                 nearest = _let_through(found, abs(change.amount), Cause("program", change.text(), interval.broken))
                 break
     return nearest
+
+
+def _by_duration(query: Query, result: Result) -> _Near | None:
+    """The least duration with which a recording matches whose longest interval is too short.
+
+    Args:
+        query: The query.
+        result: The longest interval.
+    """
+    wanted, span = query.options.time.min_duration_s, result.interval
+    if wanted is None or span is None:
+        return None
+    enough = math.floor((span.end_us - result.timestamp_us) / 1e4) / 100
+    if not 0 < enough < wanted:
+        return None
+    map_name = _map_of(query, result.recording)
+    shorter = replace(query, options=replace(query.options, time=replace(query.options.time, min_duration_s=enough)))
+    found = _longest(shorter, result.recording, map_name, query.world(map_name), query.options.match)
+    cause = Cause("--min-duration", f"would match with --min-duration {enough:g}")
+    return None if found is None else _let_through(found, wanted - enough, cause)
 
 
 def _by_tolerance(query: Query, recording: str, enough_m: float, most_m: float) -> _Near | None:
