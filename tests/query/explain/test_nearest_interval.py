@@ -101,3 +101,15 @@ def test_an_interval_that_is_too_short_says_which_duration_would_do(crossroads):
     longer = replace(FOR_SECONDS, time=IntervalOptions(min_duration_s=float(told.group(1)) + 0.02))
     assert matching(ask(crossroads, program, shorter)) == {first.recording}
     assert not matching(ask(crossroads, program, longer))
+
+
+def test_a_number_that_the_program_says_twice_is_one_number(crossroads):
+    program = (
+        "walker = new Pedestrian\nrequire (distance to walker) > 3\nrequire eventually (distance to walker) < 1\n"
+        "terminate when (distance to walker) < 1\n"
+    )
+    query = ask(crossroads, program)
+    assert not matching(query)
+    first = nearest_intervals(query, 1)[0]
+    told = re.fullmatch(r"`\(distance to walker\) < 1` would do with ([\d.]+) instead of 1", first.verdict.cause.detail)
+    assert matching(ask(crossroads, program.replace("< 1", f"< {float(told.group(1)) + 0.001}"))) == {first.recording}
