@@ -309,6 +309,24 @@ def test_rules_of_the_benchmarks(street: Dataset, predictions: Predictions) -> N
     assert ARGOVERSE2.range_m == 150
 
 
+def test_objects_of_roles_that_do_not_count_are_told(
+    street: Dataset, results: list[Result], predictions: Predictions
+) -> None:
+    """A benchmark's range leaves out some of what plays a role, or all of it."""
+    whole = evaluate({"a": results}, street, predictions)
+    assert whole.scenarios[0].roles[0].uncounted == 0
+    assert "objects-uncounted" not in {each.code for each in whole.warnings}
+    for range_m in (12.0, 1.0):
+        near = replace(predictions, protocol=replace(predictions.protocol, range_m=range_m))
+        found = evaluate({"a": results}, street, near)
+        (role,) = found.scenarios[0].roles
+        assert role.uncounted > 0
+        assert role.uncounted + role.share.of == len(results)
+        told = next(each for each in found.warnings if each.code == "objects-uncounted").message
+        assert f"{role.uncounted} of {len(results)} objects of role parkedCar" in told
+    assert role.sentence == f"role parkedCar: none of {len(results)} objects counts"
+
+
 def test_simulated_runs(tmp_path: Path) -> None:
     file = tmp_path / "runs.csv"
     file.write_text("scenario,failed\na,1\na,0\na,true\nb,no\n")
