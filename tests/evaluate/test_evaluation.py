@@ -335,7 +335,19 @@ def test_simulated_runs(tmp_path: Path) -> None:
     assert found["b"].rate == 0
     file.write_text("scenario,score\na,0.25\na,0.75\n")
     assert read_simulated(file)["a"].rate == pytest.approx(0.5)
-    for text in ("scenario,score\na,1.5\n", "scenario,failed\na,maybe\n", "scenario\na\n", "failed\n1\n"):
+    file.write_text("scenario,failed\n" + "a,1\na,0\n" * 60_000)
+    found = read_simulated(file)
+    assert (found["a"].of, found["a"].rate) == (120_000, 0.5)
+    assert found["a"].interval == pytest.approx((0.4972, 0.5028), abs=1e-4)
+    endless = f"scenario,failed\na,1\n{'a' * 200_000},1\n"
+    for text in (
+        endless,
+        "scenario,score\n,0.5\n",
+        "scenario,score\na,1.5\n",
+        "scenario,failed\na,maybe\n",
+        "scenario\na\n",
+        "failed\n1\n",
+    ):
         file.write_text(text)
         refused("file-invalid", lambda: read_simulated(file))
     refused("file-missing", lambda: read_simulated(tmp_path / "none.csv"))
