@@ -27,11 +27,13 @@ class Simulated:
 
     Attributes:
         share: Of the simulated runs that failed.
+        about: What it was compared with on recordings, such as "role parkedCar".
         says: "for" the failure in reality, "against" it, or "too little".
         sentence: The same in words.
     """
 
     share: Share
+    about: str
     says: str
     sentence: str
 
@@ -112,4 +114,4 @@ def verdict(share: Share, real: ObjectComparison) -> Simulated:
     }[says]
     low, high = share.interval
     text = f"failed in {100 * share.rate:.0f} % [{100 * low:.0f}, {100 * high:.0f}] of {share.of:g} simulated runs; "
-    return Simulated(share, says, text + f"{real.sentence}: {words}")
+    return Simulated(share, real.about, says, text + f"{real.sentence}: {words}")

@@ -251,3 +251,14 @@ def test_signals_at_intersections_are_what_the_map_says_of_them():
         compile_scenario(Source("test.scenic", text), silent)
     (diagnostic,) = caught.value.diagnostics
     assert (diagnostic.code, diagnostic.span.text) == ("map-lacks", "isSignalized")
+
+
+@pytest.mark.parametrize(
+    ("part", "lacked"),
+    [("backwardLanes.lanes", "backwardLanes"), ("intersection.maneuvers", "intersection")],
+)
+def test_what_an_element_of_the_map_lacks_is_said_of_the_map(part: str, lacked: str):
+    # where Scenic ends with an error of Python
+    text = f"{HEADER}some = [road for road in network.allRoads if len(road.{part}) == 1]\nego = new Car\n"
+    assert refused(text) == ("map-lacks", lacked)
+    assert refused(f"{HEADER}found = [None]\nego = new Car at (found[0].x, 1)\n") == ("unknown-attribute", "x")

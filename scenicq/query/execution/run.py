@@ -281,6 +281,21 @@ class Query:
             raise ScenarioError([replace(each, severity="error") for each in found.warnings])
         return found
 
+    def alone(self, recording: str, map_name: str, world: CompiledMap, match: MatchOptions) -> Query:
+        """This query of one recording, in this process, with another scenario or other options of the matcher.
+
+        Args:
+            recording: Its name.
+            map_name: The map that it is on.
+            world: The scenario over that map, with its prefilter.
+            match: The options.
+        """
+        frames = self.dataset.manifest.by_recording[recording].frames
+        known = replace(self._known, worlds={**self._known.worlds, map_name: world})
+        options = replace(self.options, match=match, jobs=1, limit=None, every=False)
+        stretch = {map_name: Stretch(recording, recording, frames)}
+        return Query(self.dataset, self.source, options, stretch, file=self.file, _known=known)
+
     def frames(self, map_name: str) -> int:
         """How many frames of a map are looked at."""
         if self.recordings is None:

@@ -36,14 +36,20 @@ class Change:
     Attributes:
         what: The comparison, in the words of the program.
         amount: By how much more it must let through, less if negative; in the unit of its sides.
+        compare: The comparison.
         number: What its one number would have to be; None where neither side is a number that stays the same.
         instead_of: What it is.
     """
 
     what: str
     amount: float
+    compare: Compare
     number: float | None = None
     instead_of: float | None = None
+
+    def made(self, conditions: Sequence[Node]) -> tuple[Node, ...]:
+        """The conditions of a program in which the comparison is changed wherever it is used."""
+        return tuple(transform(each, lambda node: _let(node, self.compare, self.amount)) for each in conditions)
 
     def text(self) -> str:
         """The change for a person."""
@@ -150,8 +156,8 @@ def _least(
         if len(values) and not set(features(side)):
             more = (compare.op in _GREATER) == (side is compare.left)
             old = float(values[0])
-            return Change(what, enough, old + enough if more else old - enough, old)
-    return Change(what, enough)
+            return Change(what, enough, compare, old + enough if more else old - enough, old)
+    return Change(what, enough, compare)
 
 
 def _let(node: Node, compare: Compare, amount: float) -> Node:
