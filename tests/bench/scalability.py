@@ -37,7 +37,7 @@ from scenicq.forest.scenario import Scenario  # noqa: E402
 from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
-from scenicq.match.verdict import Match  # noqa: E402
+from scenicq.match.verdict import Match, Unknown, Verdict  # noqa: E402
 from scenicq.smt.answer import Answer, NoAnswer, SolverSession  # noqa: E402
 from scenicq.smt.formula import Problem  # noqa: E402
 from scenicq.smt.pool import WorkerSolver  # noqa: E402
