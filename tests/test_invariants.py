@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -118,6 +120,16 @@ def test_the_library_never_prints_exits_or_reads_the_environment():
                     pass
     # programs of their own, which the library starts, read their arguments, and end as processes do
     assert {each for each in found if not each.startswith(PROGRAMS)} == set()
+
+
+def test_duckdb_is_connected_in_one_place_alone():
+    # where Python is interactive it draws progress bars unless it is told not to
+    there = [named(file) for file in FILES if re.search(r"duckdb\.connect\(", file.read_text())]
+    assert there == ["store/in_memory.py"]
+    code = "from scenicq.store.in_memory import connect_in_memory as c\n"
+    code += "print(c().execute(\"SELECT current_setting('enable_progress_bar')\").fetchone())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "(False,)\n"
 
 
 def test_the_core_knows_no_dataset():

@@ -10,10 +10,11 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
-import duckdb
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
+
+from scenicq.store.in_memory import connect_in_memory
 
 __all__ = ["Centres", "Pairs", "assign", "find_pairs"]
 
@@ -62,7 +63,7 @@ def find_pairs(predictions: Centres, objects: Centres, reach_m: float, *, neares
         nearest_only: Whether each prediction is paired with the nearest object alone, at any distance.
     """
     axes = "xy" if predictions.z is None or objects.z is None else "xyz"
-    with closing(duckdb.connect(":memory:")) as connection:
+    with closing(connect_in_memory()) as connection:
         connection.register("predictions", _table(predictions))
         connection.register("objects", _table(objects))
         joined = "FROM predictions p JOIN objects o ON p.frame = o.frame AND p.category = o.category"

@@ -20,6 +20,7 @@ from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.store.frame_index import find_rows
 from scenicq.store.frame_names import find_frame, shortened
+from scenicq.store.in_memory import connect_in_memory
 from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
@@ -93,7 +94,7 @@ class Dataset:
             memory_limit: Such as "2GB"; DuckDB decides by default.
             views: Whether the tables are there as views; else only `files` can be read.
         """
-        config: dict[str, str | bool | int | float | list[str]] = {
+        config: dict[str, bool | int | str] = {
             "autoinstall_known_extensions": False,
             "autoload_known_extensions": False,
         }
@@ -101,7 +102,7 @@ class Dataset:
             config["threads"] = threads
         if memory_limit is not None:
             config["memory_limit"] = memory_limit
-        connection = duckdb.connect(":memory:", config=config)
+        connection = connect_in_memory(config)
         # shapes are not for SQL, and DuckDB 1.5.0 refuses those without a coordinate reference system
         connection.execute("SET enable_geoparquet_conversion = false")
         self.place.admit(connection, (part for parts in self.manifest.tables.values() for part in parts))

@@ -1,0 +1,21 @@
+"""In-memory connections of DuckDB that print nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import duckdb
+
+__all__ = ["connect_in_memory"]
+
+
+def connect_in_memory(config: Mapping[str, bool | int | str] | None = None) -> duckdb.DuckDBPyConnection:
+    """A DuckDB without a file.
+
+    Args:
+        config: Settings that DuckDB takes at the start.
+    """
+    connection = duckdb.connect(":memory:", config={**(config or {})})
+    # where Python is interactive, DuckDB draws how far a long query has come, between whatever the program writes
+    connection.execute("SET enable_progress_bar = false")
+    return connection
