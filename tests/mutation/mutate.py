@@ -123,6 +123,7 @@ class _Mutation:
         self.options = options
         self.work = work
         self.failed = work / "failed.txt"
+        self.measuring = False
         self.noticed_all = False
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -131,13 +132,24 @@ class _Mutation:
             with self.failed.open("a") as file:
                 file.write(f"{report.nodeid}\n")
 
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self) -> Iterator[None]:
+        """End tests that are not fast while the survey is made."""
+        signal.setitimer(signal.ITIMER_VIRTUAL, _SLOWEST_S if self.measuring else 0)
+        try:
+            return (yield)
+        finally:
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Make the survey and the changes, once the tests are known."""
         items = {item.nodeid: item for item in session.items}
         kept = self.options.survey or self.work / "survey.json"
-        if not kept.exists() and _apart(None, partial(self._survey, items, kept)):
-            kept.unlink(missing_ok=True)
+        if not kept.exists():
+            kept.write_text('{"cost": {}, "tests": {}}')
+        known = json.loads(kept.read_text())
+        if items.keys() - known["cost"].keys() and _apart(None, partial(self._survey, items, known, kept)):
             raise SystemExit("the survey has failed")
         survey = Survey(json.loads(kept.read_text()), self.options.enough)
         outcomes: defaultdict[str, Counter[str]] = defaultdict(Counter)
@@ -169,34 +181,36 @@ class _Mutation:
         random.Random(self.options.seed).shuffle(every)
         return every[self.options.skip : self.options.skip + self.options.count]
 
-    def _survey(self, items: dict[str, pytest.Item], told: Path) -> int:
-        """Run tests in random order, and write which lines each runs; runs in a process of its own."""
+    def _survey(self, items: dict[str, pytest.Item], known: dict[str, Any], told: Path) -> int:
+        """Run tests that are not known in random order, and add which lines each runs; in a process of its own."""
         measured = coverage.Coverage(data_file=None, source=[str(ROOT / "scenicq" / folder) for folder in CHANGED])
         cost: dict[str, float] = {}
-        order = sorted(items)
+        order = sorted(items.keys() - known["cost"].keys())
         random.Random(0).shuffle(order)
         measured.start()
         began = _cpu_seconds()
         signal.signal(signal.SIGVTALRM, lambda *_: pytest.fail("is not fast"))
-        for name in order:
+        self.measuring = True
+        for name, following in zip(order, [*order[1:], None], strict=False):
             before = _cpu_seconds()
             if before - began > self.options.survey_seconds:
                 break
             measured.switch_context(name)
-            signal.setitimer(signal.ITIMER_VIRTUAL, _SLOWEST_S)
-            self._run([items[name]])
-            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+            items[name].config.hook.pytest_runtest_protocol(item=items[name], nextitem=following and items[following])
             cost[name] = _cpu_seconds() - before
         measured.stop()
         left_out = {*self.failed.read_text().split("\n")} if self.failed.exists() else set[str]()
-        print(f"{len(cost)} of {len(order)} tests in the survey, {len(left_out & {*cost})} left out", flush=True)
         data = measured.get_data()
-        tests: dict[str, dict[int, list[str]]] = {}
         for file in data.measured_files():
-            lines = data.contexts_by_lineno(file).items()
-            found = {line: [test for test in set(contexts) - left_out if test] for line, contexts in lines}
-            tests[str(Path(file).relative_to(ROOT))] = {line: names for line, names in found.items() if names}
-        told.write_text(json.dumps({"cost": cost, "tests": tests}))
+            lines = known["tests"].setdefault(str(Path(file).relative_to(ROOT)), {})
+            for line, contexts in data.contexts_by_lineno(file).items():
+                found = [test for test in dict.fromkeys(contexts) if test and test not in left_out]
+                lines[str(line)] = lines.get(str(line), []) + found
+        known["cost"] |= cost
+        told.write_text(json.dumps(known))
+        print(
+            f"{len(known['cost'])} of {len(items)} tests in the survey, {len(left_out & {*cost})} left out", flush=True
+        )
         return 0
 
     def _run(self, items: list[pytest.Item]) -> int:
@@ -326,7 +340,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--skip", type=int, default=0, help="how many of the chosen changes were tried before")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--survey", type=Path, help="a file that keeps the survey; it is made where it is missing")
+    parser.add_argument("--survey", type=Path, help="a file that keeps the survey; what it lacks is added")
     parser.add_argument("--survey-seconds", type=float, default=float("inf"), help="CPU seconds of the survey at most")
     parser.add_argument("--enough", type=float, default=30.0, help="CPU seconds of tests that are run against a change")
     options = parser.parse_args()
