@@ -230,3 +230,10 @@ def test_every_name_in_the_map_is_one_of_the_code():
     missing = {name for name in named_ if not known.issuperset(re.split(r"[./]", name.strip("/")))}
     # files and commands that are no code of the library
     assert {name for name in missing if not (ROOT / name).exists() and not re.search(r"\.py$", name)} == {"scenicq_cli"}
+
+
+def test_the_map_names_every_file_of_the_engine():
+    folders = SECTIONS["Folders, top to bottom"]
+    told = {word for name in re.findall(r"`([^`]+)`", folders) for word in re.split(r"[/.]", name)}
+    inside = [file for file in FILES if named(file).startswith(("match/", "query/", "forest/", "temporal/"))]
+    assert [named(file) for file in inside if file.stem not in told | {"__init__"}] == []
