@@ -1,7 +1,8 @@
 """Groups with a closed form: one comparison whose random variables are independent, or one ground condition.
 
-What most features look like once the label is known: a point of a region, an offset by ranges in a known frame, a
-heading within ranges of a known one, a condition that is known altogether. The formulas are worked out once per
+What most features look like once the label is known: a point of a region, or of what a known object sees of it, an
+offset by ranges in a known frame, a heading within ranges of a known one, a number within ranges, a condition that is
+known altogether. The formulas are worked out once per
 scenario, and hold for one assignment of label objects (floats) and for many (columns) alike. Only clear answers are
 given: whatever is close to a boundary is left to the cascade.
 """
@@ -24,13 +25,16 @@ from scenicq.forest.nodes import (
     Feature,
     Identity,
     Index,
+    Node,
     PointIn,
+    RegionIntersection,
     Rotate,
     Value,
     VectorOf,
     VectorSum,
 )
 from scenicq.forest.walk import postorder
+from scenicq.geometry.membership import contains
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.decide.compiled_expressions import (
@@ -43,6 +47,7 @@ from scenicq.match.decide.compiled_expressions import (
     Scalar,
     UnclearError,
     clipped,
+    computed,
     spread,
     truth,
     turned,
@@ -172,7 +177,9 @@ def closed_form_of(group: Group, ego: int) -> ClosedForm | None:
     if item.object != PARAMS and item.property == "position":
         node = item.expression
         return _point(item, node, ego) if isinstance(node, PointIn) else _known_position(item) or _offset(item)
-    return _heading(item) if item.object != PARAMS and item.property == "heading" else None
+    if item.object == PARAMS:
+        return None
+    return _heading(item) if item.property == "heading" else _number(item)
 
 
 def _condition(item: Condition) -> ClosedForm | None:
@@ -236,13 +243,26 @@ def _length(x: float, y: float) -> float:
 
 
 def _point(item: Comparison, node: PointIn, ego: int) -> ClosedForm | None:
-    if not isinstance(node.region, Constant):
-        return None
-    region, index = cast(Region, node.region.value), item.object
+    known: list[Region] = []
+    others: list[Callable[[Get], Value]] = []
+    for part in _parts(node.region):
+        if isinstance(part, Constant):
+            known.append(cast(Region, part.value))
+        elif (found := computed(part)) is not None:
+            others.append(found)
+        else:
+            return None
+    index = item.object
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        if others and isinstance(get, Columns):
+            raise UnclearError
         places = _each(get(index, "position"))
-        holds = [lookups.within(region, place) for place in places]
+        holds = [all(lookups.within(region, place) for region in known) for place in places]
+        for region in others:
+            holds = [
+                held and contains(cast(Region, region(get)), *place) for held, place in zip(holds, places, strict=True)
+            ]
         if options.radius is not None:
             near, centres = options.radius - SLACK, _each(get(ego, "position"))
             distances = itertools.starmap(math.dist, zip(places, centres, strict=True))
@@ -251,7 +271,19 @@ def _point(item: Comparison, node: PointIn, ego: int) -> ClosedForm | None:
             return Evaluated(holds, [False] * get.size, {node.identity: cast("list[Value]", places)})
         return Evaluated(holds[0], False, {node.identity: places[0]})
 
-    return ClosedForm(item, evaluate, region=region, index=index)
+    return ClosedForm(item, evaluate, region=known[0] if known else None, index=index)
+
+
+def _parts(region: Node) -> list[Node]:
+    """What a point of a region must lie in: the parts of intersections."""
+    left, found = [region], list[Node]()
+    while left:
+        node = left.pop()
+        if isinstance(node, RegionIntersection):
+            left += reversed(node.parts)
+        else:
+            found.append(node)
+    return found
 
 
 def _each(position: Value) -> list[XY]:
@@ -367,6 +399,28 @@ def _heading(item: Comparison) -> ClosedForm | None:
         return unlike("heading", first.known(get) + direction, seen)
 
     return ClosedForm(item, evaluate, field=flow, index=where, detail=detail)
+
+
+def _number(item: Comparison) -> ClosedForm | None:
+    form, index, name = CompiledExpressions({}).form(item.expression), item.object, item.property
+    if form is None or form.fields:
+        return None
+
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        seen, margin = get(index, name), options.tolerance.of(index, name)
+        if margin.kind != "interval" or not isinstance(seen, float | np.ndarray):
+            raise UnclearError
+        rest = seen - form.known(get)
+        value = clipped(rest, form.low, form.high)
+        off = abs(rest - value)
+        holds, fails = off <= margin.sure, off > margin.reach + SLACK
+        return Evaluated(holds, fails, spread(form, value) if form.terms else {})
+
+    def detail(get: Get, lookups: MapLookups) -> str:
+        # what the cascade tries first is what it words
+        return "" if form.terms else unlike(name, form.known(get), get(index, name))
+
+    return ClosedForm(item, evaluate, detail=detail)
 
 
 def _turn(angle: float, allowed: Sequence[float], half: float, sure: float) -> float:

@@ -49,6 +49,7 @@ __all__ = [
     "Get",
     "UnclearError",
     "clipped",
+    "computed",
     "spread",
     "truth",
     "turned",
@@ -206,7 +207,13 @@ def _with_rest(form: Form, value: float) -> dict[Identity, Value]:
 
 
 def truth(root: Node) -> Callable[[Get], bool] | None:
-    """A condition on what is observed alone as a function of it, which raises `UnclearError` where it has no value.
+    """A condition on what is observed alone as a function of it; see `computed`."""
+    whole = computed(root)
+    return None if whole is None else lambda get: bool(whole(get))
+
+
+def computed(root: Node) -> Callable[[Get], Value] | None:
+    """An expression of what is observed alone as a function of it, which raises `UnclearError` where it has no value.
 
     None if anything about it is random or it takes too many steps.
     """
@@ -220,8 +227,7 @@ def truth(root: Node) -> Callable[[Get], bool] | None:
         if isinstance(node, Feature) and node.object == PARAMS:
             return None
         made[id(node)] = _computed(node, [made[id(child)] for child in below])
-    whole = made[id(root)]
-    return lambda get: bool(whole(get))
+    return made[id(root)]
 
 
 def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[Get], Value]:

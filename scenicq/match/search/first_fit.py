@@ -251,12 +251,15 @@ class _Batch:
     def _column(self, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
         """The values of a property of the label objects that play an object."""
         rank = self.fit.ranks[index]
-        playing = zip(self.rows, self.numbers, strict=True)
+        playing = [*zip(self.rows, self.numbers, strict=True)]
         objects = [_label_object(row.label, numbers[rank]) for row, numbers in playing]
         if name == "position":
             return np.array([each.x for each in objects]), np.array([each.y for each in objects])
         if name in _SCALARS:
             return np.array([getattr(each, name) for each in objects], dtype=np.float64)
+        values = [row.observed[numbers[rank]].get(name) for row, numbers in playing]
+        if all(isinstance(value, float) for value in values):
+            return np.array(values, dtype=np.float64)
         raise UnclearError
 
 

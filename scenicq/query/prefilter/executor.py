@@ -324,6 +324,7 @@ def candidate_rows(connection: duckdb.DuckDBPyConnection, plan: Plan) -> Candida
         connection: The one that sifted.
         plan: The plan; with roles.
     """
+    assert plan.roles
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
     roles = ", ".join(f"r{place}" for place in range(len(plan.roles)))
     found: Any = connection.execute(f"SELECT row, {roles} FROM roles WHERE f IN {left} ORDER BY row").fetchnumpy()
@@ -356,10 +357,16 @@ def candidates(
     frames = _rows(connection, f"SELECT l.number, {of_frames} FROM {LABELS} l WHERE l.number IN {left} ORDER BY 1")
     mine = f"JOIN {LABELS} l ON s.frame = l.frame WHERE l.number IN {left} ORDER BY s.number"
     sensors = _rows(connection, f"SELECT s.channel, s.path FROM {_SENSORS} s {mine}")
-    if not plan.roles:
+    if plan.roles is None:
         objects = _rows(connection, f"SELECT {of_objects.replace('a.', 's.')} FROM {OBJECTS} s {mine}")
         for label in _assembled(frames, objects, sensors):
             yield Candidate(label, None)
+        return
+    if not plan.roles:
+        frames = _with_counts(frames, np.zeros(len(frames), np.int32))
+        objects = _rows(connection, f"SELECT {of_objects.replace('a.', 's.')} FROM {OBJECTS} s WHERE false")
+        for label in _assembled(frames, objects, sensors):
+            yield Candidate(label, {})
         return
     flags = "".join(f", r.r{place}" for place in range(len(plan.roles)))
     objects = _rows(
@@ -369,7 +376,7 @@ def candidates(
     )
     numbers, owners = frames["number"].to_numpy(), objects["f"].to_numpy()
     counts = np.searchsorted(owners, numbers, side="right") - np.searchsorted(owners, numbers)
-    frames = frames.set_column(frames.column_names.index("object_count"), "object_count", [counts.astype(np.int32)])
+    frames = _with_counts(frames, counts.astype(np.int32))
     ends = np.concatenate(([0], np.cumsum(counts)))
     may = [
         (index, *_numbered(np.array(objects[f"r{place}"].to_pylist(), dtype=bool), ends))
@@ -377,6 +384,11 @@ def candidates(
     ]
     for place, label in enumerate(_assembled(frames, objects, sensors)):
         yield Candidate(label, {index: tuple(mine[cuts[place] : cuts[place + 1]]) for index, mine, cuts in may})
+
+
+def _with_counts(frames: ArrowTable, counts: NDArray[np.int32]) -> ArrowTable:
+    """Frames of which fewer objects were read."""
+    return frames.set_column(frames.column_names.index("object_count"), "object_count", [counts])
 
 
 def _numbered(chosen: NDArray[np.bool_], ends: NDArray[np.int64]) -> tuple[list[int], list[int]]:
