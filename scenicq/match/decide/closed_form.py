@@ -2,9 +2,8 @@
 
 What most features look like once the label is known: a point of a region, or of what a known object sees of it, an
 offset by ranges in a known frame, a heading within ranges of a known one, a number within ranges, a condition that is
-known altogether. The formulas are worked out once per
-scenario, and hold for one assignment of label objects (floats) and for many (columns) alike. Only clear answers are
-given: whatever is close to a boundary is left to the cascade.
+known altogether. The formulas are worked out once per scenario, and hold for one assignment of label objects (floats)
+and for many (columns) alike. Only clear answers are given: whatever is close to a boundary is left to the cascade.
 """
 
 from __future__ import annotations

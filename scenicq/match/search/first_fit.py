@@ -326,8 +326,8 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
     known = {names & wanted for names in {*seen.values()}}
     params: frozenset[str] = frozenset(observe_params(label)) if label.params else frozenset()
     own = observed_names(label.ego) & wanted
-    if len(known) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
-        return _signature(relevant, ego, own, next(iter(known)), params)
+    if len(known) <= 1 and all(among[index] for index in range(len(relevant)) if index != ego):
+        return _signature(relevant, ego, own, next(iter(known), frozenset()), params)
     kinds: list[frozenset[str]] = []
     for index, names in enumerate(relevant):
         if index == ego:
