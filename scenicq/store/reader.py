@@ -232,7 +232,10 @@ def _values(table: ArrowTable, name: str) -> list[Any]:
     if column.null_count == len(column):
         return [{} if is_json else None] * len(column)
     if is_json and not pa.types.is_dictionary(column.type):
-        column = column.dictionary_encode()
+        # to make a dictionary of it pyarrow would load another module
+        texts_: list[str | None] = column.to_pylist()
+        read: dict[str | None, Any] = {text: {} if text is None else json.loads(text) for text in set(texts_)}
+        return [read[text] for text in texts_]
     if pa.types.is_dictionary(column.type):
         values: list[Any] = []
         for chunk in column.chunks:

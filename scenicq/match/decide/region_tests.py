@@ -36,8 +36,8 @@ __all__ = ["RegionTest", "region_test"]
 _MOST_PARTS = 40
 """Regions that one may be made of."""
 
-Truth: TypeAlias = "bool | NDArray[np.bool_]"
-Test: TypeAlias = Callable[[Get, Value, MapLookups, float], "tuple[Truth, Truth]"]
+_Truths: TypeAlias = "bool | NDArray[np.bool_]"
+_Test: TypeAlias = Callable[[Get, Value, MapLookups, float], "tuple[_Truths, _Truths]"]
 """From what is observed, a position, what is known of the map and the tolerance, whether the position surely lies in a
 region, and whether it surely lies further than the tolerance from it; of columns, columns."""
 
@@ -51,14 +51,14 @@ class RegionTest:
         regions: Those of the map that it asks for.
     """
 
-    evaluate: Test
+    evaluate: _Test
     regions: tuple[Region, ...]
 
 
 def region_test(root: Node) -> RegionTest | None:
     """The test of a region; None if something about it is random, or it is made of too many."""
     formulas = CompiledExpressions({})
-    made: dict[int, Test | None] = {}
+    made: dict[int, _Test | None] = {}
     regions: dict[int, Region] = {}
     parts = 0
     for node in postorder((root,)):
@@ -79,8 +79,8 @@ def region_test(root: Node) -> RegionTest | None:
     return None if test is None or parts > _MOST_PARTS else RegionTest(test, tuple(regions.values()))
 
 
-def _constant(region: Region) -> Test:
-    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[Truth, Truth]:
+def _constant(region: Region) -> _Test:
+    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
         # how far off a place is, is not looked up
         if isinstance(get, Columns):
             held = np.array([lookups.within(region, place) for place in each_position(position)], dtype=np.bool_)
@@ -91,14 +91,14 @@ def _constant(region: Region) -> Test:
     return test
 
 
-def _placed(node: DiscAt | SectorAt | RectangleAt, known: list[Exact | None]) -> Test | None:
+def _placed(node: DiscAt | SectorAt | RectangleAt, known: list[Exact | None]) -> _Test | None:
     if any(each is None for each in known):
         return None
     center, *numbers = cast("list[Exact]", known)
     of_many = {DiscAt: to_discs, SectorAt: to_sectors, RectangleAt: to_rectangles}[type(node)]
     kind = {DiscAt: Disc, SectorAt: Sector, RectangleAt: Rectangle}[type(node)]
 
-    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[Truth, Truth]:
+    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
         (x, y), given = cast(XY, center(get)), [number(get) for number in numbers]
         px, py = cast(XY, position)
         if isinstance(get, Columns):
@@ -110,11 +110,11 @@ def _placed(node: DiscAt | SectorAt | RectangleAt, known: list[Exact | None]) ->
     return test
 
 
-def _combined(node: RegionUnion | RegionIntersection | RegionDifference, tests: list[Test]) -> Test:
+def _combined(node: RegionUnion | RegionIntersection | RegionDifference, tests: list[_Test]) -> _Test:
     if isinstance(node, RegionDifference):
         base, removed = tests
 
-        def without(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[Truth, Truth]:
+        def without(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
             held, missed = base(get, position, lookups, reach)
             # whoever is surely off what is removed, by whatever little
             _, off = removed(get, position, lookups, 0.0)
@@ -123,7 +123,7 @@ def _combined(node: RegionUnion | RegionIntersection | RegionDifference, tests: 
         return without
     each_holds = isinstance(node, RegionIntersection)
 
-    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[Truth, Truth]:
+    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
         held, missed = tests[0](get, position, lookups, reach)
         for one in tests[1:]:
             also, off = one(get, position, lookups, reach)
