@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "match"))
+sys.path[:0] = [str(ROOT / "tests" / "match"), str(ROOT / "tests" / "oracle")]
 
 from clock import cpu_s  # noqa: E402
 from scenes import compiled, drawn, label_of  # noqa: E402

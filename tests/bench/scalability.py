@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "match"))
+sys.path[:0] = [str(ROOT / "tests" / "match"), str(ROOT / "tests" / "oracle")]
 
 from algorithm1 import VARIANTS, Variant, matches  # noqa: E402
 from clock import cpu_s  # noqa: E402

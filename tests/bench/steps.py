@@ -28,7 +28,7 @@ from typing import Any
 from unittest.mock import patch
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "match"))
+sys.path[:0] = [str(ROOT / "tests" / "match"), str(ROOT / "tests" / "oracle")]
 
 from programs import HEADER, PROGRAMS  # noqa: E402
 from scenes import STREET, compiled, drawn, label_of  # noqa: E402

@@ -19,7 +19,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(TESTS / "generate"), str(TESTS / "match")]
+sys.path[:0] = [str(TESTS / each) for each in ("generate", "match", "oracle")]
 
 from compositions import Composer  # noqa: E402
 from examples import examples, town  # noqa: E402
