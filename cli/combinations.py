@@ -29,7 +29,7 @@ _EXCLUDES = {
 }
 """Two options that cannot be had together, and what to do instead."""
 
-_FRAMES_ONLY = ("near", "advise")
+_FRAMES_ONLY = ("advise",)
 """Options that mean nothing where intervals are looked for."""
 
 

@@ -100,7 +100,8 @@ def _deliver(
         with bar.aside(), writing(file):
             writer.finish()
         if unlisted:
-            told = f"`ids` lists frames that match: {count(unlisted, 'other frame')} left out"
+            what = "interval" if query.is_over_time() else "frame"
+            told = f"`ids` lists {what}s that match: {count(unlisted, f'other {what}')} left out"
             with bar.aside():
                 click.echo(told, err=True)
         if exporter is not None:

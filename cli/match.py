@@ -45,9 +45,15 @@ __all__ = ["match"]
 
 
 def _near(query: Query, count: int | None) -> Iterator[Result]:
-    """The frames that come closest, looked for once the matches are there."""
-    if count is not None and not query.funnel.cut:
-        from scenicq.query.explain.nearest_miss import nearest_misses  # noqa: PLC0415 - takes long to load
+    """The frames or recordings that come closest, looked for once the matches are there."""
+    if count is None or query.funnel.cut:
+        return
+    if query.is_over_time():
+        from scenicq.query.explain.nearest_interval import nearest_intervals  # noqa: PLC0415 - takes long to load
+
+        yield from nearest_intervals(query, count)
+    else:
+        from scenicq.query.explain.nearest_miss import nearest_misses  # noqa: PLC0415
 
         yield from nearest_misses(query, count)
 
@@ -104,7 +110,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--all-matches", is_flag=True, help="One line for each correspondence by which a frame matches, "
               "interchangeable objects in one order only.")
 @click.option("--near", metavar="K", type=click.IntRange(1), help="Show the K frames, too, that do not match but come "
-              "closest, each with the tolerance under which it would.")
+              "closest, each with the tolerance under which it would; over time K recordings, each with the tolerance, "
+              "the number of the program or the duration with which it would.")
 @click.option("--rank", is_flag=True, help="Order matches from typical to borderline: by the density with which the "
               "program generates what the label observes.")
 @click.option("--sample", metavar="N", type=click.IntRange(1), help="Show N of the matches, drawn at random.")

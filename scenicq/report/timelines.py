@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
-from scenicq.query.execution.interval_frames import frames_of, locate
+from scenicq.query.execution.interval_frames import frames_of
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.interval_explanation import Band, bands_of
+from scenicq.query.explain.interval_explanation import Band, bands_of, placed
 from scenicq.report.runs import FrameRun
 from scenicq.report.svg import element, escape
-from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader
-from scenicq.temporal.intervals import IntervalVerdict
-from scenicq.temporal.truth import TRUE
 
 __all__ = ["interval_runs"]
 
@@ -50,23 +47,10 @@ def _at(verdict: Verdict, roles: dict[str, str]) -> Verdict:
 
 def _timeline(query: Query, result: Result) -> str:
     """The bands of an interval as a picture; nothing for a program about one instant."""
-    part, first, end = locate(query.dataset, result.recording)
-    label = next(query.dataset.labels_at(part, first, first + 1))
-    scenario, _ = query.compile(label.map)
-    verdict = result.verdict
-    if scenario.dynamics is None or isinstance(verdict, NoMatch) or result.interval is None:
+    scenario, tracks, interval = placed(query, result)
+    if scenario.dynamics is None:
         return ""
-    with TrackReader(query.dataset, part) as reader:
-        tracks = reader.read(first, end)
-    names = {owner.name: owner.index for owner in scenario.objects}
-    binding = tuple((names[name], _key(tracks, track)) for name, track in verdict.correspondence.items())
-    start, last = tracks.frames.index(result.frame), tracks.frames.index(result.interval.last)
-    return _drawn(bands_of(scenario, tracks, IntervalVerdict(start, last, int(TRUE), binding)))
-
-
-def _key(tracks: RecordingTracks, name: str) -> TrackKey:
-    """The track that a result names."""
-    return ("ego", "") if name == "ego" else tracks.key(name)
+    return _drawn(bands_of(scenario, tracks, interval))
 
 
 def _drawn(bands: tuple[Band, ...]) -> str:

@@ -18,7 +18,6 @@ PROGRAM = "ego = new Car"
         (("--shard", "1/2", "-o", "pieces", "--sample", "2"), "--shard cannot be had with --sample"),
         (("--shard", "1/2", "-o", "pieces", "--advise"), "--shard cannot be had with --advise"),
         (("--shard", "1/2", "-o", "pieces", "--report", "r"), "--report: give it to `scenicq gather`"),
-        (("--near", "2", "--min-duration", "1"), "--near is about frames"),
         (("--advise", "--min-duration", "1"), "--advise is about frames"),
     ],
 )

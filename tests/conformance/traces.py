@@ -1,11 +1,11 @@
 """Do traces that Scenic simulates match the programs that they come from, over time?
 
 Run by `make conformance-time MAP=Town01.xodr`, or with SCENIC=a checkout for the programs that Scenic's repository
-publishes. Scenic's Newtonian simulator runs each program (`simulate.py`). Its trace is written as a recording, ingested
-and matched with `--behaviors ignore`: it must match from its first sample to its last. So must what is left of it at
-2 Hz, and with noise within the tolerance; and changed ones (an object late, stopped, aside, turned, or said to be
-faster, the trace cut) must match if and only if Scenic, replaying the same states without behaviors, says that the
-program holds, and must end where it says.
+publishes, on the towns that they name or, where the checkout lacks one, on another. Scenic's Newtonian simulator runs
+each program (`simulate.py`). Its trace is written as a recording, ingested and matched with `--behaviors ignore`: it
+must match from its first sample to its last. So must what is left of it at 2 Hz, and with noise within the tolerance;
+and changed ones (an object late, stopped, aside, turned, or said to be faster, the trace cut) must match if and only if
+Scenic, replaying the same states without behaviors, says that the program holds, and must end where it says.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any
 
 from click.testing import CliRunner
 from original import HERE, Original, environment
-from published_scenes import maps_of, published_programs
+from published_scenes import SECOND, maps_of, published_programs
 from recordings import Recorded, recordings, write
 from run_conformance import SCENIC
 from temporal_formulas import compare_formulas
@@ -182,13 +182,12 @@ def programs(arguments: argparse.Namespace) -> Iterator[tuple[str, Path, Path]]:
             yield path.stem, path, arguments.map
         return
     towns = maps_of([arguments.checkout / "assets", *arguments.maps])
-    for program, town in published_programs(arguments.checkout):
-        if town in towns:
-            yield (
-                f"{program.removeprefix('examples/').removesuffix('.scenic')}",
-                arguments.checkout / program,
-                towns[town],
-            )
+    for program, own in published_programs(arguments.checkout):
+        town = next((name for name in (own, *SECOND) if name in towns), None)
+        if town is None:
+            raise SystemExit(f"no town for {program}: give --maps")
+        name = program.removeprefix("examples/").removesuffix(".scenic")
+        yield name if town == own else f"{name} ({town})", arguments.checkout / program, towns[town]
 
 
 def parse_arguments() -> argparse.Namespace:
@@ -202,7 +201,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--work", type=Path, default=Path(".conformance/traces"), help="folder of maps and recordings")
     parser.add_argument("--seeds", type=int, default=2, help="traces of each program")
     parser.add_argument("--formulas", type=int, default=10_000, help="random temporal formulas to compare with rv_ltl")
-    parser.add_argument("--only", default="", metavar="TEXT", help="programs whose name has this in it")
+    parser.add_argument("--only", default="", metavar="PATTERN", help="programs in whose name this is found")
     return parser.parse_args()
 
 
@@ -217,7 +216,7 @@ def main() -> int:
     print(HEADING)
     try:
         for name, path, chart in programs(arguments):
-            if arguments.only not in name:
+            if not re.search(arguments.only, name):
                 continue
             if chart not in originals:
                 originals[chart] = Original(python, chart, arguments.work / chart.stem, "simulate.py")

@@ -41,6 +41,7 @@ from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.match.linear.affine_reach import ends
 
 __all__ = [
+    "VECTORS",
     "Columns",
     "CompiledExpressions",
     "Exact",
@@ -49,7 +50,6 @@ __all__ = [
     "Get",
     "UnclearError",
     "clipped",
-    "computed",
     "spread",
     "truth",
     "turned",
@@ -67,7 +67,7 @@ _MOST_STEPS = 400
 """Operations that a formula may take: what is shared in an expression is worked out anew for each use of it."""
 
 _NUMBERS = frozenset({"heading", "width", "length", "height", "speed"})
-_VECTORS = frozenset({"position", "velocity"})
+VECTORS = frozenset({"position", "velocity"})
 """Properties that are numbers and pairs wherever they are observed."""
 
 
@@ -207,13 +207,7 @@ def _with_rest(form: Form, value: float) -> dict[Identity, Value]:
 
 
 def truth(root: Node) -> Callable[[Get], bool] | None:
-    """A condition on what is observed alone as a function of it; see `computed`."""
-    whole = computed(root)
-    return None if whole is None else lambda get: bool(whole(get))
-
-
-def computed(root: Node) -> Callable[[Get], Value] | None:
-    """An expression of what is observed alone as a function of it, which raises `UnclearError` where it has no value.
+    """A condition on what is observed alone as a function of it, which raises `UnclearError` where it has no value.
 
     None if anything about it is random or it takes too many steps.
     """
@@ -227,7 +221,8 @@ def computed(root: Node) -> Callable[[Get], Value] | None:
         if isinstance(node, Feature) and node.object == PARAMS:
             return None
         made[id(node)] = _computed(node, [made[id(child)] for child in below])
-    return made[id(root)]
+    whole = made[id(root)]
+    return lambda get: bool(whole(get))
 
 
 def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[Get], Value]:
@@ -343,8 +338,12 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
             return (lambda _: value) if isinstance(value, float | tuple) else None
         case Feature():
             index, name = node.object, node.property
-            fits = name in (_VECTORS if node.kind == "vector" else _NUMBERS)
-            return (lambda get: cast(float, get(index, name))) if fits else None
+            fits = name in (VECTORS if node.kind == "vector" else _NUMBERS)
+
+            def observed(get: Get) -> Value:
+                return get(index, name)
+
+            return cast(Exact, observed) if fits else None
         case _ if any(arg is None for arg in args):
             return None
         case Arithmetic():

@@ -25,7 +25,7 @@ from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.starts import RoleCandidates, StartSearch
 from scenicq.temporal.truth import TRUE, UNKNOWN
 
-__all__ = ["DecidedRecordings", "RecordingMatcher", "Survivors", "lost_recording"]
+__all__ = ["CUT_OFF", "DecidedRecordings", "RecordingMatcher", "Survivors", "lost_recording"]
 
 CUT_OFF = "recording-ends"
 """The cause of what might have matched, had the recording or a track gone on."""

@@ -6,10 +6,12 @@ amounts at which anything changes are the differences of its sides at the sample
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.forest.build import constant
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Compare, CompareOp, Node
@@ -36,14 +38,20 @@ class Change:
     Attributes:
         what: The comparison, in the words of the program.
         amount: By how much more it must let through, less if negative; in the unit of its sides.
+        compare: The comparison.
         number: What its one number would have to be; None where neither side is a number that stays the same.
         instead_of: What it is.
     """
 
     what: str
     amount: float
+    compare: Compare
     number: float | None = None
     instead_of: float | None = None
+
+    def made(self, conditions: Sequence[Node]) -> tuple[Node, ...]:
+        """The conditions of a program in which the comparison is changed wherever the program says the same."""
+        return tuple(transform(each, lambda node: _let(node, self.compare, self.amount)) for each in conditions)
 
     def text(self) -> str:
         """The change for a person."""
@@ -55,8 +63,9 @@ class Change:
 
 
 def least_changes(
-    columns: AtomColumns, formula: Formula, conditions: Sequence[Node], *, ends: bool = False, goes_on: bool = False
-) -> Iterator[Change]:
+    columns: AtomColumns, formula: Formula, conditions: Sequence[Node], *, ends: bool = False, goes_on: bool = False,
+    quick: bool = False,
+) -> Iterator[Change]:  # fmt: skip
     """For each comparison in a formula that does not hold the least change of it alone that makes it hold.
 
     Args:
@@ -65,6 +74,7 @@ def least_changes(
         conditions: Of the program, by number.
         ends: Whether the formula need only hold at some sample: of the condition of a termination.
         goes_on: Whether the interval is cut off, so that the formula need only be such that it may still hold.
+        quick: Whether to bisect, which finds the least where the formula holds for all larger changes, too.
     """
     asked = Eventually(formula) if ends else formula
     numbers = sorted({node.number for node in _atoms(formula)})
@@ -75,7 +85,7 @@ def least_changes(
     told: set[str] = set()
     for number in numbers:
         for compare in _comparisons(conditions[number]):
-            change = _least(columns, asked, known, number, conditions[number], compare, goes_on=goes_on)
+            change = _least(columns, asked, known, number, conditions[number], compare, goes_on=goes_on, quick=quick)
             if change is not None and change.text() not in told:
                 told.add(change.text())
                 yield change
@@ -118,7 +128,7 @@ def may_still_hold(formula: Formula, atom: Callable[[Atom], Truth]) -> bool:
 
 def _least(
     columns: AtomColumns, formula: Formula, known: Mapping[int, Truth], number: int, condition: Node, compare: Compare,
-    *, goes_on: bool,
+    *, goes_on: bool, quick: bool,
 ) -> Change | None:  # fmt: skip
     """The least change of one comparison that makes a formula hold; None if there is none."""
     sides = [columns.number(columns.expanded(side)) for side in (compare.left, compare.right)]
@@ -140,8 +150,12 @@ def _least(
     # just more than a difference lets its sample through, just less keeps it out
     spare = _SPARE * max(1.0, float(np.abs(amounts).max(initial=0.0)))
     tried = np.concatenate((amounts + spare, amounts - spare))
-    tried = tried[np.argsort(np.abs(tried), kind="stable")][:_MOST_TRIED]
-    enough = next((float(amount) for amount in tried if holds(float(amount))), None)
+    tried = tried[np.argsort(np.abs(tried), kind="stable")]
+    if quick:
+        ends = [_first(tried[side], holds) for side in (tried > 0, tried < 0)]
+        enough = min((each for each in ends if each is not None), key=abs, default=None)
+    else:
+        enough = next((float(amount) for amount in tried[:_MOST_TRIED] if holds(float(amount))), None)
     if enough is None:
         return None
     assert compare.span is not None
@@ -150,13 +164,23 @@ def _least(
         if len(values) and not set(features(side)):
             more = (compare.op in _GREATER) == (side is compare.left)
             old = float(values[0])
-            return Change(what, enough, old + enough if more else old - enough, old)
-    return Change(what, enough)
+            return Change(what, enough, compare, old + enough if more else old - enough, old)
+    return Change(what, enough, compare)
+
+
+def _first(amounts: NDArray[np.float64], holds: Callable[[float], bool]) -> float | None:
+    """The first amount for which something holds that holds for all that come after it, too; None if there is none."""
+    if not len(amounts) or not holds(float(amounts[-1])):
+        return None
+    place = bisect_left(range(len(amounts)), True, key=lambda each: holds(float(amounts[each])))
+    return float(amounts[place])
 
 
 def _let(node: Node, compare: Compare, amount: float) -> Node:
-    """A comparison that lets an amount more through, if it is the one in question."""
-    if not (isinstance(node, Compare) and node.span == compare.span and node.op is compare.op):
+    """A comparison that lets an amount more through, if it is the one in question, or the program says the same."""
+    if not (isinstance(node, Compare) and node.op is compare.op and node.span is not None and compare.span is not None):
+        return node
+    if node.span != compare.span and node.span.text != compare.span.text:
         return node
     more = Arithmetic(ArithmeticOp.ADD, (node.right, constant(-amount if node.op in _GREATER else amount)))
     return Compare(node.op, node.left, more, span=node.span)

@@ -15,11 +15,13 @@ from scenicq.forest.nodes import Compare, Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom, Formula, Termination, Test, operands
 from scenicq.match.matcher import Matcher
-from scenicq.match.verdict import Match
+from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.interval_frames import locate
+from scenicq.query.execution.recording_matcher import CUT_OFF
 from scenicq.query.execution.recording_starts import DecidedStart, start_table, starts_of
+from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.interval_changes import least_changes, may_still_hold
+from scenicq.query.explain.interval_changes import Change, least_changes, may_still_hold
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
@@ -28,9 +30,9 @@ from scenicq.temporal.atoms import AtomColumns, HiddenVariable
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
-from scenicq.temporal.truth import FALSE, TRUE, Truth
+from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Band", "IntervalExplanation", "bands_of", "explain_recording", "show_bands"]
+__all__ = ["Band", "IntervalExplanation", "bands_of", "changes_of", "explain_recording", "placed", "show_bands"]
 
 _WIDTH = 60
 """Characters of a band, at most."""
@@ -209,7 +211,8 @@ def explain_recording(query: Query, solver: Solver, name: str, time_us: int | No
     if best.cut_off:
         best = replace(best, broken=_already_broken(scenario, tracks, best))
     roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
-    return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best), _changes(scenario, tracks, best))
+    changes = tuple(change.text() for change in changes_of(scenario, tracks, best))
+    return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best), changes)
 
 
 def _columns(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> AtomColumns:
@@ -218,8 +221,17 @@ def _columns(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
     return AtomColumns(scenario, samples, start=np.zeros(len(samples), np.int64))
 
 
-def _changes(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[str, ...]:
-    """What would let an interval through: the requirement that is broken hold, or the program end."""
+def changes_of(
+    scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict, *, quick: bool = False
+) -> tuple[Change, ...]:
+    """What would let an interval through: the requirement that is broken hold, or the program end; the least first.
+
+    Args:
+        scenario: The scenario.
+        tracks: The recording.
+        interval: What does not match.
+        quick: As of `least_changes`.
+    """
     dynamics = scenario.dynamics
     if dynamics is None or interval.truth == TRUE:
         return ()
@@ -228,13 +240,13 @@ def _changes(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
         change
         for each in dynamics.requirements
         if each.span == interval.broken
-        for change in least_changes(columns, each.formula, dynamics.conditions, goes_on=interval.cut_off)
+        for change in least_changes(columns, each.formula, dynamics.conditions, goes_on=interval.cut_off, quick=quick)
     ]
     if interval.cut_off and interval.broken is None:
         for each in _conditional(dynamics.terminations):
             assert each.condition is not None
-            changes += least_changes(columns, each.condition, dynamics.conditions, ends=True)
-    return tuple(change.text() for change in sorted(changes, key=lambda each: abs(each.amount)))
+            changes += least_changes(columns, each.condition, dynamics.conditions, ends=True, quick=quick)
+    return tuple(sorted(changes, key=lambda each: abs(each.amount)))
 
 
 def _intervals(
@@ -265,6 +277,38 @@ def _already_broken(scenario: Scenario, tracks: RecordingTracks, interval: Inter
             if not may_still_hold(requirement.formula, at_each):
                 return requirement.span
     return None
+
+
+def placed(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, IntervalVerdict]:
+    """The interval of a result: the scenario over its map, its recording, and where in it who plays whom.
+
+    Raises:
+        ValueError: The result is of a frame.
+        ScenarioError: The program is wrong.
+    """
+    if result.interval is None:
+        raise ValueError("the result is of a frame")
+    part, first, end = locate(query.dataset, result.recording)
+    label = next(query.dataset.labels_at(part, first, first + 1))
+    scenario = query.world(label.map).scenario
+    with TrackReader(query.dataset, part) as reader:
+        tracks = reader.read(first, end)
+    verdict = result.verdict
+    roles = verdict.partial if isinstance(verdict, NoMatch) else verdict.correspondence
+    indices = {owner.name: owner.index for owner in scenario.objects}
+    binding = tuple((indices[name], _key(tracks, track)) for name, track in roles.items())
+    start, last = tracks.frames.index(result.frame), tracks.frames.index(result.interval.last)
+    truth = int(TRUE if isinstance(verdict, Match) else FALSE if isinstance(verdict, NoMatch) else UNKNOWN)
+    if not isinstance(verdict, NoMatch):
+        return scenario, tracks, IntervalVerdict(start, last, truth, binding)
+    cause = verdict.cause
+    cut_off = cause.what == CUT_OFF
+    return scenario, tracks, IntervalVerdict(start, last, truth, binding, broken=cause.span, cut_off=cut_off)
+
+
+def _key(tracks: RecordingTracks, name: str) -> TrackKey:
+    """The track that a result names."""
+    return ("ego", "") if name == "ego" else tracks.key(name)
 
 
 def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[Band, ...]:

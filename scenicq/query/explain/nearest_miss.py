@@ -30,7 +30,17 @@ from scenicq.query.prefilter.executor import names, run_prefilter
 from scenicq.query.prefilter.plan import make_plan
 from scenicq.store.labels import Label
 
-__all__ = ["Closest", "closest", "nearest_misses", "separated", "show_tolerance", "widened"]
+__all__ = [
+    "FINEST_M",
+    "LADDER_M",
+    "Closest",
+    "closest",
+    "nearest_misses",
+    "separated",
+    "show_tolerance",
+    "widened",
+    "with_parts",
+]
 
 MOST_M = 100.0
 """Metres beyond which a tolerance is not widened."""
@@ -38,8 +48,9 @@ FINEST_M = 1e-3
 """Metres to which the least tolerance is found."""
 MOST_FRAMES = 5000
 """Frames that a ranking looks at."""
+LADDER_M = (0.01, 0.1, 1.0, 4.0, 16.0, MOST_M)
+"""Metres by which tolerances are widened on the way to the least."""
 
-_LADDER_M = (0.01, 0.1, 1.0, 4.0, 16.0, MOST_M)
 _TIMEOUT_S = 1.0
 _HEADING_PER_M = math.radians(20)
 _BATCH = 256
@@ -67,7 +78,7 @@ def widened(tolerance: Tolerance, widening_m: float) -> Tolerance:
     return tolerance.widened(widening_m, widening_m * _HEADING_PER_M)
 
 
-def _with_parts(tolerance: Tolerance, parts: Mapping[str, float]) -> Tolerance:
+def with_parts(tolerance: Tolerance, parts: Mapping[str, float]) -> Tolerance:
     """A tolerance of which some parts are widened, each by so many metres.
 
     Args:
@@ -128,7 +139,7 @@ def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest |
         return None
     # small tolerances are decided fastest
     low, best = 0.0, None
-    for size in _LADDER_M:
+    for size in LADDER_M:
         best = at(min(size, most_m))
         if best is not None or size >= most_m:
             break
@@ -160,19 +171,19 @@ def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
     compared = dict.fromkeys(each.property for each in constraints if isinstance(each, Comparison))
 
     def at(parts: Mapping[str, float]) -> Finding | None:
-        options = replace(base, tolerance=_with_parts(base.tolerance, parts))
+        options = replace(base, tolerance=with_parts(base.tolerance, parts))
         finding = matcher.relaxed(options).examine(label)
         return finding if isinstance(finding.verdict, Match) else None
 
     alone: list[tuple[float, Tolerance]] = []
     for part in compared:
         # widened alone, a part must be at least as wide as all together
-        sizes = [found.widening_m, *(size for size in _LADDER_M if size > found.widening_m)]
+        sizes = [found.widening_m, *(size for size in LADDER_M if size > found.widening_m)]
         reached = next((place for place, size in enumerate(sizes) if at({part: size})), None)
         if reached is not None:
             low = sizes[reached - 1] if reached else max(0.0, 0.98 * found.widening_m - FINEST_M)
             least = _least(partial(_enough, at, part, {}), low, sizes[reached])
-            alone.append((least, _with_parts(base.tolerance, {part: least})))
+            alone.append((least, with_parts(base.tolerance, {part: least})))
     if alone:
         alone.sort(key=lambda each: each[0])
         return replace(found, alone=tuple(tolerance for _, tolerance in alone))
@@ -187,7 +198,7 @@ def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
     finding = at(parts)
     if finding is None:
         return found
-    return replace(found, tolerance=_with_parts(base.tolerance, parts), finding=finding)
+    return replace(found, tolerance=with_parts(base.tolerance, parts), finding=finding)
 
 
 def _enough(
@@ -273,7 +284,7 @@ def nearest_misses(
     with LazySolver(query.options.solver) as solver:
         worlds = [(world, Matcher(world.scenario, query.options.match, solver)) for world in query.fitting()]
         nearer = 0.0
-        for widening_m in _LADDER_M:
+        for widening_m in LADDER_M:
             if len(ranking.heap) >= count and ranking.bound <= nearer:
                 break
             for map_number, (world, matcher) in enumerate(worlds):

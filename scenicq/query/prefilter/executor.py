@@ -362,21 +362,15 @@ def candidates(
         for label in _assembled(frames, objects, sensors):
             yield Candidate(label, None)
         return
-    if not plan.roles:
-        frames = _with_counts(frames, np.zeros(len(frames), np.int32))
-        objects = _rows(connection, f"SELECT {of_objects.replace('a.', 's.')} FROM {OBJECTS} s WHERE false")
-        for label in _assembled(frames, objects, sensors):
-            yield Candidate(label, {})
-        return
-    flags = "".join(f", r.r{place}" for place in range(len(plan.roles)))
-    objects = _rows(
-        connection,
-        f"SELECT {of_objects}, r.f{flags} FROM {OBJECTS} a JOIN roles r ON a.number = r.row "
-        f"WHERE r.f IN {left} ORDER BY a.number",
-    )
+    if plan.roles:
+        flags = "".join(f", r.r{place}" for place in range(len(plan.roles)))
+        who = f"{OBJECTS} a JOIN roles r ON a.number = r.row WHERE r.f IN {left}"
+    else:
+        flags, who = "", f"(SELECT *, number AS f FROM {OBJECTS} LIMIT 0) a JOIN (SELECT 0 AS f LIMIT 0) r USING (f)"
+    objects = _rows(connection, f"SELECT {of_objects}, r.f{flags} FROM {who} ORDER BY a.number")
     numbers, owners = frames["number"].to_numpy(), objects["f"].to_numpy()
     counts = np.searchsorted(owners, numbers, side="right") - np.searchsorted(owners, numbers)
-    frames = _with_counts(frames, counts.astype(np.int32))
+    frames = frames.set_column(frames.column_names.index("object_count"), "object_count", [counts.astype(np.int32)])
     ends = np.concatenate(([0], np.cumsum(counts)))
     may = [
         (index, *_numbered(np.array(objects[f"r{place}"].to_pylist(), dtype=bool), ends))
@@ -384,11 +378,6 @@ def candidates(
     ]
     for place, label in enumerate(_assembled(frames, objects, sensors)):
         yield Candidate(label, {index: tuple(mine[cuts[place] : cuts[place + 1]]) for index, mine, cuts in may})
-
-
-def _with_counts(frames: ArrowTable, counts: NDArray[np.int32]) -> ArrowTable:
-    """Frames of which fewer objects were read."""
-    return frames.set_column(frames.column_names.index("object_count"), "object_count", [counts])
 
 
 def _numbered(chosen: NDArray[np.bool_], ends: NDArray[np.int64]) -> tuple[list[int], list[int]]:

@@ -75,8 +75,7 @@ class Plan:
         steps: Conditions in the order in which they are blamed.
         stages: How they are decided.
         roles: The objects for which the table `roles` then has a column `r0`, `r1` ...: whether the object in row `row`
-            may play them. None if every object of a frame must be looked at; without any there is no table, and no
-            object need be looked at.
+            may play them; none where there is nobody but the ego. None if every object of a frame must be looked at.
         decision: SQL that makes the table `decided` of frames that surely match, of those that all stages have left;
             none where SQL decides nothing, or was not asked to.
     """

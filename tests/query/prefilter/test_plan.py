@@ -11,12 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from drawing import draw_scene
 from shapely.geometry import LineString
 
 from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
-from scenicq.forest.improvise import draw_scene
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
