@@ -52,6 +52,12 @@ def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str
     return element("div", found, class_="wide")
 
 
+def _way(number: float, positive: str, negative: str, unit: str = " m") -> str:
+    """A number without its sign, and in which direction it counts."""
+    shown = f"{abs(number):.1f}" if isinstance(number, float) else f"{abs(number)}"
+    return f"{shown}{unit} {negative if number < 0 else positive}"
+
+
 def _roles(shot: Shot) -> str:
     ego = next((role.member for role in shot.roles if shot.scenario and role.index == shot.scenario.ego), None)
     rows: list[tuple[str, ...]] = []
@@ -60,9 +66,10 @@ def _roles(shot: Shot) -> str:
         where: list[str] = []
         if ego is not None and member is not ego and ego.heading is not None:
             right, ahead = rotate(member.x - ego.x, member.y - ego.y, -ego.heading)
-            where = [f"{ahead:+z.1f} m ahead", f"{right:+z.1f} m right"]
+            where = [_way(ahead, "ahead", "behind"), _way(right, "to the right", "to the left")]
             if member.heading is not None:
-                where.append(f"{math.degrees(normalize(member.heading - ego.heading)):+z.0f}\N{DEGREE SIGN} turned")
+                turned = math.degrees(normalize(member.heading - ego.heading))
+                where.append(_way(round(turned), "turned left", "turned right", "\N{DEGREE SIGN}"))
         name = element("span", escape(role.name), class_=f"chip {role.colour}")
         played = element("span", escape(member.id), class_="id") + element(
             "div", escape(member.category), class_="time"
