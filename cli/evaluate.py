@@ -39,7 +39,8 @@ _EXTENSIONS = {".json": "json"}
 @click.command(
     cls=Manual,
     arguments={
-        "RESULTS...": "Files that `scenicq match -o` wrote, one a scenario: .jsonl, .csv or .parquet.",
+        "RESULTS...": "Files that `scenicq match -o` wrote, one a scenario: .jsonl, .csv or .parquet. All matches must "
+        "be there (no --limit, --sample): other frames count as those that do not match.",
         "DATASET": "The dataset that they are of.",
     },
     topics={

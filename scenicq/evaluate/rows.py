@@ -63,6 +63,7 @@ def _comparison(each: ObjectComparison) -> dict[str, Any]:
         "recordings": each.recordings,
         "effective_recordings": round(each.effective, 2),
         "alone": each.alone,
+        "uncounted": each.uncounted,
         "sentence": each.sentence,
     }
 

@@ -377,9 +377,9 @@ def _check(found: Predictions) -> None:
         if wrong.any():
             first = int(np.argmax(wrong))
             count = int(wrong.sum())
-            told = "a box has" if count == 1 else f"{count} boxes have"
+            told = "a box" if count == 1 else f"{count} boxes"
             where = f"{'in' if count == 1 else 'the first in'} frame {found.frames[found.frame[first]]}"
-            message = f"{found.name}: {told} a {name} that makes no sense, {where}: {values[first]:g}"
+            message = f"{found.name}: {told} whose `{name}` makes no sense, {where}: {values[first]:g}"
             raise DataError(Diagnostic("predictions-invalid", message))
     # equal boxes lie together when sorted by all that tells them apart
     order = np.lexsort((found.y, found.x, found.category, found.frame))

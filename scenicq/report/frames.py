@@ -52,12 +52,6 @@ def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str
     return element("div", found, class_="wide")
 
 
-def _way(number: float, positive: str, negative: str, unit: str = " m") -> str:
-    """A number without its sign, and in which direction it counts."""
-    shown = f"{abs(number):.1f}" if isinstance(number, float) else f"{abs(number)}"
-    return f"{shown}{unit} {negative if number < 0 else positive}"
-
-
 def _roles(shot: Shot) -> str:
     ego = next((role.member for role in shot.roles if shot.scenario and role.index == shot.scenario.ego), None)
     rows: list[tuple[str, ...]] = []
@@ -66,10 +60,13 @@ def _roles(shot: Shot) -> str:
         where: list[str] = []
         if ego is not None and member is not ego and ego.heading is not None:
             right, ahead = rotate(member.x - ego.x, member.y - ego.y, -ego.heading)
-            where = [_way(ahead, "ahead", "behind"), _way(right, "to the right", "to the left")]
+            where = [
+                f"{abs(ahead):.1f} m {'behind' if ahead < 0 else 'ahead'}",
+                f"{abs(right):.1f} m {'left' if right < 0 else 'right'}",
+            ]
             if member.heading is not None:
                 turned = math.degrees(normalize(member.heading - ego.heading))
-                where.append(_way(round(turned), "turned left", "turned right", "\N{DEGREE SIGN}"))
+                where.append(f"turned {abs(turned):.0f}\N{DEGREE SIGN} {'right' if turned < 0 else 'left'}")
         name = element("span", escape(role.name), class_=f"chip {role.colour}")
         played = element("span", escape(member.id), class_="id") + element(
             "div", escape(member.category), class_="time"

@@ -10,12 +10,12 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
+from drawing import draw_scene
 
 from scenicq.compiler.element_lookups import LOOKUPS, Lookups
 from scenicq.compiler.occupancy import Ranked
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
-from scenicq.forest.improvise import draw_scene
 from scenicq.forest.nodes import Constant, DirectionAt, PointIn
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder

@@ -309,6 +309,24 @@ def test_rules_of_the_benchmarks(street: Dataset, predictions: Predictions) -> N
     assert ARGOVERSE2.range_m == 150
 
 
+def test_objects_of_roles_that_do_not_count_are_told(
+    street: Dataset, results: list[Result], predictions: Predictions
+) -> None:
+    """A benchmark's range leaves out some of what plays a role, or all of it."""
+    whole = evaluate({"a": results}, street, predictions)
+    assert whole.scenarios[0].roles[0].uncounted == 0
+    assert "objects-uncounted" not in {each.code for each in whole.warnings}
+    for range_m in (12.0, 1.0):
+        near = replace(predictions, protocol=replace(predictions.protocol, range_m=range_m))
+        found = evaluate({"a": results}, street, near)
+        (role,) = found.scenarios[0].roles
+        assert role.uncounted > 0
+        assert role.uncounted + role.share.of == len(results)
+        told = next(each for each in found.warnings if each.code == "objects-uncounted").message
+        assert f"{role.uncounted} of {len(results)} objects of role parkedCar" in told
+    assert role.sentence == f"role parkedCar: none of {len(results)} objects counts"
+
+
 def test_simulated_runs(tmp_path: Path) -> None:
     file = tmp_path / "runs.csv"
     file.write_text("scenario,failed\na,1\na,0\na,true\nb,no\n")
@@ -317,7 +335,19 @@ def test_simulated_runs(tmp_path: Path) -> None:
     assert found["b"].rate == 0
     file.write_text("scenario,score\na,0.25\na,0.75\n")
     assert read_simulated(file)["a"].rate == pytest.approx(0.5)
-    for text in ("scenario,score\na,1.5\n", "scenario,failed\na,maybe\n", "scenario\na\n", "failed\n1\n"):
+    file.write_text("scenario,failed\n" + "a,1\na,0\n" * 60_000)
+    found = read_simulated(file)
+    assert (found["a"].of, found["a"].rate) == (120_000, 0.5)
+    assert found["a"].interval == pytest.approx((0.4972, 0.5028), abs=1e-4)
+    endless = f"scenario,failed\na,1\n{'a' * 200_000},1\n"
+    for text in (
+        endless,
+        "scenario,score\n,0.5\n",
+        "scenario,score\na,1.5\n",
+        "scenario,failed\na,maybe\n",
+        "scenario\na\n",
+        "failed\n1\n",
+    ):
         file.write_text(text)
         refused("file-invalid", lambda: read_simulated(file))
     refused("file-missing", lambda: read_simulated(tmp_path / "none.csv"))

@@ -105,7 +105,7 @@ def test_null_and_nan_are_no_numbers(tmp_path: Path) -> None:
             ("width", nuscenes(tmp_path / "c.json", {"frame 7": [detection(size=[value, 1, 1])]})),
         ):
             message = refused("predictions-invalid", path)
-            assert f"a {name} that makes no sense" in message
+            assert f"`{name}` makes no sense" in message
             assert "frame 7" in message
     message = refused("file-invalid", nuscenes(tmp_path / "d.json", {"frame 7": [detection(rotation=[None, 0, 0, 0])]}))
     assert "frame 7" in message
