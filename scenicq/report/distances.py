@@ -28,6 +28,9 @@ __all__ = ["Measured", "draw_distances", "measured_distances"]
 Measured = tuple[XY, XY]
 """Both ends of a distance, in metres."""
 
+_ASIDE = 130
+"""Centimetres from a line to its length: more than half the width of a car."""
+
 
 def measured_distances(scenario: Scenario, observed: Observation, bounds: Bounds) -> list[Measured]:
     """The distances that the author's requirements speak of, as far as both ends are known.
@@ -76,7 +79,7 @@ def _known(node: Node, observed: Observation) -> object:
 
 
 def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
-    """Lines between both ends, each with its length in the middle.
+    """Lines between both ends, each with its length beside its middle.
 
     Args:
         found: As `measured_distances` gives them.
@@ -90,15 +93,18 @@ def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
             continue  # the ends are one spot in the picture
         (left, top), (right, bottom) = plane.at(x0, y0), plane.at(x1, y1)
         parts.append(element("path", class_="distance", d=f"M{left} {top}L{right} {bottom}"))
+        # beside the line, where no box at one of its ends hides it
+        upright = abs(bottom - top) > abs(right - left)
+        aside, above = (_ASIDE, -round(size * 0.35)) if upright else (0, _ASIDE)
         parts.append(
             element(
                 "text",
                 f"{metres:.1f} m",
                 class_="metres",
-                x=(left + right) // 2,
-                y=(top + bottom) // 2 + round(size * 0.35),
+                x=(left + right) // 2 - aside,
+                y=(top + bottom) // 2 - above,
                 font_size=size,
-                text_anchor="middle",
+                text_anchor="end" if upright else "middle",
             )
         )
     return "".join(parts)

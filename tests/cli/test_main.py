@@ -91,6 +91,16 @@ def test_a_closed_pipe_is_silent(command, crossroads, scenarios, tmp_path):
     assert noise == b""
 
 
+@pytest.mark.parametrize(
+    "more", [["--limit", "1"], ["--report", "pages", "--near", "2", "-o", "found.jsonl"], ["--jobs", "2"]]
+)
+def test_no_library_complains_when_the_process_ends(command, crossroads, scenarios, tmp_path, more):
+    """What is kept until the end, such as a connection of DuckDB's, is told of on standard error as leaked."""
+    line = [command, "match", str(scenarios / "02_crossing_cars.scenic"), str(crossroads), *more]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
 @pytest.mark.parametrize("buffered", ["", "1"])
 @pytest.mark.parametrize("words", ["match SCENARIO DATASET", "info DATASET", "--version"])

@@ -250,6 +250,17 @@ def test_distances_of_requirements_are_drawn(crossroads, tmp_path):
     assert len(Drawn(text).with_class("distance")) == len(told) == 1 + (math.dist(*ways[1]) > 5)
 
 
+def test_no_box_hides_a_length(shoot):
+    """The ego is 5 m from the intersection: in the middle of that line stands its own dark box."""
+    shot, backdrop = shoot("03-busy-intersection/09", "02_crossing_cars.scenic")
+    drawn = Drawn(draw(shot, backdrop, half=50))
+    (length,), (line,) = drawn.with_class("metres"), drawn.with_class("distance")
+    (x0, y0), (x1, y1) = (map(int, pair.split()) for pair in line.get("d").removeprefix("M").split("L"))
+    assert abs(y1 - y0) > abs(x1 - x0)
+    assert length.get("text-anchor") == "end"
+    assert min(x0, x1) - int(length.get("x")) > 100  # centimetres; the ego is 2 m wide
+
+
 @pytest.mark.parametrize("half", [50, 100])
 def test_people_are_large_enough_to_be_seen(shoot, half):
     shot, backdrop = shoot("02-pedestrian-crosses/10")
