@@ -19,7 +19,7 @@ from scenicq.evaluate.detection import Missing
 from scenicq.evaluate.evaluation import Evaluation
 from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
-from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, tables
+from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview, tables
 from scenicq.report.write import check_target
 
 from .datasets import open_checked
@@ -39,7 +39,8 @@ _EXTENSIONS = {".json": "json"}
 @click.command(
     cls=Manual,
     arguments={
-        "RESULTS...": "Files that `scenicq match -o` wrote, one a scenario: .jsonl, .csv or .parquet.",
+        "RESULTS...": "Files that `scenicq match -o` wrote, one a scenario: .jsonl, .csv or .parquet. All matches must "
+        "be there (no --limit, --sample): other frames count as those that do not match.",
         "DATASET": "The dataset that they are of.",
     },
     topics={
@@ -144,6 +145,9 @@ def _write_parquet(found: Evaluation, sink: BinaryIO) -> None:
 
 def _text(found: Evaluation) -> str:
     lines: list[str] = []
+    if len(found.scenarios) > 1:
+        title, head, rows = overview(found)
+        lines += [title, *columns([head, *rows]), ""]
     for each in found.scenarios:
         lines.append(f"{each.name}: {each.matching:,} frames match, {each.other:,} do not")
         for title, head, rows in tables(each, found.distance_m):

@@ -75,6 +75,7 @@ CODES: dict[str, str] = {
     "predictions-unmatched": "predictions are of a frame that the dataset does not have",
     "predictions-frame": "predicted boxes do not lie in the frame of reference that their format has",
     "few-recordings": "too few recordings for a verdict",
+    "objects-uncounted": "the rules of a benchmark leave out objects that play roles",
     "heights-unknown": "distances are those in the plane: the dataset does not know all heights",
     "no-density": "a probability density does not exist, or could not be computed",
     "engine-failed": "what runs a query on other processes or machines is not there, or stopped",

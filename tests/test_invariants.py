@@ -13,11 +13,12 @@ LIBRARY = ROOT / "scenicq"
 FILES = sorted(LIBRARY.rglob("*.py"))
 README = (LIBRARY / "README.md").read_text()
 
-PASSES = ("forest/", "match/", "query/prefilter/")
+PASSES = ("forest/", "match/", "query/prefilter/", "temporal/")
 """Where expressions are gone through. Syntax and compiler recurse over the program's text, which the parser limits."""
 RECURSIVE = {
     "match/decide/cascade.py": "the discrete variables and truth values of a group, at most a stated number of them",
     "match/decide/decomposition.py": "each part has fewer constraints, or fewer distances of hidden points",
+    "match/search/choice_search.py": "choices met only in what another choice leads to, to a stated depth",
 }
 """Files with functions that call themselves, and what bounds the depth."""
 DATASETS = re.compile(r"nuscenes|argoverse|waymo|lyft|kitti|interaction dataset|boston", re.IGNORECASE)
@@ -48,7 +49,7 @@ def functions(scope: ast.AST, prefix: str = "", owner: str = "") -> Iterator[tup
 
 
 def calls(name: str, owner: str, function: ast.AST, known: set[str]) -> set[str]:
-    """Functions of the same file that a function calls by their plain name, or as methods of `self`."""
+    """Functions of the file that a function calls by their plain name, or as methods of `self` or of a new object."""
     found: set[str] = set()
     for node in ast.walk(function):
         match node:
@@ -57,6 +58,8 @@ def calls(name: str, owner: str, function: ast.AST, known: set[str]) -> set[str]
                 around = [name[:end] for end, sign in enumerate(name) if sign == "."]
                 scopes = [f"{each}." for each in (name, *reversed(around)) if each in known]
                 found.update(next(([f"{s}{called}"] for s in (*scopes, "") if f"{s}{called}" in known), []))
+            case ast.Call(func=ast.Attribute(value=ast.Call(func=ast.Name(id=made)), attr=called)):
+                found.add(f"{made}.{called}")
             case ast.Call(func=ast.Attribute(value=ast.Name(id="self" | "cls"), attr=called)):
                 found.add(f"{owner}{called}")
             case _:
@@ -94,8 +97,9 @@ def test_recursion_is_found(tmp_path):
         "def direct(x):\n    return direct(x)\n\n"
         "class Some:\n    def one(self):\n        return self.two()\n    def two(self):\n        return self.one()\n"
         "    def plain(self):\n        return plain(self)\n"
+        "class Made:\n    def run(self):\n        return begin()\n\ndef begin():\n    return Made().run()\n"
     )
-    assert recursive(file) == {"direct", "Some.one", "Some.two"}
+    assert recursive(file) == {"direct", "Some.one", "Some.two", "Made.run", "begin"}
 
 
 def test_the_library_never_prints_exits_or_reads_the_environment():
@@ -155,3 +159,62 @@ def test_every_path_that_the_map_names_exists():
     )
     assert inside
     assert [path for path in inside if not (LIBRARY / path).exists()] == []
+
+
+SECTIONS = dict(zip(*[iter(re.split(r"^## (.*)$", README, flags=re.MULTILINE)[1:])] * 2, strict=True))
+MOST_HOPS = 3
+QUESTIONS = {
+    "Where is position tolerance applied?", "What happens to a random lane?", "Why was this frame no match?",
+    "Where would a new distribution go?", "Where is a requirement turned into SQL?",
+    "What runs when nothing is hidden?",
+}  # fmt: skip
+
+
+def defined(file: Path) -> set[str]:
+    """Names of functions, classes, methods and values of a file."""
+    found: set[str] = set()
+    for node in ast.walk(tree(file)):
+        match node:
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                found.add(name)
+            case ast.Name(id=name, ctx=ast.Store()):
+                found.add(name)
+            case _:
+                pass
+    return found
+
+
+def rows(section: str) -> list[list[str]]:
+    """The rows of a section's table, without its head."""
+    lines = [line for line in SECTIONS[section].splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
+def test_each_question_of_a_stranger_is_answered_in_three_files_at_most():
+    asked: set[str] = set()
+    for question, path in rows("Where to look"):
+        asked.add(question)
+        hops = re.findall(r"`([\w/]+\.py)`(?: \(([^)]*)\))?", path)
+        assert 1 <= len(hops) <= MOST_HOPS, question
+        for file, told in hops:
+            assert (LIBRARY / file).exists(), file
+            assert set(re.findall(r"`(\w+)`", told)) <= defined(LIBRARY / file), (question, file)
+    assert asked >= QUESTIONS
+
+
+def test_every_step_of_matching_names_its_file():
+    assert [file for _, file, *_ in rows("Steps of matching") if not (LIBRARY / file.strip("`")).exists()] == []
+
+
+def test_every_name_in_the_map_is_one_of_the_code():
+    known: set[str] = set()
+    for file in (*FILES, *(ROOT / "cli").rglob("*.py")):
+        known |= {*file.relative_to(ROOT).parts, file.stem}
+        for node in ast.walk(tree(file)):
+            for field in ("name", "id", "attr", "arg"):
+                known.add(str(getattr(node, field, "")))
+    text = "".join(text for title, text in SECTIONS.items() if title != "Decisions")
+    named_ = {name for name in re.findall(r"`([^`]+)`", text) if re.fullmatch(r"[\w./]+", name)}
+    missing = {name for name in named_ if not known.issuperset(re.split(r"[./]", name.strip("/")))}
+    # files and commands that are no code of the library
+    assert {name for name in missing if not (ROOT / name).exists() and not re.search(r"\.py$", name)} == {"scenicq_cli"}

@@ -18,11 +18,11 @@ from itertools import dropwhile, takewhile
 from pathlib import Path
 
 import pytest
+from drawing import draw_scene
 
 from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import CODES, ScenarioError, Source
-from scenicq.forest.improvise import draw_scene
 from scenicq.forest.scenario import Scenario
 from scenicq.lint.program import lint
 from scenicq.match.options import MatchOptions

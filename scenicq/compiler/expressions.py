@@ -39,6 +39,7 @@ from scenicq.compiler.values import (
     lift,
 )
 from scenicq.errors import Span
+from scenicq.geometry.elements import NetworkElement
 from scenicq.syntax import ast
 
 __all__ = ["call", "evaluate"]
@@ -214,7 +215,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
                 raise fail("unsupported-construct", "a literal of this kind is not supported", span)
             return node.value if not isinstance(node.value, str) else checked_text(node.value, span)
         case ast.Attribute():
-            return lift(lambda value: _attribute(run, value, node), evaluate(run, node.value, scope))
+            return lift(lambda value: _attribute(run, value, node, scope), evaluate(run, node.value, scope))
         case ast.Call():
             return _call(run, node, scope)
         case ast.BinaryOp():
@@ -270,7 +271,13 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             return construct(run, node, scope, lambda part: evaluate(run, part, scope))
 
 
-def _attribute(run: Runner, value: ModelValue, node: ast.Attribute) -> ModelValue:
+def _attribute(run: Runner, value: ModelValue, node: ast.Attribute, scope: Environment) -> ModelValue:
+    if value is None and isinstance(node.value, ast.Attribute):
+        owner, lacked = evaluate(run, node.value.value, scope), node.value.name
+        if isinstance(owner, NetworkElement):
+            hints = (f"`{lacked}` is None there: leave such elements out with a condition",)
+            raise fail("map-lacks", f"the map says that {owner.name} has no `{lacked}`", node.value.name_span,
+                       "not in this map", hints)  # fmt: skip
     name = FIRST_NAMES.get(node.name, node.name) if run.version == 1 and isinstance(value, Instance) else node.name
     found = attribute(run, value, name, node.name_span)
     if isinstance(found, Function) and isinstance(value, Instance) and name not in value.properties:

@@ -25,13 +25,12 @@ from shapely import STRtree
 from scenicq.geometry import shapes
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
+from scenicq.geometry.network import TOLERANCE
 from scenicq.geometry.regions import SLACK
 from scenicq.geometry.shapes import Bounds, Shape
 
 __all__ = ["TOLERANCE", "Layer", "Occupancy", "OptionArea", "Ranked"]
 
-TOLERANCE = 0.05
-"""Metres beside an element that still count as in it where no element holds a point (Scenic's `tolerance`)."""
 _OVERLAP = 1e-6
 """Square metres that two elements may share without counting as overlapping."""
 _KEPT = 4096

@@ -72,6 +72,7 @@ class ObjectComparison:
         effective: Number of equally large recordings that would tell as much.
         alone: Share of the objects in question to which no other is alike.
         p_corrected: The same p-value, corrected for all tests of the evaluation.
+        uncounted: How many more objects would be in question, but for the rules of the benchmark.
     """
 
     about: str
@@ -84,6 +85,7 @@ class ObjectComparison:
     effective: float
     alone: float = 0.0
     p_corrected: float = math.nan
+    uncounted: int = 0
 
     @property
     def few(self) -> bool:
@@ -94,7 +96,8 @@ class ObjectComparison:
     def sentence(self) -> str:
         """All of it in one line."""
         if math.isnan(self.share.rate):
-            return f"{self.about}: no object to be found"
+            without = f"none of {self.uncounted} objects counts" if self.uncounted else "no object to be found"
+            return f"{self.about}: {without}"
         text = f"missed {percent(self.share)} of {self.about}"
         if not math.isnan(self.other.rate):
             text += f" against {percent(self.other)}"

@@ -171,7 +171,7 @@ def _places(dataset: Dataset, frames: Frames, predictions: Predictions, missing:
         raise DataError(
             Diagnostic(
                 "predictions-unmatched",
-                f"{name} has {len(unmatched)} frames that {dataset.name} does not have, the first {first}",
+                f"{name} has frames that {dataset.name} does not have: {len(unmatched)}, the first {first}",
                 hints=("`--missing skip` evaluates the frames that both have",),
             )
         )
@@ -235,7 +235,7 @@ def _classes(objects: Annotations, predictions: Predictions) -> tuple[list[str],
         if evaluated not in numbers:
             if protocol.classes is not None or (protocol.tree and not is_class(evaluated)):
                 message = f"{predictions.name}: `{name}` is no class of {protocol.name} predictions"
-                hint = f"known are {', '.join(known)}"
+                hint = f"known are {', '.join(known)}" + (", and the others of the class tree" if protocol.tree else "")
                 raise DataError(Diagnostic("unknown-class", message, hints=(hint,)))
             # a class without any label object
             numbers[evaluated] = len(known)

@@ -237,6 +237,14 @@ def _warnings(found: Iterable[ScenarioEvaluation], detection: Detection) -> Iter
         yield Diagnostic("heights-unknown", message, severity="warning", hints=(hint,))
     for one in found:
         for each in one.headline:
+            if each.uncounted:
+                whole = each.uncounted + int(each.share.of)
+                message = (
+                    f"{one.name}: {each.uncounted} of {whole} objects of {each.about} do not count by the rules of "
+                    f"{detection.predictions.protocol.name} predictions: too far away, without points in the box, of "
+                    "another class, or not where the benchmark looks"
+                )
+                yield Diagnostic("objects-uncounted", message, severity="warning")
             if each.share.of and each.few:
                 message = (
                     f"{one.name}: {each.about} tells as much as {each.effective:.1f} equally large recordings would: "
@@ -277,11 +285,13 @@ class _Judge:
         for role in matched.roles:
             mine = np.zeros(len(frame), dtype=np.bool_)
             mine[role.objects] = True
+            uncounted = int((mine & matching[frame] & ~self._counted).sum())
             mine &= here
             in_roles |= mine
             asked.append((f"role {role.name}", mine))
             others = (here | there) & ~mine & self._of_classes(mine)
-            roles.append(self._compare(f"role {role.name}", mine, others, self._alike))
+            found = self._compare(f"role {role.name}", mine, others, self._alike)
+            roles.append(replace(found, uncounted=uncounted))
         of_all = self._compare("all objects", here, there, self._class)
         mine = in_roles if matched.roles else here
         others = (here | there) & ~mine & self._of_classes(mine)

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from scenicq.evaluate.comparison import Share
 from scenicq.evaluate.detection import Detection
 from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation, WorstFrame
-from scenicq.evaluate.rows import tables
+from scenicq.evaluate.rows import Table, overview, tables
 from scenicq.geometry.boxes import corners
-from scenicq.geometry.camera import box_corners
+from scenicq.geometry.camera import box_corners, box_edges
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
 from scenicq.report.frames import table, when
 from scenicq.report.page import page
 from scenicq.report.picture import View, ground, plane_of
 from scenicq.report.scene import draw_object
-from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
+from scenicq.report.sensors import Sensor, SensorFiles, can_make_thumbnails, roots_of
 from scenicq.report.svg import Plane, element, escape, points_path
 from scenicq.report.write import new_report
 from scenicq.store.dataset import Dataset
@@ -35,10 +36,13 @@ _IMAGE = (720, 450)
 """Pixels of a camera's image at most: enough to see boxes on it."""
 _FAR_M = 100.0
 """Boxes farther away than this are not drawn over the image of a camera."""
+_ASKED = "asked"
+"""The class of what is in question, for the style."""
 _SIGNS = (
     "Pictures: label objects are green where they were found, red where they were missed, dotted where they do not "
-    "count; those in question have thick lines; predictions are dashed. Over images of cameras the same "
-    "boxes are drawn where the dataset knows the calibration and the heights of the boxes."
+    "count; those in question have thick lines; predictions are dashed. Over images of cameras the same boxes are "
+    "drawn where the dataset knows the calibration and the heights of the boxes; cameras that show what is in question "
+    "come first."
 )
 
 
@@ -70,6 +74,36 @@ def _cell(text: str) -> str:
     return escape(text).replace(" %", "\u00a0%").replace(", ", ",\u00a0")
 
 
+def _table(shown: Table, graphs: Sequence[str] = ()) -> str:
+    """A table of texts.
+
+    Args:
+        shown: The table.
+        graphs: A last cell of each row; none of them where there are none.
+    """
+    title, head, rows = shown
+    cells = [[*map(_cell, row), *graphs[number : number + 1]] for number, row in enumerate(rows)]
+    names = [name.lower() for name in head] + ["0 to 100 %"] * bool(graphs)
+    return table(title[:1].upper() + title[1:], names, cells)
+
+
+def _whiskers(share: Share, other: Share | None) -> str:
+    """Two shares with their intervals, one over the other: the objects in question, then the others."""
+    drawn: list[str] = [element("path", d="M0 12H100", class_="track")]
+    for each, kind, height in ((share, "own", 7), (other, "other", 17)):
+        if each is not None and not math.isnan(each.rate):
+            low, high = (100 * each.rate if math.isnan(end) else 100 * end for end in each.interval)
+            path = f"M{low:.1f} {height}H{high:.1f}"
+            drawn.append(element("path", d=path, class_=kind))
+            drawn.append(element("path", d=f"M{100 * each.rate:.1f} {height}h0", class_=f"{kind} rate"))
+    return element("svg", *drawn, viewBox="-3 0 106 24", preserveAspectRatio="none", class_="whiskers",
+                   aria_hidden="true")  # fmt: skip
+
+
+def _counted(count: int, what: str, several: str) -> str:
+    return f"{count} {what if count == 1 else several}"
+
+
 class _Pages:
     """A page in the making."""
 
@@ -92,7 +126,17 @@ class _Pages:
             element("ul", *warnings, class_="cause") if warnings else "",
         )
         sections = [part for each in found.scenarios for part in self._scenario(each)]
-        return page("Detections on the frames that match", [head, element("main", *sections)], script=False)
+        summary = self._overview() if len(found.scenarios) > 1 else ""
+        return page("Detections on the frames that match", [head, element("main", summary, *sections)], script=False)
+
+    def _overview(self) -> str:
+        """All scenarios in one table, with links to each."""
+        title, head, rows = overview(self._evaluation)
+        place = {each.name: number for number, each in enumerate(self._evaluation.scenarios)}
+        cells = [
+            [element("a", escape(row[0]), href=f"#scenario-{place[row[0]]}"), *map(_cell, row[1:])] for row in rows
+        ]
+        return table(title.capitalize(), [name.lower() for name in head], cells)
 
     def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
         counts = f"{each.matching:,} frames match, {each.other:,} do not"
@@ -101,8 +145,11 @@ class _Pages:
         if each.simulated is not None:
             sentences.append(element("p", escape(each.simulated.sentence)))
         parts = [element("h2", escape(each.name)), element("p", escape(counts)), *sentences]
-        for title, head, rows in tables(each, self._evaluation.distance_m):
-            parts.append(table(title, [name.lower() for name in head], [[*map(_cell, row)] for row in rows]))
+        graphs = {
+            "missed": [_whiskers(one.share, one.other) for one in (*each.roles, each.all_objects)],
+            "slices": [_whiskers(one.share, one.other) for one in each.slices],
+        }
+        parts += [_table(shown, graphs.get(shown[0], ())) for shown in tables(each, self._evaluation.distance_m)]
         worst = each.worst[:SHOWN]
         links = [
             (
@@ -115,7 +162,7 @@ class _Pages:
         ]
         parts.append(element("p", escape(_SIGNS), class_="hint"))
         parts.append(table("Worst frames", ("frame", "recording", "missed", "false boxes"), links))
-        yield element("section", *parts)
+        yield element("section", *parts, id=f"scenario-{self._evaluation.scenarios.index(each)}")
         for one in worst:
             yield self._frame(each, one)
 
@@ -125,28 +172,40 @@ class _Pages:
 
     def _frame(self, each: ScenarioEvaluation, one: WorstFrame) -> str:
         label = self._labels[one.frame]
-        told = f"{one.recording}, {when(label.timestamp_us)}: {one.missed} of {one.of} missed, {one.false} false boxes"
-        boxes = list(self._boxes(each, label)) if label.cameras else []
-        images = [
-            element("li", element("a", camera_image(sensor, label.cameras.get(sensor.channel), boxes),
-                                  element("span", escape(sensor.channel)), href=sensor.link))
-            for sensor in self._files.find(label.sensors)
-            if sensor.thumbnail
-        ]  # fmt: skip
+        told = f"{one.recording}, {when(label.timestamp_us)}: {one.missed} of {one.of} missed, "
+        told += _counted(one.false, "false box", "false boxes")
+        images = self._images(each, label)
+        cameras = element("ul", *images, class_="cameras wide", aria_label="Cameras") if images else ""
         return element(
             "section",
             element("h3", escape(one.frame)),
             element("p", escape(told), class_="hint"),
-            self._picture(each, label),
-            element("ul", *images, class_="cameras wide", aria_label="Cameras") if images else "",
+            element("div", element("div", self._picture(each, label)), cameras, class_="run-body"),
             id=self._anchor(each, one),
+            class_="run",
         )
+
+    def _images(self, each: ScenarioEvaluation, label: Label) -> list[str]:
+        """The images of a frame's cameras, those first that show the most objects in question."""
+        boxes = list(self._boxes(each, label)) if label.cameras else []
+        asked = [box for box in boxes if box.kind.endswith(_ASKED)]
+
+        def shown(sensor: Sensor) -> int:
+            camera = label.cameras.get(sensor.channel)
+            return 0 if camera is None else sum(len(box_edges(camera, box.corners)) > 0 for box in asked)
+
+        found = [sensor for sensor in self._files.find(label.sensors) if sensor.thumbnail]
+        return [
+            element("li", element("a", camera_image(sensor, label.cameras.get(sensor.channel), boxes),
+                                  element("span", escape(sensor.channel)), href=sensor.link))
+            for sensor in sorted(found, key=shown, reverse=True)
+        ]  # fmt: skip
 
     def _kind(self, each: ScenarioEvaluation, number: int) -> str:
         """Of a label object, for the style."""
         counts = self._evaluation.detection.object_class[number] >= 0
         kind = "missed" if each.missed[number] else "found" if counts else "uncounted"
-        return f"{kind} asked" if each.mine[number] else kind
+        return f"{kind} {_ASKED}" if each.mine[number] else kind
 
     def _boxes(self, each: ScenarioEvaluation, label: Label) -> Iterator[SpaceBox]:
         """Label objects and predictions in space, those in question last."""

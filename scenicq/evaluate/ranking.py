@@ -163,7 +163,8 @@ def rank_results(query: Query, results: Iterable[Result]) -> list[Result]:
 
     def order(number: int) -> tuple[float, int]:
         density = known[number].density
-        return (math.inf if density is None or density.log is None else -density.log, number)
+        # equal densities differ by how they were rounded
+        return (math.inf if density is None or density.log is None else -round(density.log, 9), number)
 
     return [known[number] for number in sorted(range(len(known)), key=order)]
 

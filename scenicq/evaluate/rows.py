@@ -13,7 +13,7 @@ from scenicq.evaluate.precision import ERRORS
 from scenicq.evaluate.slices import Slice
 from scenicq.evaluate.weighting import Weighted
 
-__all__ = ["COLUMNS", "Table", "evaluation_record", "flat_rows", "tables"]
+__all__ = ["COLUMNS", "Table", "evaluation_record", "flat_rows", "overview", "tables"]
 
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, names of the columns, and rows of texts."""
@@ -63,6 +63,7 @@ def _comparison(each: ObjectComparison) -> dict[str, Any]:
         "recordings": each.recordings,
         "effective_recordings": round(each.effective, 2),
         "alone": each.alone,
+        "uncounted": each.uncounted,
         "sentence": each.sentence,
     }
 
@@ -193,12 +194,28 @@ def _percent(value: float, interval: tuple[float, float] | None = None) -> str:
     return text
 
 
+def overview(evaluation: Evaluation) -> Table:
+    """What answers the question, of all scenarios in one table."""
+    simulated = any(each.simulated is not None for each in evaluation.scenarios)
+    rows: list[tuple[str, ...]] = []
+    for one in evaluation.scenarios:
+        for each in one.headline:
+            row = (one.name, *_compared(each))
+            if simulated:
+                told = one.simulated if one.simulated is not None and one.simulated.about == each.about else None
+                share = ("", "") if told is None else (_percent(told.share.rate, told.share.interval), told.says)
+                row = (*row, *share)
+            rows.append(row)
+    more = ("SIMULATED", "RECORDINGS SAY") if simulated else ()
+    return "scenarios", ("SCENARIO", *_COMPARED, *more), rows
+
+
 def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
     """What people look at: roles, classes at one centre distance, slices."""
     found: list[Table] = [
         (
             "missed",
-            ("WHAT", "OBJECTS", "MISSED", "OTHERS ALIKE", "P", "CORRECTED", "RECORDINGS"),
+            _COMPARED,
             [_compared(each) for each in (*scenario.roles, scenario.all_objects)],
         )
     ]
@@ -231,6 +248,9 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
     ]
     found.append(("slices", ("BY", "PART", "OBJECTS", "MISSED", "OTHERS"), cut))
     return [table for table in found if table[2]]
+
+
+_COMPARED = ("WHAT", "OBJECTS", "MISSED", "OTHERS ALIKE", "P", "CORRECTED", "RECORDINGS")
 
 
 def _compared(each: ObjectComparison) -> tuple[str, ...]:

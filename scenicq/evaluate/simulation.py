@@ -8,8 +8,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.comparison import ObjectComparison, Share
@@ -19,6 +21,7 @@ __all__ = ["Simulated", "read_simulated", "verdict"]
 
 _WORDS = {"1": 1.0, "0": 0.0, "true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0}
 _RUNS = 100_000
+"""Runs of a scenario that are resampled, at most; the mean of more is as good as normally distributed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +30,13 @@ class Simulated:
 
     Attributes:
         share: Of the simulated runs that failed.
+        about: What it was compared with on recordings, such as "role parkedCar".
         says: "for" the failure in reality, "against" it, or "too little".
         sentence: The same in words.
     """
 
     share: Share
+    about: str
     says: str
     sentence: str
 
@@ -57,11 +62,15 @@ def read_simulated(path: Path, seed: int = 0) -> Mapping[str, Share]:
     if column is None or "scenario" not in names:
         raise _invalid(path, "it lacks the columns `scenario` and `failed` or `score`")
     runs: dict[str, list[float]] = {}
-    for number, row in enumerate(rows, 2):
-        value = _value((row[column] or "").strip().lower(), column)
-        if value is None or not row["scenario"]:
-            raise _invalid(path, f"line {number}: `{column}` is `{row[column]}`")
-        runs.setdefault(row["scenario"], []).append(value)
+    try:
+        for row in rows:
+            value = _value((row[column] or "").strip().lower(), column)
+            if value is None or not row["scenario"]:
+                wrong = "scenario" if value is not None else column
+                raise _invalid(path, f"line {rows.line_num}: `{wrong}` is `{row[wrong]}`")
+            runs.setdefault(row["scenario"], []).append(value)
+    except csv.Error as error:
+        raise _invalid(path, f"line {rows.line_num}: {error}") from None
     return {name: _share(np.array(values), seed) for name, values in runs.items()}
 
 
@@ -79,13 +88,14 @@ def _value(text: str, column: str) -> float | None:
     return value if 0 <= value <= 1 else None
 
 
-def _share(values: np.ndarray[tuple[int], np.dtype[np.float64]], seed: int) -> Share:
-    if len(values) > _RUNS:
-        values = values[:_RUNS]
-    rate = float(values.mean())
+def _share(values: NDArray[np.float64], seed: int) -> Share:
+    number, rate = float(len(values)), float(values.mean())
+    if number > _RUNS:
+        reach = NormalDist().inv_cdf(0.975) * float(values.std()) / math.sqrt(number)
+        return Share(float(values.sum()), number, rate, (max(0.0, rate - reach), min(1.0, rate + reach)))
     count = max(1, min(2000, 20_000_000 // len(values)))
-    drawn = resamples(len(values), np.random.default_rng(seed), count) @ values / len(values)
-    return Share(float(values.sum()), float(len(values)), rate, rate_interval(drawn, rate, float(len(values))))
+    drawn = resamples(len(values), np.random.default_rng(seed), count) @ values / number
+    return Share(float(values.sum()), number, rate, rate_interval(drawn, rate, number))
 
 
 def verdict(share: Share, real: ObjectComparison) -> Simulated:
@@ -112,4 +122,4 @@ def verdict(share: Share, real: ObjectComparison) -> Simulated:
     }[says]
     low, high = share.interval
     text = f"failed in {100 * share.rate:.0f} % [{100 * low:.0f}, {100 * high:.0f}] of {share.of:g} simulated runs; "
-    return Simulated(share, says, text + f"{real.sentence}: {words}")
+    return Simulated(share, real.about, says, text + f"{real.sentence}: {words}")

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from scenicq.errors import Span
+from scenicq.forest.components import connected_components
 from scenicq.forest.nodes import Leaf, Node
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import features, leaves
@@ -71,23 +72,8 @@ class Group:
 def group_constraints(constraints: Iterable[Constraint]) -> tuple[Group, ...]:
     """Partition constraints into groups, in dependency order: a group comes once its last object is there."""
     items = tuple(constraints)
-    parent = list(range(len(items)))
-
-    def find(i: int) -> int:
-        while parent[i] != i:
-            parent[i] = parent[parent[i]]
-            i = parent[i]
-        return i
-
-    owner: dict[object, int] = {}
-    for number, item in enumerate(items):
-        for leaf in leaves(item.expression):
-            first = owner.setdefault(leaf.identity, number)
-            parent[find(number)] = find(first)
-    members: dict[int, list[Constraint]] = {}
-    for number, item in enumerate(items):
-        members.setdefault(find(number), []).append(item)
-    groups = [_group(tuple(chosen)) for chosen in members.values()]
+    parts = connected_components([[leaf.identity for leaf in leaves(item.expression)] for item in items])
+    groups = [_group(tuple([items[number] for number in part])) for part in parts]
     return tuple(sorted(groups, key=lambda group: group.objects[-1] if group.objects else -1))
 
 

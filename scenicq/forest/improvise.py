@@ -22,7 +22,7 @@ from scenicq.forest.nodes import Constant, Encloses, Identity, Undefined, Value
 from scenicq.forest.proximity_pruning import Window, close_points
 from scenicq.forest.scenario import BuiltIn, Scenario
 
-__all__ = ["Improviser", "Scene", "draw_scene"]
+__all__ = ["Improviser", "Scene"]
 
 _ALL = frozenset(BuiltIn)
 _PATIENCE = 30
@@ -170,20 +170,3 @@ def _never(check: Check) -> bool:
         return False
     value = check.condition.value
     return isinstance(value, Undefined) or not (check.defined or bool(value))
-
-
-def draw_scene(
-    scenario: Scenario,
-    rng: random.Random,
-    attempts: int = 1000,
-    enforce: Set[BuiltIn] = frozenset({BuiltIn.VISIBILITY}),
-) -> Scene | None:
-    """A scene that satisfies every hard requirement, or None if none came up; see `Improviser` for many scenes.
-
-    Args:
-        scenario: The scenario.
-        rng: Source of randomness.
-        attempts: Failures to endure.
-        enforce: The built-in requirements in force; by default those that matching enforces.
-    """
-    return Improviser(scenario, enforce).draw(rng, attempts)

@@ -27,8 +27,6 @@ from scenicq.forest.nodes import (
     DiscAt,
     Identity,
     Intersects,
-    Logic,
-    LogicOp,
     Node,
     Norm,
     PointIn,
@@ -38,7 +36,7 @@ from scenicq.forest.nodes import (
     SectorAt,
     VectorSum,
 )
-from scenicq.forest.walk import leaves, transform
+from scenicq.forest.walk import conjuncts, leaves, transform
 from scenicq.geometry import shapes
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.geometry.sampling import sampler
@@ -208,7 +206,7 @@ def _all_close(conditions: Iterable[Node], order: Mapping[Identity, int]) -> Ite
 
 def close_boxes(condition: Node) -> Iterator[tuple[Node, Box]]:
     """Points that a condition holds close to a known place, each with a box around that place."""
-    for part in condition.args if isinstance(condition, Logic) and condition.op is LogicOp.AND else (condition,):
+    for part in conjuncts(condition):
         for one, other, away in _distances(part):
             for point, center in ((one, other), (other, one)):
                 if isinstance(center, Constant) and not isinstance(point, Constant) and math.isfinite(away):

@@ -13,7 +13,6 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TypeVar, cast
 
-import numpy as np
 from shapely import STRtree
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
@@ -40,9 +39,12 @@ from scenicq.geometry.regions import SLACK, DeferredPolylines, PolygonSet, Polyl
 from scenicq.geometry.road_direction import along_lines
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["MapFeature", "Network", "read_geojson"]
+__all__ = ["TOLERANCE", "MapFeature", "Network", "read_geojson"]
 
 _Element = TypeVar("_Element", bound=NetworkElement)
+
+TOLERANCE = 0.05
+"""Metres beside an element that still count as in it where no element holds a point (Scenic's `tolerance`)."""
 
 
 class Network:
@@ -207,38 +209,44 @@ class Network:
 
     # --- what lies at a point
 
+    # The first that holds the point, in the map's order; else the first within the tolerance. So does Scenic.
+
     def laneAt(self, x: float, y: float) -> Lane | None:
-        """The lane at a point: of several the one whose centreline is nearest."""
-        return _nearest(self._at(self.lanes, "lane", x, y), x, y)
+        """The lane at a point."""
+        return self._first(((self.lanes, "lane"),), x, y)
 
     def laneSectionAt(self, x: float, y: float) -> LaneSection | None:
-        """The lane section at a point."""
+        """The lane section at a point, one of the lane there."""
         lane = self.laneAt(x, y)
-        here = shapes.point(x, y)
-        inside = [s for s in lane.sections if shapes.distance(s.polygon, here) <= SLACK] if lane else []
-        return inside[0] if inside else None
+        return _first_within(lane.sections, x, y) if lane else None
 
     def laneGroupAt(self, x: float, y: float) -> LaneGroup | None:
-        """The lane group at a point, that of the lane there if there is one."""
-        lane = self.laneAt(x, y)
-        return lane.group if lane and lane.group else next(iter(self._at(self.laneGroups, "lane_group", x, y)), None)
+        """The lane group at a point: one of the road there, else that of the lane there, else any."""
+        road, lane = self.roadAt(x, y), self.laneAt(x, y)
+        here = self._all(((self.laneGroups, "lane_group"),), x, y)
+        own = (group for group in here if road is not None and group.road is road)
+        return next(own, None) or (lane.group if lane else None) or next(iter(here), None)
 
     def roadAt(self, x: float, y: float) -> Road | None:
-        """The road at a point, that of the lane there if there is one."""
-        lane = self.laneAt(x, y)
-        return lane.road if lane and lane.road else next(iter(self._at(self.allRoads, "road", x, y)), None)
+        """The road at a point, else that of the lane there."""
+        road, lane = self._first(((self.allRoads, "road"),), x, y), self.laneAt(x, y)
+        return road or (lane.road if lane else None)
 
     def intersectionAt(self, x: float, y: float) -> Intersection | None:
         """The intersection at a point."""
-        return next(iter(self._at(self.intersections, "intersection", x, y)), None)
+        return self._first(((self.intersections, "intersection"),), x, y)
 
     def crossingAt(self, x: float, y: float) -> PedestrianCrossing | None:
         """The pedestrian crossing at a point."""
-        return next(iter(self._at(self.crossings, "crossing", x, y)), None)
+        return self._first(((self.crossings, "crossing"),), x, y)
 
     def sidewalkAt(self, x: float, y: float) -> Sidewalk | None:
         """The sidewalk at a point."""
-        return next(iter(self._at(self.sidewalks, "sidewalk", x, y)), None)
+        return self._first(((self.sidewalks, "sidewalk"),), x, y)
+
+    def shoulderAt(self, x: float, y: float) -> Shoulder | None:
+        """The shoulder at a point."""
+        return self._first(((self.shoulders, "shoulder"),), x, y)
 
     def elementAt(self, x: float, y: float) -> NetworkElement | None:
         """The element at a point, in Scenic's order: intersection, road, then the others."""
@@ -250,7 +258,7 @@ class Network:
             (self.sidewalks, "sidewalk"),
             (self.crossings, "crossing"),
         )
-        return next((found[0] for elements, kind in kinds if (found := self._at(elements, kind, x, y))), None)
+        return self._first(kinds, x, y)
 
     def nominalDirectionsAt(self, x: float, y: float) -> tuple[float, ...]:
         """The directions of traffic at a point."""
@@ -262,14 +270,26 @@ class Network:
     def _indices(self) -> dict[str, tuple[PolygonSet, list[int]]]:
         return {}
 
-    def _at(self, elements: Sequence[_Element], kind: str, x: float, y: float) -> list[_Element]:
-        """The elements of a kind whose area holds a point, in the map's order."""
+    def _first(self, kinds: Sequence[tuple[Sequence[_Element], str]], x: float, y: float) -> _Element | None:
+        return next(iter(self._all(kinds, x, y)), None)
+
+    def _all(self, kinds: Sequence[tuple[Sequence[_Element], str]], x: float, y: float) -> list[_Element]:
+        """The elements that hold a point, of the first kind of which any does; else those within the tolerance."""
+        here = shapes.point(x, y)
+        for distance in (SLACK, TOLERANCE):
+            for elements, kind in kinds:
+                region, owners = self._index(elements, kind)
+                hits: list[int] = shapes.tree_within(region.tree, here, distance).tolist()
+                if hits:
+                    return [elements[i] for i in sorted({owners[hit] for hit in hits})]
+        return []
+
+    def _index(self, elements: Sequence[NetworkElement], kind: str) -> tuple[PolygonSet, list[int]]:
+        """The areas of the elements of a kind, and whose each is."""
         if kind not in self._indices:
             parts = [(piece, i) for i, e in enumerate(elements) for piece in shapes.simple_parts([e.polygon])]
             self._indices[kind] = PolygonSet(tuple(cast(Polygon, p) for p, _ in parts), kind), [i for _, i in parts]
-        region, owners = self._indices[kind]
-        found: list[int] = shapes.tree_within(region.tree, shapes.point(x, y), SLACK).tolist()
-        return [elements[i] for i in sorted({owners[i] for i in found})]
+        return self._indices[kind]
 
     def _region(self, name: str, kinds: tuple[str, ...], orientation: VectorField | None) -> PolygonSet:
         found = [feature for feature in self.features if feature.kind in kinds]
@@ -277,13 +297,9 @@ class Network:
         return PolygonSet(polygons, name, orientation, tuple(feature.id for feature in found))
 
 
-def _nearest(lanes: list[Lane], x: float, y: float) -> Lane | None:
-    if len(lanes) <= 1:
-        return lanes[0] if lanes else None
+def _first_within(elements: Sequence[_Element], x: float, y: float) -> _Element | None:
     here = shapes.point(x, y)
-
-    def away(lane: Lane) -> float:
-        lines = lane.centerline.lines if lane.centerline else ()
-        return min((shapes.distance(line, here) for line in lines), default=np.inf)
-
-    return min(lanes, key=away)
+    away = [shapes.distance(element.polygon, here) for element in elements]
+    return next(
+        (e for limit in (SLACK, TOLERANCE) for e, far in zip(elements, away, strict=True) if far <= limit), None
+    )

@@ -7,10 +7,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -25,6 +26,9 @@ from scenicq.store.schema import ArrowTable
 __all__ = ["read_predictions"]
 
 Reals = NDArray[np.float64]
+T = TypeVar("T")
+_Number = float | None
+"""Null, or NaN as some programs write it, is checked with the other numbers, and told with the frame."""
 
 _compute: Any = import_module("pyarrow.compute")
 """Of which no stubs know the functions."""
@@ -36,17 +40,18 @@ _HINT = (
 _NUMBERS = ("x", "y", "heading", "width", "length", "height", "vx", "vy", "score", "z")
 _MOST_ATTRIBUTES = 100
 _NEEDED = ("x", "y", "heading", "width", "length", "score")
+_TEXT_OR_NO_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|NaN|-?Infinity')
 
 
 class _Detection(msgspec.Struct):
     """A box of nuScenes detection results."""
 
-    translation: tuple[float, float, float]
-    size: tuple[float, float, float]
+    translation: tuple[_Number, _Number, _Number]
+    size: tuple[_Number, _Number, _Number]
     rotation: tuple[float, float, float, float]
     detection_name: str
-    detection_score: float
-    velocity: tuple[float | None, float | None] = (None, None)
+    detection_score: _Number
+    velocity: tuple[_Number, _Number] = (None, None)
     attribute_name: str = ""
 
 
@@ -60,15 +65,15 @@ class _Object(msgspec.Struct, rename={"category": "class"}):
     """An object of the interchange format."""
 
     category: str
-    position: tuple[float, float]
-    width: float
-    length: float
-    score: float
-    heading: float | None = None
-    yaw: float | None = None
-    height: float | None = None
-    velocity: tuple[float, float] | None = None
-    z: float | None = None
+    position: tuple[_Number, _Number]
+    width: _Number
+    length: _Number
+    score: _Number
+    heading: _Number = None
+    yaw: _Number = None
+    height: _Number = None
+    velocity: tuple[_Number, _Number] | None = None
+    z: _Number = None
 
 
 class _Line(msgspec.Struct):
@@ -115,6 +120,19 @@ def _invalid(path: Path, why: object) -> DataError:
     return DataError(Diagnostic("file-invalid", f"{path} holds no predictions: {text}", hints=(_HINT,)))
 
 
+def _decoded(decoder: msgspec.json.Decoder[T], text: bytes) -> T:
+    """What a JSON text says; NaN and infinities, which are no JSON but often written, are null."""
+    try:
+        return decoder.decode(text)
+    except msgspec.ValidationError:
+        raise
+    except msgspec.DecodeError:
+        plain = _TEXT_OR_NO_NUMBER.sub(lambda found: found[1] or b"null", text)
+        if plain == text:
+            raise
+        return decoder.decode(plain)
+
+
 class _Gathered:
     """Boxes one after the other."""
 
@@ -131,10 +149,10 @@ class _Gathered:
         self,
         frame: str,
         classes: Iterable[str],
-        rows: Sequence[Sequence[float]],
+        rows: Sequence[Sequence[_Number]],
         attributes: Sequence[str] | None = None,
     ) -> None:
-        """A frame with its boxes: columns as in `_NUMBERS`; an empty attribute is none.
+        """A frame with its boxes: columns as in `_NUMBERS`, None for nan; an empty attribute is none.
 
         Raises:
             ValueError: There are more attributes than anybody names.
@@ -172,10 +190,13 @@ class _Gathered:
 
 def _nuscenes(path: Path) -> Predictions:
     try:
-        whole = msgspec.json.decode(_bytes(path), type=_Results)
-        decoder = msgspec.json.Decoder(list[_Detection])
-        gathered = _Gathered()
-        for sample, text in whole.results.items():
+        whole = _decoded(msgspec.json.Decoder(_Results), _bytes(path))
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        raise _invalid(path, error) from None
+    decoder = msgspec.json.Decoder(list[_Detection])
+    gathered = _Gathered()
+    for sample, text in whole.results.items():
+        try:
             boxes = decoder.decode(text)
             gathered.add(
                 sample,
@@ -183,18 +204,17 @@ def _nuscenes(path: Path) -> Predictions:
                 [_nuscenes_row(box) for box in boxes],
                 [box.attribute_name for box in boxes],
             )
-    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
-        raise _invalid(path, error) from None
+        except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+            raise _invalid(path, f"sample {sample}: {error}") from None
     return gathered.predictions(path, NUSCENES)
 
 
-def _nuscenes_row(box: _Detection) -> tuple[float, ...]:
+def _nuscenes_row(box: _Detection) -> tuple[_Number, ...]:
     a, b, c, d = box.rotation
     norm = a * a + b * b + c * c + d * d
     yaw = math.atan2(2 * (a * d + b * c), norm - 2 * (c * c + d * d)) if norm > 0 else math.nan
-    vx, vy = (math.nan if value is None else value for value in box.velocity)
     x, y, z = box.translation
-    return (x, y, yaw - math.pi / 2, *box.size, vx, vy, box.detection_score, z)
+    return (x, y, yaw - math.pi / 2, *box.size, *box.velocity, box.detection_score, z)
 
 
 def _lines(path: Path) -> Predictions:
@@ -202,7 +222,7 @@ def _lines(path: Path) -> Predictions:
     for number, line in enumerate(_bytes(path).splitlines(), 1):
         if line.strip():
             try:
-                label = decoder.decode(line)
+                label = _decoded(decoder, line)
             except (msgspec.MsgspecError, ValueError, RecursionError) as error:
                 raise _invalid(path, f"line {number}: {error}") from None
             rows = [_line_row(box) for box in label.objects]
@@ -210,14 +230,12 @@ def _lines(path: Path) -> Predictions:
     return gathered.predictions(path, PLAIN)
 
 
-def _line_row(box: _Object) -> tuple[float, ...]:
+def _line_row(box: _Object) -> tuple[_Number, ...]:
     heading = box.heading
-    if heading is None:
-        heading = math.nan if box.yaw is None else box.yaw - math.pi / 2
-    height = math.nan if box.height is None else box.height
-    z = math.nan if box.z is None else box.z
-    velocity = box.velocity or (math.nan, math.nan)
-    return (*box.position, heading, box.width, box.length, height, *velocity, box.score, z)
+    if heading is None and box.yaw is not None:
+        heading = box.yaw - math.pi / 2
+    velocity = box.velocity or (None, None)
+    return (*box.position, heading, box.width, box.length, box.height, *velocity, box.score, box.z)
 
 
 def _table(path: Path) -> ArrowTable:
@@ -358,10 +376,10 @@ def _check(found: Predictions) -> None:
             wrong |= values <= 0
         if wrong.any():
             first = int(np.argmax(wrong))
-            message = (
-                f"{found.name}: {int(wrong.sum())} boxes have a {name} that makes no sense, the first in frame "
-                f"{found.frames[found.frame[first]]}: {values[first]:g}"
-            )
+            count = int(wrong.sum())
+            told = "a box" if count == 1 else f"{count} boxes"
+            where = f"{'in' if count == 1 else 'the first in'} frame {found.frames[found.frame[first]]}"
+            message = f"{found.name}: {told} whose `{name}` makes no sense, {where}: {values[first]:g}"
             raise DataError(Diagnostic("predictions-invalid", message))
     # equal boxes lie together when sorted by all that tells them apart
     order = np.lexsort((found.y, found.x, found.category, found.frame))
@@ -381,5 +399,6 @@ def _check(found: Predictions) -> None:
     if same.any():
         box = int(order[int(np.argmax(same))])
         frame, category = found.frames[found.frame[box]], found.classes[found.category[box]]
-        message = f"{int(same.sum())} boxes are there more than once, such as a {category} in frame {frame}"
-        raise _duplicate(found.name, message)
+        raise _duplicate(
+            found.name, f"boxes are there more than once: {int(same.sum())}, the first a {category} in frame {frame}"
+        )

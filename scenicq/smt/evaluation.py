@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from scenicq.smt.formula import Formula, Node, Operator, Problem, Term, flatten
+from scenicq.smt.formula import Formula, Node, Operator, Problem, flatten
 from scenicq.smt.operators import operate
 
-__all__ = ["Evaluator", "evaluate", "evaluate_term", "holds"]
+__all__ = ["Evaluator", "evaluate", "holds"]
 
 TINY = 5e-324
 """The least positive double: the margin by which `x < x` fails."""
@@ -63,15 +63,6 @@ def _margin(relation: str, left: float, right: float) -> float:
     if relation == "==":
         return -abs(gap)
     return -TINY if gap == 0 and relation == "<" else gap
-
-
-def evaluate_term(term: Term, values: Mapping[str, float]) -> float:
-    """The value of a term, NaN where it is undefined.
-
-    Raises:
-        KeyError: A variable has no value.
-    """
-    return Evaluator(term)(values)
 
 
 def evaluate(formula: Formula, values: Mapping[str, float], slack: float = 0.0) -> bool:

@@ -176,13 +176,12 @@ def _check_class_counts(labels: ArrowTable, objects: ArrowTable, owner: NDArray[
     expected = np.unique(owner * each + code, return_counts=True)
     told = labels["class_counts"].combine_chunks()
     sizes = np.diff(told.offsets.to_numpy())
-    items = told.slice(0)
-    claimed = _places(names, items.keys.to_pylist())
+    claimed = _places(names, told.keys.to_pylist())
     if (claimed < 0).any():
         invalid(file, "counts a class of which there is no object", column="class_counts")
     keys = np.repeat(np.arange(len(labels)), sizes) * each + claimed
     order = np.argsort(keys, kind="stable")
-    counts = items.items.to_numpy()
+    counts = told.items.to_numpy()
     same = np.array_equal(keys[order], expected[0]) and np.array_equal(counts[order], expected[1])
     if not same:
         invalid(file, "is not how many objects of each class the labels have", column="class_counts")

@@ -49,12 +49,18 @@ def test_what_is_behind_an_error_counts():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")
-def test_too_little_memory_never_means_that_nothing_matched(command, crossroads):
+@pytest.mark.parametrize("what", ["match", "gather", "ingest"])
+def test_too_little_memory_never_means_that_nothing_matched(what, command, crossroads, tmp_path):
     code = (
         "import os, resource, sys; resource.setrlimit(resource.RLIMIT_AS, (256_000_000, 256_000_000)); "
         "os.execv(sys.argv[1], sys.argv[1:])"
     )
-    words = [sys.executable, "-c", code, command, "match", str(PROGRAM), str(crossroads)]
+    rest = {
+        "match": [PROGRAM, crossroads],
+        "gather": [tmp_path / "pieces"],
+        "ingest": [PROGRAM.parents[1] / "crossroads", tmp_path / "made"],
+    }
+    words = [sys.executable, "-c", code, command, what, *map(str, rest[what])]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert "resources-exhausted" in done.stderr
@@ -74,6 +80,20 @@ def test_too_few_files_never_mean_that_nothing_matched(command, tmp_path, files)
     assert done.stderr.startswith("error[") == (done.returncode == 2)
     assert (tmp_path / "made").exists() == (done.returncode == 0)
     assert "internal error" not in done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of open files are those of Linux")
+@pytest.mark.parametrize("files", [6, 8, 12, 16])
+def test_a_query_with_too_few_files_never_says_that_nothing_matched(command, crossroads, files):
+    code = (
+        f"import os, resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files})); "
+        "os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    words = [sys.executable, "-c", code, command, "match", str(PROGRAM), str(crossroads), "--format", "ids"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 2), done.stderr
+    assert "internal error" not in done.stderr
+    assert bool(done.stdout) == (done.returncode == 0)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")

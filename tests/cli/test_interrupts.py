@@ -197,7 +197,7 @@ def test_a_run_in_one_process_goes_on_where_it_was_interrupted(command, crossroa
                 # later than the interpreter needs to start: before, nobody is there to heed
                 time.sleep(random.uniform(0.2, 1.0) * takes_s)
             process.send_signal(number)
-            _, told = process.communicate(timeout=20)
+            _, told = process.communicate(timeout=120)
         # the last: nothing heeds any more while the interpreter ends, after all is done
         # before the command has read its options it cannot say how to go on
         told = told.removesuffix("  = hint: the same command goes on from here\n")

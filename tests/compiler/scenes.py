@@ -6,10 +6,12 @@ import math
 import random
 from functools import cache
 
+from drawing import draw_scene
+
 from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
-from scenicq.forest.improvise import Scene, draw_scene
+from scenicq.forest.improvise import Scene
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 

@@ -6,8 +6,8 @@ import random
 from dataclasses import replace
 
 import pytest
+from drawing import draw_scene
 
-from scenicq.forest.improvise import draw_scene
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT

@@ -8,11 +8,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from drawing import draw_scene
 from shapely import LineString
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
-from scenicq.forest.improvise import draw_scene
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network

@@ -23,6 +23,7 @@ REFUSED = {
     "x = Discrete({1: 10**400})": "runtime-error",
     "new Car at 9 @ 9, with mutationScale (1, 2)": "wrong-type",
     "new Car at 9 @ 9, with mutationScale None": "wrong-type",
+    "new Car at 9 @ 9, with mutationScale Uniform(*network.lanes)": "wrong-type",
     "new Car at 9 @ 9, with mutationScale 'much'\nmutate": "wrong-type",
     "new Car at 9 @ 9, with positionStdDev 'much'\nmutate": "wrong-type",
     "new Car at 9 @ 9, with mutationScale 10**400": "wrong-value",

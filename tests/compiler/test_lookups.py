@@ -10,12 +10,12 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
+from drawing import draw_scene
 
 from scenicq.compiler.element_lookups import LOOKUPS, Lookups
 from scenicq.compiler.occupancy import Ranked
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
-from scenicq.forest.improvise import draw_scene
 from scenicq.forest.nodes import Constant, DirectionAt, PointIn
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
@@ -251,3 +251,14 @@ def test_signals_at_intersections_are_what_the_map_says_of_them():
         compile_scenario(Source("test.scenic", text), silent)
     (diagnostic,) = caught.value.diagnostics
     assert (diagnostic.code, diagnostic.span.text) == ("map-lacks", "isSignalized")
+
+
+@pytest.mark.parametrize(
+    ("part", "lacked"),
+    [("backwardLanes.lanes", "backwardLanes"), ("intersection.maneuvers", "intersection")],
+)
+def test_what_an_element_of_the_map_lacks_is_said_of_the_map(part: str, lacked: str):
+    # where Scenic ends with an error of Python
+    text = f"{HEADER}some = [road for road in network.allRoads if len(road.{part}) == 1]\nego = new Car\n"
+    assert refused(text) == ("map-lacks", lacked)
+    assert refused(f"{HEADER}found = [None]\nego = new Car at (found[0].x, 1)\n") == ("unknown-attribute", "x")

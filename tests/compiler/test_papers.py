@@ -7,10 +7,10 @@ import runpy
 from pathlib import Path
 
 import pytest
+from drawing import draw_scene
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
-from scenicq.forest.improvise import draw_scene
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.show import show
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from drawing import draw_scene
 
 from scenicq.errors import ScenarioError
-from scenicq.forest.improvise import draw_scene
 
 from .scenes import compiled
 

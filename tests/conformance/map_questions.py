@@ -1,8 +1,9 @@
 """Do maps say the same here as in Scenic? The direction of traffic and look-ups at random points, and all elements.
 
 Run by `make conformance SCENIC=CHECKOUT`: `python tests/conformance/map_questions.py CHECKOUT`. On each OpenDRIVE map,
-Scenic's direction must be one of those that are allowed at each point, and what it finds there one of what look-ups may
-find; what its elements say of each other must be what they say here.
+Scenic's direction must be one of those that are allowed at each point; what it finds there must be one of what look-ups
+of a random place may find, and what they find if the place is known; what its elements say of each other must be what
+they say here.
 """
 
 from __future__ import annotations
@@ -72,6 +73,8 @@ def compare_points(network: Network, answers: list[dict[str, Any]], tally: Tally
             options = [*(option.id for option in table.options), None]
             found = [options[number] for number in table.occupancy.at(each["x"], each["y"])]
             tally.note(name, each[name] in found, f"{place}: {each[name]}, here {found}")
+            known = _name(getattr(network, name)(each["x"], each["y"]))
+            tally.note(f"{name} of a known place", each[name] == known, f"{place}: {each[name]}, here {known}")
 
 
 def _layers(network: Network, name: str) -> tuple[str, Any]:

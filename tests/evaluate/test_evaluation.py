@@ -14,11 +14,12 @@ import pytest
 from shapely.geometry import Polygon
 
 from scenicq.errors import DataError
+from scenicq.evaluate.comparison import Share
 from scenicq.evaluate.detection import detect
 from scenicq.evaluate.evaluation import Evaluation, evaluate
-from scenicq.evaluate.pages import write_pages
+from scenicq.evaluate.pages import _whiskers, write_pages
 from scenicq.evaluate.region_of_interest import RegionOfInterest
-from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows
+from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview
 from scenicq.evaluate.simulation import read_simulated
 from scenicq.geometry.features import MapFeature
 from scenicq.importers.ingest import ingest
@@ -203,7 +204,38 @@ def test_pages(judged: Evaluation, street: Dataset, tmp_path: Path) -> None:
     worst = judged.scenarios[0].worst[0]
     assert text.index('id="frame-0-0"') < text.index('id="frame-0-1"')
     assert f'href="#frame-0-0">{worst.frame}<' in text
+    assert "1 false box<" in text
+    drawn = 2 + len(judged.scenarios[0].slices)
+    assert text.count('class="whiskers"') == drawn
+    assert text.count('class="own rate"') == drawn
+    assert "Scenarios" not in text
     write_pages(judged, street, tmp_path / "pages")
+
+
+def test_shares_are_drawn_where_they_are() -> None:
+    own = Share(1, 4, 0.25, (0.1, 0.5))
+    text = _whiskers(own, Share(0, 0, math.nan, (math.nan, math.nan)))
+    assert 'd="M10.0 7H50.0" class="own"' in text
+    assert "M25.0 7h0" in text
+    assert "other" not in text
+    assert "M25.0 7H25.0" in _whiskers(Share(1, 4, 0.25, (math.nan, math.nan)), None)
+
+
+def test_several_scenarios_are_in_one_table(
+    street: Dataset, results: list[Result], predictions: Predictions, tmp_path: Path
+) -> None:
+    half = [each for each in results if each.recording < "09"]
+    runs = tmp_path / "runs.csv"
+    runs.write_text("scenario,failed\n" + "".join(f"{name},{n % 2}\n" for name in ("all", "half") for n in range(40)))
+    both = evaluate({"all": results, "half": half}, street, predictions, simulated=runs)
+    _, head, rows = overview(both)
+    assert [row[0] for row in rows] == ["all", "half"]
+    assert all(len(row) == len(head) for row in rows)
+    assert [row[-1] for row in rows] == [each.simulated.says for each in both.scenarios if each.simulated]
+    assert overview(evaluate({"all": results}, street, predictions))[1][-1] == "RECORDINGS"
+    text = write_pages(both, street, tmp_path / "pages").read_text(encoding="utf-8")
+    assert '<a href="#scenario-1">half</a>' in text
+    assert 'id="scenario-1"' in text
 
 
 def test_what_does_not_fit_is_told(street: Dataset, results: list[Result], predictions: Predictions) -> None:
@@ -277,6 +309,24 @@ def test_rules_of_the_benchmarks(street: Dataset, predictions: Predictions) -> N
     assert ARGOVERSE2.range_m == 150
 
 
+def test_objects_of_roles_that_do_not_count_are_told(
+    street: Dataset, results: list[Result], predictions: Predictions
+) -> None:
+    """A benchmark's range leaves out some of what plays a role, or all of it."""
+    whole = evaluate({"a": results}, street, predictions)
+    assert whole.scenarios[0].roles[0].uncounted == 0
+    assert "objects-uncounted" not in {each.code for each in whole.warnings}
+    for range_m in (12.0, 1.0):
+        near = replace(predictions, protocol=replace(predictions.protocol, range_m=range_m))
+        found = evaluate({"a": results}, street, near)
+        (role,) = found.scenarios[0].roles
+        assert role.uncounted > 0
+        assert role.uncounted + role.share.of == len(results)
+        told = next(each for each in found.warnings if each.code == "objects-uncounted").message
+        assert f"{role.uncounted} of {len(results)} objects of role parkedCar" in told
+    assert role.sentence == f"role parkedCar: none of {len(results)} objects counts"
+
+
 def test_simulated_runs(tmp_path: Path) -> None:
     file = tmp_path / "runs.csv"
     file.write_text("scenario,failed\na,1\na,0\na,true\nb,no\n")
@@ -285,7 +335,19 @@ def test_simulated_runs(tmp_path: Path) -> None:
     assert found["b"].rate == 0
     file.write_text("scenario,score\na,0.25\na,0.75\n")
     assert read_simulated(file)["a"].rate == pytest.approx(0.5)
-    for text in ("scenario,score\na,1.5\n", "scenario,failed\na,maybe\n", "scenario\na\n", "failed\n1\n"):
+    file.write_text("scenario,failed\n" + "a,1\na,0\n" * 60_000)
+    found = read_simulated(file)
+    assert (found["a"].of, found["a"].rate) == (120_000, 0.5)
+    assert found["a"].interval == pytest.approx((0.4972, 0.5028), abs=1e-4)
+    endless = f"scenario,failed\na,1\n{'a' * 200_000},1\n"
+    for text in (
+        endless,
+        "scenario,score\n,0.5\n",
+        "scenario,score\na,1.5\n",
+        "scenario,failed\na,maybe\n",
+        "scenario\na\n",
+        "failed\n1\n",
+    ):
         file.write_text(text)
         refused("file-invalid", lambda: read_simulated(file))
     refused("file-missing", lambda: read_simulated(tmp_path / "none.csv"))

@@ -136,6 +136,13 @@ def predictions(query: Query, file: Path) -> Path:
     return file
 
 
+def test_matches_of_equal_density_keep_their_order(query: Query, ranked: list[Result]) -> None:
+    assert {round(each.density.log, 9) for each in ranked if each.density and each.density.log} == {
+        round(-math.log(40), 9)
+    }
+    assert [each.frame for each in ranked] == [label.frame for label in query.dataset.labels()]
+
+
 def test_a_share_missed_is_that_of_the_programs_scenes(query: Query, ranked: list[Result], tmp_path: Path) -> None:
     found = evaluate({"near": ranked}, query.dataset, predictions(query, tmp_path / "boxes.jsonl"))
     (one,) = found.scenarios[0].weighted

@@ -6,13 +6,14 @@ import math
 import random
 
 import pytest
+from drawing import draw_scene
 
 from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest import build
 from scenicq.forest.angle_wrap import any_turn, one_turn
-from scenicq.forest.improvise import Scene, draw_scene
+from scenicq.forest.improvise import Scene
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Range
 from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher

@@ -12,6 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 sys.path.insert(0, str(Path(__file__).parent))
+from drawing import draw_scene
 from expressions import expressions, near
 
 from scenicq.compiler.default_street import street
@@ -22,7 +23,6 @@ from scenicq.forest.bounds import point_boxes, vector_bounds
 from scenicq.forest.condition import condition, expand
 from scenicq.forest.evaluate import admits, evaluate
 from scenicq.forest.groups import Comparison, group_constraints
-from scenicq.forest.improvise import draw_scene
 from scenicq.forest.interval_ends import FLOATS
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import (

@@ -5,7 +5,9 @@ over every kind, and over random pairs of kinds for the time that is left.
 """
 
 import argparse
+import contextlib
 import hashlib
+import importlib
 import json
 import os
 import random
@@ -16,15 +18,24 @@ import struct
 import subprocess
 import sys
 import tempfile
+import traceback
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from rounds import Round, cpu_seconds
+from rounds import Round, attend
+
+from scenicq.store.dataset import open_dataset
 
 ROOT = Path(__file__).parents[2]
+_COMMAND = str(Path(sys.executable).with_name("scenicq"))
+_FRAME = "03-busy-intersection/09"
+"""One of the sample data."""
+_MOST_KIB = 2 << 20
+"""Memory that no run may take."""
 Damage = Callable[[Path], None]
 
 _REALS = (float("nan"), float("inf"), -float("inf"), 1e300, -1e300)
@@ -199,15 +210,14 @@ def make_hostile(sound: Path, target: Path, *applied: Damage) -> bool:
 def commands(folder: Path, scratch: Path) -> dict[str, list[str]]:
     """Every command that reads a dataset."""
     program = str(ROOT / "sample_data/scenarios/02_crossing_cars.scenic")
-    frame = json.loads((folder / "dataset.json").read_text()).get("name", "x")
     return {
         "match": ["match", program, str(folder), "--all", "--format", "jsonl"],
         "bare": ["match", program, str(folder), "--no-prefilter", "--method", "smt"],
         "report": ["match", program, str(folder), "--report", str(scratch / "report")],
-        "check": ["check", program, "--dataset", str(folder)],
+        "check": ["check", program, str(folder)],
         "info": ["info", str(folder), "--verify"],
-        "show": ["show", str(folder), str(frame)],
-        "explain": ["explain", program, str(folder), str(frame)],
+        "show": ["show", str(folder), _FRAME],
+        "explain": ["explain", program, str(folder), _FRAME],
         "sample": ["sample", program, str(folder), "-n", "1"],
         "index": ["index", str(folder)],
     }
@@ -221,54 +231,121 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=30.0, help="CPU seconds of a run that hangs")
     options = parser.parse_args()
     chance = random.Random(options.seed)
-    command = str(Path(sys.executable).with_name("scenicq"))
     outcomes: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
-        environment = {**os.environ, "XDG_STATE_HOME": str(work / "state")}
-        sound = work / "sound"
-        subprocess.run([command, "ingest", str(ROOT / "sample_data/crossroads"), str(sound), "-q"], check=True)
+        os.environ["XDG_STATE_HOME"] = str(work / "state")
+        sound, folder = work / "sound", work / "hostile"
+        subprocess.run([_COMMAND, "ingest", str(ROOT / "sample_data/crossroads"), str(sound), "-q"], check=True)
+        shutil.copytree(sound, folder)
+        _load(work, [*commands(folder, work).values()])
+        shutil.rmtree(folder)
         kinds = damages()
         todo = [[kind] for kind in kinds]
         chance.shuffle(todo)
-        attack = Round(
-            options.minutes,
-            lambda: f"{outcomes.total()} runs, {len(kinds)} kinds of damage, {len(todo)} not reached: {dict(outcomes)}",
-        )
+        applied = 0
+
+        def figures() -> str:
+            told = f"{outcomes.total()} runs, {applied} damaged datasets, {len(kinds)} kinds of damage"
+            return f"{told}, {len(todo)} not reached: {dict(outcomes)}"
+
+        attack = Round(options.minutes, figures)
         while attack.goes_on():
             chosen = todo.pop() if todo else chance.sample(sorted(kinds), 2)
-            folder = work / "hostile"
-            if make_hostile(sound, folder, *(kinds[kind] for kind in chosen)):
-                names = commands(folder, work)
-                # what the checker lets through goes through all of them; else one more shows that it is always there
-                for what in [*names][:1] if outcomes.total() % 3 else chance.sample(sorted(names), 2):
-                    began = cpu_seconds()
-                    outcomes[_run([command, *names[what]], environment, options.limit, f"{chosen} {what}")] += 1
-                    attack.took(cpu_seconds() - began)
-            shutil.rmtree(folder, ignore_errors=True)
-            shutil.rmtree(work / "report", ignore_errors=True)
-    sys.exit(any(outcomes[bad] for bad in ("internal error", "signal", "hang")))
+            # in a process of its own: one with threads of libraries is not to be forked
+            if _apart(partial(_damage, sound, folder, [kinds[kind] for kind in chosen]), work)[0] == "exit 0":
+                applied += 1
+                for number, (what, words) in enumerate(commands(folder, work).items()):
+                    outcome, spent = _apart(partial(_invoke, words, number > 0), work, options.limit)
+                    attack.took(spent)
+                    outcomes[outcome] += 1
+                    if not outcome.startswith("exit"):
+                        print(f"{outcome}: {chosen} {what}", flush=True)
+            for left in (folder, work / "report"):
+                shutil.rmtree(left, ignore_errors=True)
+    sys.exit(any(outcomes[bad] for bad in ("internal error", "signal", "hang", "memory")))
 
 
-def _run(command: list[str], environment: dict[str, str], limit: float, what: str) -> str:
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 1))
+def _damage(sound: Path, folder: Path, applied: list[Damage]) -> int:
+    return int(not make_hostile(sound, folder, *applied))
 
+
+def _load(work: Path, runs: list[list[str]]) -> None:
+    """Load whatever modules some runs need, once, so that processes that are forked have them."""
+
+    def run() -> int:
+        for words in runs:
+            _apart(partial(_invoke, words, True, work / "modules"), work)
+        return 0
+
+    _apart(run, work, 60.0 * len(runs))
+    for module in dict.fromkeys((work / "modules").read_text().split()):
+        if not module.startswith(("__", "multiprocessing")):
+            with contextlib.suppress(ImportError):
+                importlib.import_module(module)
+
+
+def _invoke(words: list[str], checks_here: bool, modules: Path | None = None) -> int:
+    """The command in this process.
+
+    Args:
+        words: Its arguments.
+        checks_here: Whether a dataset is looked at in this process, too, whose end is then what the run ends with: to
+            start another one for that takes longer than all else.
+        modules: A file to which the names of the modules are appended that are loaded in the end.
+    """
+    from scenicq_cli import datasets, start
+
+    if checks_here:
+        datasets.check_apart = lambda address: open_dataset(address) and None
+    sys.argv = [_COMMAND, *words]
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, timeout=60 * limit, check=False,
-                              preexec_fn=limited)  # fmt: skip
-    except subprocess.TimeoutExpired:
-        outcome = "hang"
-    else:
-        told = done.stderr.decode(errors="replace")
-        internal = "internal error" in told or "Traceback" in told
-        late, killed = done.returncode == -signal.SIGXCPU, done.returncode < 0
-        outcome = (
-            "internal error" if internal else "hang" if late else "signal" if killed else f"exit {done.returncode}"
-        )
-    if not outcome.startswith("exit"):
-        print(f"{outcome}: {what}", flush=True)
-    return outcome
+        start.main()
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
+    finally:
+        if modules is not None:
+            with modules.open("a") as file:
+                file.write("\n".join([*sys.modules, ""]))
+    return 0
+
+
+def _apart(run: Callable[[], int], work: Path, limit: float = 60.0) -> tuple[str, float]:
+    """Do something in a forked process: how that ends, and CPU seconds.
+
+    Args:
+        run: Gives the exit code.
+        work: Where its output goes.
+        limit: CPU seconds after which it hangs.
+    """
+    output = work / "output"
+    child = os.fork()
+    if child == 0:
+        code = 70
+        try:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 1))
+            said = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            os.dup2(said, 1)
+            os.dup2(said, 2)
+            code = run()
+            sys.stdout.flush()
+            sys.stderr.flush()
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(code)
+    status, used, late = attend(child, 60 * limit)
+    spent = used.ru_utime + used.ru_stime
+    code, told = os.waitstatus_to_exitcode(status), output.read_text(errors="replace")
+    if late or code == -signal.SIGXCPU:
+        return "hang", spent
+    if code < 0:
+        return "signal", spent
+    if "internal error" in told or "Traceback" in told:
+        return "internal error", spent
+    return "memory" if used.ru_maxrss > _MOST_KIB else f"exit {code}", spent
 
 
 if __name__ == "__main__":

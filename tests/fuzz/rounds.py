@@ -1,5 +1,6 @@
 """A round of attacks: how long it goes on, what it has come to so far, and what its runs have cost."""
 
+import os
 import resource
 import signal
 import threading
@@ -54,3 +55,17 @@ def cpu_seconds() -> float:
     """The processor time of this process and of all that it has waited for."""
     used = (resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN))
     return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def attend(child: int, patience_s: float) -> tuple[int, resource.struct_rusage, bool]:
+    """Wait for a process, and kill it if it takes too long: its status, what it has used, and whether it was killed."""
+    deadline = time.monotonic() + patience_s
+    while True:
+        done, status, usage = os.wait4(child, os.WNOHANG)
+        if done:
+            return status, usage, False
+        if time.monotonic() > deadline:
+            os.kill(child, signal.SIGKILL)
+            _, status, usage = os.wait4(child, 0)
+            return status, usage, True
+        time.sleep(0.005)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pyarrow as pa
 import pytest
-from hostile_datasets import damages, enter, make_hostile, nested, rewrite
+from hostile_datasets import commands, damages, enter, make_hostile, nested, rewrite
 
 from scenicq.errors import DataError
 from scenicq.store.dataset import open_dataset
@@ -84,6 +84,27 @@ def test_a_sound_dataset_is_sound(crossroads):
 
 def test_nested_collections_never_reach_the_geometry_library():
     assert wkb_problem(nested(100_000), lines=False) == "is not a polygon in the plane"
+
+
+COMMANDS = ("match", "bare", "report", "check", "info", "show", "explain", "sample", "index")
+
+
+@pytest.mark.parametrize("what", COMMANDS)
+def test_every_command_that_is_run_on_damage_does_its_work_without(what, run, crossroads, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(crossroads, folder)
+    words = commands(folder, tmp_path)
+    assert set(words) == set(COMMANDS)
+    assert run(*words[what]).exit_code == 0
+
+
+@pytest.mark.parametrize("what", COMMANDS)
+def test_no_command_reads_nested_collections(what, run, hostile, tmp_path, monkeypatch):
+    monkeypatch.setattr("scenicq_cli.datasets.check_apart", open_dataset)
+    result = run(*commands(hostile("regions.geometry nested"), tmp_path)[what])
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error[dataset-invalid]")
+    assert "row 1, column `geometry`" in result.stderr
 
 
 def test_the_command_refuses_a_strangers_dataset_and_says_where(run, hostile):

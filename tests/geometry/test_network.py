@@ -213,7 +213,7 @@ def test_lookups() -> None:
         return found.id if found else None
 
     assert name(network.laneAt(1, 5)) == "inner"
-    assert name(network.laneAt(4, 5)) == "inner", "the border lies in both, equally near"
+    assert name(network.laneAt(4, 5)) == "inner", "the border lies in both: the first in the map's order"
     assert name(network.laneSectionAt(1, 25)) == "inner2"
     assert name(network.laneGroupAt(-1, 5)) == "south"
     assert name(network.laneGroupAt(7, 45)) == "more"
@@ -230,6 +230,29 @@ def test_lookups() -> None:
     assert network.nominalDirectionsAt(-1, 5) == (math.pi,)
     assert network.roadDirection.values(9, 5) == (0.0,)
     assert network.roadDirection.values(45, 5) == ()
+
+
+def test_where_elements_overlap_the_first_in_the_order_of_the_map_counts() -> None:
+    def middle(x: float) -> list[list[list[float]]]:
+        return [[[x, 40], [x, 50]]]
+
+    # nearer centrelines, but later in the map
+    across = area("across", "road", (-4, 40, 8, 46), forward="along", intersection="cross")
+    along = area("along", "lane_group", (-4, 40, 8, 46), road="across")
+    later = area("later", "lane", (4, 40, 8, 46), group="along", centerline=middle(5.8))
+    network = town(across, along, later)
+    found = (network.laneAt, network.laneSectionAt, network.laneGroupAt, network.roadAt)
+    assert [getattr(each(5.8, 45), "id", None) for each in found] == ["turn", "turn_sec", "turns", "inside"]
+    assert [getattr(each(7, 47), "id", None) for each in found] == [None, None, "more", "inside"]
+    assert [getattr(each(0, 45), "id", None) for each in found] == [None, None, "along", "across"]
+
+
+def test_within_the_tolerance_of_elements_counts_where_none_holds_the_point() -> None:
+    network = town()
+    assert network.laneAt(-4.04, 5) is network.elements["back"]
+    assert network.roadAt(-4.04, 5) is network.elements["road"]
+    assert network.elementAt(-4.04, 5) is network.elements["edge"], "which holds it"
+    assert network.laneAt(-4.06, 5) is None
 
 
 def test_problems_are_listed_and_passed_over() -> None:

@@ -87,6 +87,30 @@ def test_parquet_with_lists_or_with_rows(tmp_path: Path) -> None:
         assert each.frame.tolist() == [0, 0]
 
 
+def test_null_and_nan_are_no_numbers(tmp_path: Path) -> None:
+    """Programs write NaN where JSON has null: velocities may be unknown, what must be known is told by its frame."""
+    unknown = detection(velocity=[math.nan, None], size=[2, 4, -math.inf])
+    found = read_predictions(nuscenes(tmp_path / "a.json", {"NaN": [unknown], "b": []}))
+    assert found.frames == ["NaN", "b"]
+    assert np.isnan([found.vx[0], found.vy[0], found.height[0]]).all()
+    box = {**BOX, "velocity": [math.nan, 1.0], "class": 'a, NaN, "b'}
+    found = read_predictions(lines(tmp_path / "a.jsonl", {"id": "a", "objects": [box]}))
+    assert np.isnan(found.vx[0])
+    assert (found.vy[0], found.classes) == (1.0, ['a, NaN, "b'])
+    for value in (math.nan, None):
+        for name, path in (
+            ("score", lines(tmp_path / "b.jsonl", {"id": "frame 7", "objects": [{**BOX, "score": value}]})),
+            ("x", lines(tmp_path / "c.jsonl", {"id": "frame 7", "objects": [{**BOX, "position": [value, 1]}]})),
+            ("score", nuscenes(tmp_path / "b.json", {"frame 7": [detection(detection_score=value)]})),
+            ("width", nuscenes(tmp_path / "c.json", {"frame 7": [detection(size=[value, 1, 1])]})),
+        ):
+            message = refused("predictions-invalid", path)
+            assert f"`{name}` makes no sense" in message
+            assert "frame 7" in message
+    message = refused("file-invalid", nuscenes(tmp_path / "d.json", {"frame 7": [detection(rotation=[None, 0, 0, 0])]}))
+    assert "frame 7" in message
+
+
 UNSOUND: dict[str, tuple[str, Callable[[Path], Path]]] = {
     "nan": ("predictions-invalid", lambda p: nuscenes(p / "a.json", {"a": [detection(rotation=[0, 0, 0, 0])]})),
     "size": ("predictions-invalid", lambda p: lines(p / "a.jsonl", {"id": "a", "objects": [{**BOX, "width": 0}]})),

@@ -13,6 +13,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown
 from scenicq.smt.solver import Sat, Unsat
+from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label, LabelObject
 
 
@@ -125,6 +126,23 @@ def test_a_solver_gets_what_is_left(start):
 def test_with_enough_time_the_same_label_matches():
     program = PROGRAM.replace("require", "param unused = 1\n# require")
     assert isinstance(_matcher(program).match(_label((3.0, 3.0), (4.0, 4.0))), Match)
+
+
+@pytest.mark.parametrize(
+    "line", ["require (distance from ego to intersection) < 100", "require not (ego in intersection)"]
+)
+def test_what_a_hidden_place_asks_of_the_map_counts(line, start, crossroads):
+    dataset = open_dataset(crossroads)
+    (name,) = dataset.maps
+    network = Network(name, dataset.features(name))
+    text = f"model scenic.domains.driving.model\nego = new Car\nmutate\n{line}"
+    matcher = Matcher(compile_scenario(Source("p.scenic", text), network), MatchOptions(timeout_s=2.0))
+    label = next(dataset.labels())
+    assert isinstance(matcher.match(label), Match)
+    start()
+    verdict = matcher.match(label)
+    assert isinstance(verdict, Unknown)
+    assert verdict.reason == "timeout"
 
 
 def test_finding_every_match_ends_too(start):

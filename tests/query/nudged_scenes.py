@@ -7,10 +7,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+from drawing import draw_scene
+
 from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
-from scenicq.forest.improvise import draw_scene
 from scenicq.geometry.angles import normalize
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording

@@ -22,6 +22,7 @@ from scenicq.store.writer import write_dataset
 
 # looks along +y from a height of 1.5 m
 CAMERA = Camera(640, 360, (300.0, 300.0, 320.0, 180.0), (0.0, 0.0, 1.5), (0.5**0.5, -(0.5**0.5), 0.0, 0.0))
+BACK = Camera(640, 360, (300.0, 300.0, 320.0, 180.0), (0.0, 0.0, 1.5), (0.0, 0.0, 0.5**0.5, -(0.5**0.5)))
 PROGRAM = Source("ahead.scenic", "ego = new Object at (0, 0), facing 0\nlead = new Object at (0, 20), facing 0\n")
 
 
@@ -56,12 +57,13 @@ def test_reports_show_them(tmp_path: Path) -> None:
     images = pytest.importorskip("PIL.Image", reason="the extra scenicq[thumbnails] is not installed")
     ego = LabelObject("ego", "Car", "car", 0.0, 0.0, 0.0, 2.0, 4.0)
     labels = tuple(
-        Label(f"f{number}", "r", number, "none", ego, (car("a", 20.0), car("b", 40.0)), sensors={"CAM_FRONT": "a.png"},
-              cameras={"CAM_FRONT": CAMERA})
+        Label(f"f{number}", "r", number, "none", ego, (car("a", 20.0), car("b", 40.0)),
+              sensors={"CAM_BACK": "b.png", "CAM_FRONT": "a.png"}, cameras={"CAM_BACK": BACK, "CAM_FRONT": CAMERA})
         for number in range(2)
     )  # fmt: skip
     write_dataset(tmp_path / "d", [Recording("r", "none", labels)], {}, name="d")
-    images.new("RGB", (640, 360), "gray").save(tmp_path / "d" / "a.png")
+    for name in ("a.png", "b.png"):
+        images.new("RGB", (640, 360), "gray").save(tmp_path / "d" / name)
     query = Query(open_dataset(tmp_path / "d"), PROGRAM)
     results = list(query.results())
     text = write_report(query, results, tmp_path / "report").read_text(encoding="utf-8")
@@ -83,6 +85,7 @@ def test_reports_show_them(tmp_path: Path) -> None:
     file.write_text("".join(json.dumps({"id": label.frame, "objects": boxes}) + "\n" for label in labels))
     found = evaluate({"a": results}, query.dataset, file)
     text = write_pages(found, query.dataset, tmp_path / "pages").read_text(encoding="utf-8")
+    assert text.index(">CAM_FRONT<") < text.index(">CAM_BACK<"), "what shows the objects in question comes first"
     over = text.partition('class="boxes"')[2].partition("</svg>")[0]
     assert 'class="missed asked"' in over
     assert 'class="found"' in over

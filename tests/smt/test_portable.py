@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from scenicq.smt.answer import NoAnswer, Sat, Unsat
-from scenicq.smt.evaluation import evaluate, evaluate_term, holds
+from scenicq.smt.evaluation import Evaluator, evaluate, holds
 from scenicq.smt.formula import (
     Formula,
     Num,
@@ -57,7 +57,7 @@ def satisfied(draw: st.DrawFn) -> tuple[Formula, dict[str, float]]:
     parts: list[Formula] = []
     for _ in range(draw(st.integers(1, 3))):
         term = draw(terms())
-        value = evaluate_term(term, point)
+        value = Evaluator(term)(point)
         assume(math.isfinite(value) and abs(value) < 1e6)
         slack = 1e-9 * max(1.0, abs(value))
         upper, lower = compare("<=", term, value + slack), compare(">=", term, value - slack)
@@ -110,7 +110,7 @@ def test_deep_terms() -> None:
     term: Term = X
     for _ in range(5000):
         term = apply(Fn.SIN, apply(Fn.ADD, term, 0.1))
-    value = evaluate_term(term, {"x": 0.5})
+    value = Evaluator(term)({"x": 0.5})
     problem = Problem((Variable("x", 0.0, 1.0),), compare("<=", term, value + 1e-3))
     assert isinstance(check(problem, precision=1e-3, timeout_s=20.0), Sat)
 

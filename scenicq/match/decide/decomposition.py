@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from scenicq.forest.components import connected_components
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Range, TruncatedNormal, Value
 from scenicq.forest.walk import leaves, postorder
 from scenicq.match.decide.cascade import decide
@@ -76,16 +77,8 @@ def _components(
     items: Sequence[Item], used: Mapping[int, Mapping[Identity, Leaf]], without: Identity | None
 ) -> list[list[Item]]:
     """The items in parts that share no random variable but one."""
-    found: list[tuple[set[Identity], list[Item]]] = []
-    for item in items:
-        own = set(used[id(item)]) - {without}
-        joined = [item]
-        for part in [part for part in found if part[0] & own]:
-            found.remove(part)
-            own |= part[0]
-            joined = part[1] + joined
-        found.append((own, joined))
-    return [part for _, part in found]
+    parts = connected_components([used[id(item)].keys() - {without} for item in items])
+    return [[items[number] for number in part] for part in parts]
 
 
 def _shared(

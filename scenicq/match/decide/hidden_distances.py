@@ -16,7 +16,8 @@ from shapely.geometry import Polygon
 
 from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.groups import Comparison
-from scenicq.forest.nodes import Compare, CompareOp, Constant, Contains, Distance, Logic, LogicOp, Node
+from scenicq.forest.nodes import Compare, CompareOp, Constant, Contains, Distance, Node
+from scenicq.forest.walk import conjuncts
 from scenicq.geometry import shapes
 from scenicq.geometry.membership import distance
 from scenicq.geometry.regions import Nowhere, PolygonSet, PolylineSet, Region, UnionOf
@@ -41,7 +42,11 @@ def with_areas(items: Sequence[Item], tolerance: Tolerance, *, outer: bool = Tru
         tolerance: Per feature.
         outer: Whether areas leave out no point that satisfies the constraints; else they have no other points.
     """
-    parts = [part for item in items for part in _conjuncts(item)]
+    parts = [
+        (constraint, part, seen)
+        for constraint, node, seen in items
+        for part in ((node,) if isinstance(constraint, Comparison) else conjuncts(node))
+    ]
     compared = [_distance_of(node) for constraint, node, _ in parts if not isinstance(constraint, Comparison)]
     if not any(compared):
         return None
@@ -62,19 +67,6 @@ def with_areas(items: Sequence[Item], tolerance: Tolerance, *, outer: bool = Tru
         )
         found.append((constraint, within, seen))
     return found if changed else None
-
-
-def _conjuncts(item: Item) -> list[Item]:
-    constraint, root, seen = item
-    found: list[Item] = []
-    todo = [root]
-    while todo:
-        node = todo.pop()
-        if isinstance(node, Logic) and node.op is LogicOp.AND and not isinstance(constraint, Comparison):
-            todo += reversed(node.args)
-        else:
-            found.append((constraint, node, seen))
-    return found
 
 
 _TURNED = {

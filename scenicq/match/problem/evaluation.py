@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import cast
 
+from scenicq.forest.components import connected_components
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.evaluate import admits, evaluate_all
 from scenicq.forest.groups import Comparison, Constraint
@@ -89,16 +90,8 @@ MOST_CHOICES = 1024
 
 def _sharing(items: _Items) -> list[_Items]:
     """The items in parts that have no use of a field in common: one use is one direction, whoever refers to it."""
-    parts: list[tuple[set[int], _Items]] = []
-    for item in items:
-        uses = {id(below) for below in postorder((item[1],)) if isinstance(below, DirectionAt)}
-        joined: _Items = []
-        for part in [part for part in parts if part[0] & uses]:
-            parts.remove(part)
-            uses |= part[0]
-            joined += part[1]
-        parts.append((uses, [*joined, item]))
-    return [part for _, part in parts]
+    uses = [[id(below) for below in postorder((node,)) if isinstance(below, DirectionAt)] for _, node, _ in items]
+    return [[items[number] for number in part] for part in connected_components(uses)]
 
 
 class _Picks:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest import build
+from scenicq.forest.components import connected_components
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import (
     DiscreteRange,
@@ -27,7 +28,7 @@ from scenicq.forest.walk import leaves
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.search.outcome_tables import ChoiceTree, ChoiceVariable, Outcomes, above_choices, tree_of
 
-__all__ = ["ChoiceProblem", "Component", "ConstraintChoices", "Domain", "Lookup", "conjuncts"]
+__all__ = ["ChoiceProblem", "Component", "ConstraintChoices", "Domain", "conjuncts"]
 
 
 def conjuncts(item: Item) -> list[Item]:
@@ -94,21 +95,19 @@ class Domain:
     first: int
 
 
-@dataclass(slots=True)
-class Lookup:
-    """A choice that an expression makes: what its point has to satisfy."""
-
-    variable: Node
-
-
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Component:
-    """Constraints that share random variables, and the slots on which they hang."""
+    """Constraints that share random variables.
 
-    parts: list[ConstraintChoices] = field(default_factory=list[ConstraintChoices])
-    lookups: list[Lookup] = field(default_factory=list[Lookup])
-    slots: set[int] = field(default_factory=set[int])
-    others: set[ChoiceVariable] = field(default_factory=set["ChoiceVariable"])
+    Attributes:
+        parts: The constraints.
+        lookups: Expressions that say which option is taken, and must come out as what is chosen.
+        slots: On which both hang.
+    """
+
+    parts: tuple[ConstraintChoices, ...]
+    lookups: tuple[Node, ...]
+    slots: frozenset[int]
 
 
 class ChoiceProblem:
@@ -150,21 +149,22 @@ class ChoiceProblem:
         self.components = self._components()
 
     def _components(self) -> list[Component]:
-        found: list[Component] = []
-        pieces: list[Component] = [Component([part], [], set(part.slots), set(part.others)) for part in self.parts]
+        slots = [part.slots for part in self.parts]
+        others = [part.others for part in self.parts]
+        lookups: list[Node] = []
         for variable, places in self.columns.items():
             if not isinstance(variable, Identity):
                 used = leaves(variable)
-                below: set[ChoiceVariable] = {leaf.identity for leaf in used if not isinstance(leaf, Index)}
                 above = [self.columns.get(leaf.identity, ()) for leaf in used if isinstance(leaf, Index)]
-                slots = {slot for each in (places, *above) for slot, _ in each}
-                pieces.append(Component([], [Lookup(variable)], slots, below))
-        for piece in pieces:
-            for other in [each for each in found if each.others & piece.others]:
-                found.remove(other)
-                piece.parts[:0] = other.parts
-                piece.lookups[:0] = other.lookups
-                piece.slots |= other.slots
-                piece.others |= other.others
-            found.append(piece)
-        return found
+                lookups.append(variable)
+                slots.append(frozenset(slot for each in (places, *above) for slot, _ in each))
+                others.append({leaf.identity for leaf in used if not isinstance(leaf, Index)})
+        count = len(self.parts)
+        return [
+            Component(
+                tuple(self.parts[number] for number in joined if number < count),
+                tuple(lookups[number - count] for number in joined if number >= count),
+                frozenset[int]().union(*(slots[number] for number in joined)),
+            )
+            for joined in connected_components(others)
+        ]

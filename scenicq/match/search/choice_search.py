@@ -32,7 +32,7 @@ from scenicq.match.problem.conditioned import Item, conditioned, fact
 from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
-from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices, Lookup, conjuncts
+from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices, conjuncts
 from scenicq.match.search.outcome_bounds import possible_outcomes
 from scenicq.match.search.outcome_tables import TooManyOutcomesError
 from scenicq.match.tolerance import Tolerance
@@ -227,7 +227,7 @@ class _ChoiceSearch:
                     number + len(self.parts), component.parts, component.lookups, component.slots, assignment
                 )
                 if isinstance(outcome, Refuted):
-                    return self._refuted(outcome, frozenset(component.slots), assignment)
+                    return self._refuted(outcome, component.slots, assignment)
                 if isinstance(outcome, Undecided):
                     self.doubt = self.doubt or outcome
                     answer = Consistency.NO
@@ -252,8 +252,8 @@ class _ChoiceSearch:
         self,
         number: int,
         parts: Sequence[ConstraintChoices],
-        lookups: Sequence[Lookup],
-        slots: frozenset[int] | set[int],
+        lookups: Sequence[Node],
+        slots: frozenset[int],
         assignment: Mapping[int, int],
         *,
         whole: bool = True,
@@ -280,13 +280,13 @@ class _ChoiceSearch:
     def _decided(
         self,
         parts: Sequence[ConstraintChoices],
-        lookups: Sequence[Lookup],
-        slots: frozenset[int] | set[int],
+        lookups: Sequence[Node],
+        slots: frozenset[int],
         assignment: Mapping[int, int],
         decide: Decide,
     ) -> Outcome:
         given, taken = self._given(slots, assignment)
-        asked = {id(lookup.variable) for lookup in lookups}
+        asked = {id(lookup) for lookup in lookups}
         memo: dict[int, Node] = {id(node): Constant(float(pick), span=node.span) for node, pick in taken}
         left = conditioned([part.item for part in parts], given, memo=dict(memo))
         for node, pick in taken:
@@ -307,7 +307,7 @@ class _ChoiceSearch:
         return replace(found, constraint=self.items[0][0] if not parts else parts[0].item[0])
 
     def _given(
-        self, slots: frozenset[int] | set[int], assignment: Mapping[int, int]
+        self, slots: frozenset[int], assignment: Mapping[int, int]
     ) -> tuple[dict[Identity, Value], list[tuple[Node, int]]]:
         """Values of random choices, and the options that expressions take."""
         given: dict[Identity, Value] = {}

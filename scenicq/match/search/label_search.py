@@ -158,10 +158,10 @@ class LabelSearch:
         judged = self._filter(plan, wanted, ego)
         if judged is None:
             return
-        slots, doubtful = judged
+        slots, undecided = judged
         found = False
         if Consistency.UNKNOWN not in answers:
-            for assignment in self._firm(plan, _without(slots, doubtful), ego):
+            for assignment in self._satisfying(plan, _without(slots, undecided), ego):
                 found = True
                 yield self._solution(plan, assignment)
         if self._open and not found and self.undecided is None:
@@ -173,15 +173,15 @@ class LabelSearch:
     def _filter(
         self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
     ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
-        """Candidates that pass the groups about them and the ego alone, and which of them are doubtful."""
+        """Candidates that pass the groups about them and the ego alone, and those for which some are undecided."""
         left = wanted
         if self.options.method == "auto" and not _easy(plan, wanted):
             left, failed = thinned(plan, wanted, self.problem, self.scenario.ego, self.options.tolerance)
             if failed is not None:
-                self._blame_thinning(*failed, wanted, ego)
+                self._explain_thinning(*failed, wanted, ego)
                 return None
         slots: list[Slot] = []
-        doubtful: set[tuple[int, int]] = set()
+        undecided: set[tuple[int, int]] = set()
         known: dict[tuple[tuple[int, ...], tuple[int, ...]], tuple[tuple[int, ...], tuple[int, ...]]] = {}
         for index, numbers in left.items():
             groups = plan.unary.get(index, ())
@@ -196,11 +196,11 @@ class LabelSearch:
             kept, open_ones = known[key]
             if not kept:
                 return None
-            doubtful.update((index, number) for number in open_ones)
+            undecided.update((index, number) for number in open_ones)
             slots.append(Slot(index, kept))
-        return slots, doubtful
+        return slots, undecided
 
-    def _blame_thinning(
+    def _explain_thinning(
         self, index: int, blamed: GroupPlan, candidates: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
     ) -> None:
         """Note why an object has no candidate left; for the wording the first one is looked at without a solver."""
@@ -225,11 +225,12 @@ class LabelSearch:
             answer = one if one is Consistency.UNKNOWN else answer
         return answer
 
-    def _firm(self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int]) -> Iterator[dict[int, int]]:
-        """Correspondences that satisfy all groups.
+    def _satisfying(self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int]) -> Iterator[dict[int, int]]:
+        """Correspondences that satisfy all groups, each once.
 
-        Few objects are searched for in the order of the program: then the first correspondence does not depend on how
-        many candidates are known not to pass.
+        In two stages: few objects are searched for in the order of the program, so that the first correspondence does
+        not depend on how many candidates are known not to pass. Where that takes more than a few steps, or there are
+        many objects, the most constrained ones come first.
         """
         given: list[dict[int, int]] = []
         if len(slots) <= _FEW_SLOTS:
@@ -253,9 +254,21 @@ class LabelSearch:
         accept_unknown: bool,
         budget: int | None = None,
     ) -> Iterator[dict[int, int]]:
+        """Correspondences of which no group fails.
+
+        Args:
+            plan: The groups.
+            slots: The objects with their candidates.
+            ego: Who plays the ego.
+            accept_unknown: Whether groups may be undecided.
+            budget: Steps; with a budget, objects are assigned in the order of the program.
+
+        Raises:
+            Exhausted: The budget is used up.
+        """
         due: dict[int, list[tuple[GroupPlan, frozenset[int]]]] = {}
         parts: dict[int, list[tuple[int, GroupPlan, frozenset[int]]]] = {}
-        wary: set[int] = set()
+        refuted: set[int] = set()
         if self.options.method == "auto":
             for group in plan.joint:
                 for part in group.parts:
@@ -268,7 +281,7 @@ class LabelSearch:
 
         def check(slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
             for whole, part, roles in parts.get(slot, ()):
-                ready = whole in wary and roles <= assignment.keys()
+                ready = whole in refuted and roles <= assignment.keys()
                 if ready and self._judge(part, assignment, 10 + len(assignment)) is Consistency.NO:
                     return Consistency.NO, roles
             for group, roles in due.get(slot, ()):
@@ -276,7 +289,7 @@ class LabelSearch:
                     answer = self._judge(group, assignment, 10 + len(assignment))
                     if answer is Consistency.NO:
                         # from now on its parts are looked at first
-                        wary.add(group.kind)
+                        refuted.add(group.kind)
                         return answer, self._blamed(group, assignment) if parts else roles
                     if answer is Consistency.UNKNOWN and not accept_unknown:
                         return Consistency.NO, roles
@@ -343,11 +356,11 @@ def _easy(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
     return pairs <= _FEW
 
 
-def _without(slots: list[Slot], doubtful: set[tuple[int, int]]) -> list[Slot]:
-    """The slots without doubtful candidates."""
-    if not doubtful:
+def _without(slots: list[Slot], undecided: set[tuple[int, int]]) -> list[Slot]:
+    """The slots without undecided candidates."""
+    if not undecided:
         return slots
-    return [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in doubtful)) for s in slots]
+    return [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in undecided)) for s in slots]
 
 
 def _accept(slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:

@@ -16,11 +16,9 @@ import os
 import random
 import resource
 import shutil
-import signal
 import sys
 import sysconfig
 import tempfile
-import time
 import traceback
 from collections import Counter
 from pathlib import Path
@@ -38,7 +36,7 @@ from scenicq.query.execution.run import Query
 from scenicq.store.dataset import open_dataset
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "fuzz"))
-from rounds import Round
+from rounds import Round, attend
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 SAMPLES = REPOSITORY / "sample_data"
@@ -218,20 +216,6 @@ def _child(name: str, folder: Path, seed: str) -> None:
     os._exit(status)
 
 
-def _attend(child: int) -> tuple[int, resource.struct_rusage, bool]:
-    """Wait for a process; one that takes too long is killed."""
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
-        done, status, usage = os.wait4(child, os.WNOHANG)
-        if done:
-            return status, usage, False
-        if time.monotonic() > deadline:
-            os.kill(child, signal.SIGKILL)
-            _, status, usage = os.wait4(child, 0)
-            return status, usage, True
-        time.sleep(0.005)
-
-
 def main() -> int:
     """Run cases until the time is over; the exit code says whether there was a crash."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -259,7 +243,7 @@ def main() -> int:
         child = os.fork()
         if child == 0:
             _child(name, folder, f"{options.seed}:{number}")
-        status, usage, hung = _attend(child)
+        status, usage, hung = attend(child, PATIENCE_S)
         spent = usage.ru_utime + usage.ru_stime
         attack.took(spent)
         said = (folder / "said.txt").read_text(errors="replace")
