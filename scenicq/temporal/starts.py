@@ -291,8 +291,7 @@ class StartSearch:
             if form.index >= 0:
                 x, y = places.observed(form.index, "position") or ((), ())
                 xy = list(zip(np.asarray(x).tolist(), np.asarray(y).tolist(), strict=True))
-                regions = () if form.region is None else (form.region,)
-                lookups.look_up(() if form.field is None else (form.field,), regions, xy)
+                lookups.look_up(() if form.field is None else (form.field,), form.regions, xy)
             found = form.evaluate_many(lambda number: _getter(places, number), columns, self.rest.options, lookups)
             holds &= np.asarray(found.holds, np.bool_)
             fails |= np.asarray(found.fails, np.bool_)
