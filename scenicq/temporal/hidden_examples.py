@@ -156,4 +156,4 @@ class Examples:
 
 
 def _place(leaf: Leaf) -> str:
-    return leaf.span.place if leaf.span else type(leaf).__name__
+    return leaf.span.mark if leaf.span else type(leaf).__name__

@@ -222,7 +222,7 @@ class HiddenRuns:
 
 
 def _place(leaf: Leaf) -> str:
-    return leaf.span.place if leaf.span else type(leaf).__name__
+    return leaf.span.mark if leaf.span else type(leaf).__name__
 
 
 def _within(joint: Sequence[Leaf], some: Sequence[Cell]) -> Node:

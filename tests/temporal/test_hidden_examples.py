@@ -24,7 +24,7 @@ TOLERANCE = 0.25
 @pytest.fixture(scope="module")
 def found(crossroads):
     options = QueryOptions(solver="portable", every=True)
-    return list(Query(open_dataset(crossroads), Source("program.scenic", PROGRAM), options).results())
+    return list(Query(open_dataset(crossroads), Source("a/folder/program.scenic", PROGRAM), options).results())
 
 
 def farthest(dataset, result):
