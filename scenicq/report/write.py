@@ -205,9 +205,14 @@ class _Report:
         inline = self.files.inside = frames <= INLINE
         self.files.most = max(1, THUMBNAILS // max(frames, 1))
         numbers = frame_numbers(dataset, {result.recording for result in (*shown, *near)})
-        over_time = any(each.interval is not None for each in shown)
-        found = interval_runs(self.query, shown, numbers) if over_time else find_runs(shown, numbers)
-        runs = [*found, *(FrameRun(r.recording, (r,), *numbers[r.frame]) for r in near)]
+        over_time = any(each.interval is not None for each in (*shown, *near))
+        if over_time:
+            runs = list(interval_runs(self.query, (*shown, *near), numbers))
+        else:
+            runs = [
+                *find_runs(shown, numbers),
+                *(FrameRun(r.recording, (r,), *numbers[r.frame]) for r in near),
+            ]
         cards = list(self.cards(runs, inline=inline))
         recordings = list(dict.fromkeys(run.recording for run in runs))
         left = len(results) - len(shown)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +107,21 @@ class AtomColumns:
         n = len(self.samples)
         values = np.where(status == DEFINED, data, np.nan)
         return np.broadcast_to(values, n).copy(), np.broadcast_to(status == UNOBSERVED, n).copy()
+
+    def observed(self, feature: Feature, sample: int) -> Value:
+        """What is observed of a feature at a sample; None if nothing is."""
+        column = self._feature(feature)
+        if column is None or column.status[sample] != DEFINED:
+            return None
+        match column.data:
+            case Coded(which, options):
+                return options[int(which[sample])]
+            case (x, y):
+                return float(x[sample]), float(y[sample])
+            case np.ndarray() as data:
+                return cast("float | bool", data[sample].item())
+            case _:
+                return None
 
     def _definition(self, feature: Feature) -> Node | None:
         if feature.property in MOVING or self._feature(feature) is not None:

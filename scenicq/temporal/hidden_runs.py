@@ -21,11 +21,12 @@ from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
 from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
+from scenicq.temporal.hidden_examples import Examples
 from scenicq.temporal.run_columns import RunColumns, Runs
 from scenicq.temporal.runs import Run
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.thresholds import thresholds_of
-from scenicq.temporal.truth import FALSE, UNKNOWN, Truth
+from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["Details", "HiddenRuns", "Remembered"]
 
@@ -94,7 +95,17 @@ class HiddenRuns:
         try:
             with limited(self.match.timeout_s):
                 best = list(self._over_cells(stretch, columns, expanded, joint, remember))
-        except (UnclearVariable, HiddenVariable, TimeIsUp) as error:
+        except UnclearVariable as error:
+            for start, number in enumerate(numbers):
+                # what the initial scene says of the variables may be enough
+                one = replace(
+                    stretch, starts=stretch.starts[start : start + 1], numbers=stretch.numbers[start : start + 1]
+                )
+                run, why, witness = self._by_examples(one, columns, expanded, remember(number), str(error))
+                details[number] = why, witness
+                yield run
+            return
+        except (HiddenVariable, TimeIsUp) as error:
             reason = "timeout" if isinstance(error, TimeIsUp) else str(error) or "a hidden random variable over time"
             for number, start in zip(numbers, starts, strict=True):
                 details[number] = reason, {}
@@ -131,6 +142,45 @@ class HiddenRuns:
                 yield replace(best, truth=int(UNKNOWN)), cell, "budget"
             else:
                 yield self._jointly(remember(number), joint, ranked)
+
+    def _by_examples(
+        self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: Remembered, unclear: str
+    ) -> tuple[Run, str, Mapping[str, WitnessValue]]:
+        """The run of one start by what its label says of the variables, else why it is unknown."""
+        label, correspondence = start
+        ego = self.scenario.objects[self.scenario.ego].name
+        given = {name: id_ for name, id_ in correspondence.items() if name != ego}
+        hanging = {number: each for number, each in enumerate(expanded) if any(True for _ in leaves(each))}
+        first = int(one.starts[0])
+        asked = Examples(self.scenario, self.match, self.solver, label, given, columns, hanging, first)
+        try:
+            with limited(self.match.timeout_s):
+                certain = asked.certain()
+                runs = None if certain is None else self._run(one, columns, expanded, certain)
+                if runs is not None and runs.truth != UNKNOWN:
+                    return runs, "", asked.found[0].witness if runs.truth == TRUE else {}
+        except (HiddenVariable, TimeIsUp):
+            pass
+        # an example is a proof, although others may be longer
+        found = [(self._run(one, columns, expanded, each.truth), each) for each in asked.found]
+        matches = [(run, each) for run, each in found if run.truth == TRUE]
+        if not matches:
+            return Run(first, len(one.labels) - 1, int(UNKNOWN)), unclear, {}
+        run, example = max(matches, key=lambda each: each[0].end)
+        return run, "", example.witness
+
+    def _run(self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], known: Mapping[int, Truth]) -> Run:
+        """The run of one start, given some conditions at each sample."""
+        values = dict(known)
+
+        def atom(each: Atom) -> Truth:
+            if each.number not in values:
+                values[each.number] = columns.truth_of(expanded[each.number])
+            return values[each.number]
+
+        runs = self.runs.follow(one, atom)
+        start, end = int(one.starts[0]), int(runs.ends[0])
+        return Run(start, end, int(runs.truth[0]), runs.broken[0], bool(runs.cut_off[0]))
 
     def _in_cell(self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node]) -> Runs:
         known: dict[int, Truth] = {}
@@ -172,7 +222,7 @@ class HiddenRuns:
 
 
 def _place(leaf: Leaf) -> str:
-    return leaf.span.place if leaf.span else type(leaf).__name__
+    return leaf.span.mark if leaf.span else type(leaf).__name__
 
 
 def _within(joint: Sequence[Leaf], some: Sequence[Cell]) -> Node:

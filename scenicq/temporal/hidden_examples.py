@@ -1,0 +1,159 @@
+"""Runs whose conditions hang on random variables in ways that no cells tell apart, such as a hidden point.
+
+The matcher gives one example of values with which the label at the start matches. With it every condition has a value
+at every sample, and the matcher is asked for others: values with which some of these turn out otherwise, many at once,
+then fewer. What no values turn is certain, however the variables come out; what some turn is unknown. A run that is
+decided so is decided for all values, and one of an example that matches is a proof.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from scenicq.budget import look
+from scenicq.forest.build import constant
+from scenicq.forest.nodes import Feature, Identity, Leaf, Logic, LogicOp, Node, Value
+from scenicq.forest.scenario import Requirement, Scenario
+from scenicq.forest.walk import leaves, postorder, transform
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.verdict import Match, NoMatch, WitnessValue
+from scenicq.smt.answer import Solver
+from scenicq.store.labels import Label
+from scenicq.temporal.atoms import AtomColumns
+from scenicq.temporal.truth import TRUE, UNKNOWN, Truth
+
+__all__ = ["Example", "Examples"]
+
+_MOST_ASKED = 64
+"""Questions to the matcher for one start."""
+
+_Place = tuple[int, int]
+"""The number of a condition and a sample."""
+
+
+@dataclass(frozen=True, slots=True)
+class Example:
+    """Values of random variables with which a label matches.
+
+    Attributes:
+        values: Of the variables of conditions over time.
+        witness: Of all, by their place in the program.
+        truth: What they make of each condition that hangs on them, at each sample.
+    """
+
+    values: Mapping[Identity, Value]
+    witness: Mapping[str, WitnessValue]
+    truth: Mapping[int, Truth]
+
+
+@dataclass(slots=True)
+class Examples:
+    """What the values of random variables can make of conditions, for one start.
+
+    Attributes:
+        scenario: The scenario, without what it says of time.
+        match: Options of the matcher.
+        solver: Decides what is not decided otherwise.
+        label: The label at the start.
+        given: The label object of each object but the ego, by name.
+        columns: Over the samples.
+        conditions: Those that hang on random variables, expanded, by number.
+        first: The sample of the start.
+        found: Examples so far.
+    """
+
+    scenario: Scenario
+    match: MatchOptions
+    solver: Solver | None
+    label: Label
+    given: Mapping[str, str]
+    columns: AtomColumns
+    conditions: Mapping[int, Node]
+    first: int
+    found: list[Example] = field(default_factory=list[Example])
+    _asked: int = 0
+
+    def certain(self) -> Mapping[int, Truth] | None:
+        """For each condition its value at each sample where it has only one, else unknown; None without an example."""
+        if self._ask(None) is not True:
+            return None
+        base = self.found[0].truth
+        samples = range(self.first, len(self.columns.samples))
+        hanging = [(n, k) for n in self.conditions for k in samples if base[n][k] != UNKNOWN]
+        open_: set[_Place] = set()
+        stack = [hanging] if hanging else []
+        while stack:
+            look()
+            block = [each for each in stack.pop() if each not in open_]
+            if not block:
+                continue
+            # what is not all observed can come out otherwise for all that is known
+            open_ |= {(n, k) for n, k in block if not self._is_observed(n, k)}
+            block = [each for each in block if each not in open_]
+            if not block:
+                continue
+            answer = self._ask([self._otherwise(n, k, holds=bool(base[n][k] == TRUE)) for n, k in block])
+            if answer is False:
+                continue
+            if answer is True:
+                other = self.found[-1].truth
+                turned = {(n, k) for n, k in block if other[n][k] != base[n][k]}
+                if turned:
+                    open_ |= turned
+                    stack.append(block)
+                    continue
+            if len(block) == 1:
+                open_.add(block[0])
+            else:
+                stack += [block[: len(block) // 2], block[len(block) // 2 :]]
+        certain = {number: truth.copy() for number, truth in base.items()}
+        for number, sample in open_:
+            certain[number][sample] = UNKNOWN
+        return certain
+
+    def _ask(self, some: Sequence[Node] | None) -> bool | None:
+        """Whether there are values for which one of some conditions holds, which are kept; None if not known."""
+        if self._asked >= _MOST_ASKED:
+            return None
+        self._asked += 1
+        wanted: list[Requirement] = []
+        if some is not None:
+            wanted = [Requirement(some[0] if len(some) == 1 else Logic(LogicOp.OR, tuple(some)), None)]
+        scenario = replace(self.scenario, requirements=(*self.scenario.requirements, *wanted), dynamics=None)
+        verdict = Matcher(scenario, self.match, self.solver).match(self.label, given=self.given)
+        if isinstance(verdict, NoMatch):
+            return False
+        if not isinstance(verdict, Match):
+            return None
+        values: dict[Identity, Value] = {}
+        for leaf in leaves(*self.conditions.values()):
+            value = verdict.witness.get(_place(leaf))
+            if value is None:
+                return None
+            values[leaf.identity] = value
+        columns = self.columns.assigned(values)
+        truth = {number: columns.truth_of(each) for number, each in self.conditions.items()}
+        self.found.append(Example(values, verdict.witness, truth))
+        return True
+
+    def _is_observed(self, number: int, sample: int) -> bool:
+        """Whether all that a condition reads is observed at a sample."""
+        nodes = postorder((self.conditions[number],))
+        read = [each for each in nodes if isinstance(each, Feature) and each.current]
+        return all(self.columns.observed(each, sample) is not None for each in read)
+
+    def _otherwise(self, number: int, sample: int, *, holds: bool) -> Node:
+        """That a condition comes out otherwise at a sample."""
+
+        def observed(node: Node) -> Node:
+            # what is read at the start is observed by the label
+            return constant(self.columns.observed(node, sample)) if isinstance(node, Feature) and node.current else node
+
+        here = transform(self.conditions[number], observed)
+        return Logic(LogicOp.NOT, (here,)) if holds else here
+
+
+def _place(leaf: Leaf) -> str:
+    return leaf.span.mark if leaf.span else type(leaf).__name__

@@ -1,0 +1,75 @@
+"""Conditions over time that hang on a hidden point: what the first frame says of it decides them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from scenicq.errors import Source
+from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.store.dataset import open_dataset
+
+PROGRAM = """model scenic.domains.driving.model
+spot = new Point on road
+ego = new Car
+other = new Car at spot offset by (Range(-2, 2), 0)
+require 5 < (distance to other) < 30
+terminate when (distance to spot) > 40
+"""
+TOLERANCE = 0.25
+
+
+@pytest.fixture(scope="module")
+def found(crossroads):
+    options = QueryOptions(solver="portable", every=True)
+    return list(Query(open_dataset(crossroads), Source("a/folder/program.scenic", PROGRAM), options).results())
+
+
+def farthest(dataset, result):
+    """How far the point may be from the ego, at each sample of an interval: the least and the greatest distance."""
+    frames = {label.frame: label for label in dataset.labels()}
+    mine = [label for label in frames.values() if label.recording == result.recording]
+    mine = sorted((each for each in mine if each.timestamp_us >= result.timestamp_us), key=lambda e: e.timestamp_us)
+    roles = result.verdict.partial if isinstance(result.verdict, NoMatch) else result.verdict.correspondence
+    other = next(each for each in mine[0].objects if roles["other"] in (each.track, each.id))
+    spots = [(other.x - n / 10, other.y) for n in range(-20, 21)]
+    spans = []
+    for label in mine[: result.interval.count]:
+        away = [math.dist((label.ego.x, label.ego.y), spot) for spot in spots]
+        spans.append((min(away) - TOLERANCE, max(away) + TOLERANCE))
+    return mine, spans
+
+
+def test_nothing_is_left_unknown_and_both_verdicts_are_there(found):
+    assert {type(each.verdict) for each in found} == {Match, NoMatch}
+
+
+def test_a_match_is_proven_by_its_point(found, crossroads):
+    dataset = open_dataset(crossroads)
+    for each in found:
+        if isinstance(each.verdict, Match):
+            mine, _ = farthest(dataset, each)
+            spot = each.verdict.witness["program.scenic:2:18"]
+            away = [math.dist((label.ego.x, label.ego.y), spot) for label in mine[: each.interval.count]]
+            assert away[-1] > 40
+            assert max(away[:-1]) <= 40
+
+
+def test_what_is_cut_off_has_no_point_that_ends_it(found, crossroads):
+    dataset = open_dataset(crossroads)
+    cut = [each for each in found if isinstance(each.verdict, NoMatch)]
+    assert cut
+    for each in cut:
+        assert each.verdict.cause.what == "recording-ends"
+        _, spans = farthest(dataset, each)
+        assert all(least <= 40 + TOLERANCE for least, _ in spans)
+
+
+def test_a_variable_of_which_the_first_frame_says_nothing_stays_unknown(crossroads):
+    program = PROGRAM.replace("at spot offset by (Range(-2, 2), 0)", "with regionContainedIn None")
+    options = QueryOptions(solver="portable", every=True)
+    results = list(Query(open_dataset(crossroads), Source("program.scenic", program), options).results())
+    assert {type(each.verdict) for each in results} == {Unknown}
+    assert {each.verdict.reason for each in results} == {"a hidden random point in a condition over time"}
