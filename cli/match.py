@@ -110,8 +110,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--all-matches", is_flag=True, help="One line for each correspondence by which a frame matches, "
               "interchangeable objects in one order only.")
 @click.option("--near", metavar="K", type=click.IntRange(1), help="Show the K frames, too, that do not match but come "
-              "closest, each with the tolerance under which it would; over time K recordings, each with the tolerance "
-              "or the number of the program with which it would.")
+              "closest, each with the tolerance under which it would; over time K recordings, each with the tolerance, "
+              "the number of the program or the duration with which it would.")
 @click.option("--rank", is_flag=True, help="Order matches from typical to borderline: by the density with which the "
               "program generates what the label observes.")
 @click.option("--sample", metavar="N", type=click.IntRange(1), help="Show N of the matches, drawn at random.")

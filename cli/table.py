@@ -182,7 +182,7 @@ def _wrapped(table: list[Row], kept: list[int], width: int) -> list[str]:
 
 def _cells(record: Mapping[str, Any]) -> Row:
     cause = record.get("cause", {})
-    near = cause.get("what") in ("tolerance", "program")
+    near = cause.get("what") in ("tolerance", "program", "--min-duration")
     density = record.get("log_density")
     why = (
         f"{density:.2f}" if density is not None else cause.get("reason") or cause.get("detail" if near else "what", "")

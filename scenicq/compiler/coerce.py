@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -98,14 +99,19 @@ def kind_of_model(value: ModelValue) -> Kind | None:
     return None
 
 
+_VELOCITY = re.compile(r"([\w.]+)\.velocity\b")
+
+
 def _need(value: ModelValue, what: str, span: Span | None) -> Exception:
     shown = describe(value)
     if is_node(value):
         shown = {"other": "a value", "boolean": "a truth value"}.get(kind_of(value), f"a {kind_of(value)}")
-    pair = isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 2 and "number" in what
-    return fail("wrong-type", f"{what} is needed here, not {shown}", span, f"this is {shown}",
-                ("`Range(a, b)` is a random number of an interval; only Scenic 1 spells it `(a, b)`: `--scenic 1`",)
-                if pair else ())  # fmt: skip
+    hints: tuple[str, ...] = ()
+    if isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 2 and "number" in what:
+        hints = ("`Range(a, b)` is a random number of an interval; only Scenic 1 spells it `(a, b)`: `--scenic 1`",)
+    elif "number" in what and span is not None and (vector := _VELOCITY.search(span.text)):
+        hints = (f"`{vector[1]}.speed` is a number",)
+    return fail("wrong-type", f"{what} is needed here, not {shown}", span, f"this is {shown}", hints)
 
 
 def to_node(value: ModelValue, span: Span | None) -> Node:

@@ -279,7 +279,8 @@ def existing(value: ModelValue, span: Span | None) -> Node:
 def _lacking(value: object) -> tuple[str, ...]:
     """What an area consists of, if none of it is on the map."""
     if isinstance(value, PolygonSet | PolylineSet):
-        return () if value.pieces else (value.name,)
+        # `road` is the area that one can drive on
+        return () if value.pieces else ("road" if value.name == "drivable" else value.name,)
     if isinstance(value, UnionOf):
         parts = [_lacking(part) for part in value.parts]
         return tuple(name for names in parts for name in names) if all(parts) else ()

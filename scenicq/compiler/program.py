@@ -5,6 +5,7 @@ A scenario is compiled once per map: the road network is part of the program's w
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -118,6 +119,8 @@ def _compiled(
 
 
 _IMPORTS = (ast.Import, ast.ImportFrom, ast.Model)
+_OWNER = re.compile(r"[\w.]+\.$")
+"""What stands before an attribute."""
 
 
 def _start(source: Source) -> Span:
@@ -245,7 +248,7 @@ def _scenario(
     requirements = [
         _written(_at_the_end(requirement.condition, requirement.span), requirement.span) for requirement in hard
     ]
-    requirements += [_written(condition, span) for condition, span in run.excluded.conditions()]
+    requirements += [_written(condition, _with_owner(span)) for condition, span in run.excluded.conditions()]
     requirements = [requirement for requirement in requirements if requirement is not None]
     requirements += _built_in(run, ego)
     ego.label = ego.label or "ego"
@@ -339,6 +342,12 @@ def _mutated(instance: Instance) -> frozenset[str]:
     if is_zero(scale):
         return frozenset()
     return frozenset(name for name in ("position", "heading") if not is_zero(instance.properties[f"{name}StdDev"]))
+
+
+def _with_owner(span: Span) -> Span:
+    """The place of an attribute, with what it is one of: `ego.lane`, where the attribute alone is underlined."""
+    owner = _OWNER.search(span.source.text[: span.start])
+    return Span(span.source, owner.start(), span.end) if owner else span
 
 
 def _written(condition: Node, span: Span) -> Requirement | None:

@@ -1,7 +1,7 @@
 """Elements of a road network, with the attribute names of Scenic's driving domain.
 
 Scenario programs read these attributes by name, so the spelling (`laneGroups`, `_laneToLeft`) is Scenic's. The objects
-refer to each other in circles; `linking.py` fills the references in once and nothing changes them afterwards.
+refer to each other in circles; `network_builder` fills the references in once and nothing changes them afterwards.
 """
 
 # Scenic's own names, which programs use, are in mixed case.

@@ -259,10 +259,13 @@ def _link_lanes(features: list[MapFeature], elements: Elements) -> None:
 
 
 def _link_intersections(features: list[MapFeature], elements: Elements) -> None:
+    roads: dict[Intersection | None, list[Road]] = {}
+    for road in elements.roads.values():
+        roads.setdefault(road.intersection, []).append(road)
     for feature in features:
         crossing = elements.intersections[feature.id]
         named = _found(elements.roads, feature, "roads")
-        inside = [road for road in elements.roads.values() if road.intersection is crossing]
+        inside = roads.get(crossing, [])
         # Scenic counts the roads that meet; those inside only stand in where the map names none
         crossing.roads = named or tuple(inside)
         crossing.lanes = tuple(lane for road in inside for lane in road.lanes)

@@ -192,9 +192,12 @@ def _too_large(scenario: Scenario, requirement: Requirement) -> Iterator[Diagnos
             continue
         short, long = sorted((width, length))
         if not any(_fits(region, short, long) for region in regions if isinstance(region, PolygonSet)):
-            name = cast("PolygonSet | PolylineSet", regions[0]).name if len(regions) == 1 else "any of these"
+            # what the program calls it is what stands there; the map may call it otherwise
+            written = " ".join(node.span.text.split()).rpartition(" in ")[2] if node.span is not None else ""
+            name = written or cast("PolygonSet | PolylineSet", regions[0]).name
+            where = f"`{name}`" if len(regions) == 1 else "any of these"
             yield _warning(
-                "box-cannot-fit", f"a box of {width:.3g} m by {length:.3g} m fits nowhere into `{name}`",
+                "box-cannot-fit", f"a box of {width:.3g} m by {length:.3g} m fits nowhere into {where}",
                 requirement.span, "the whole box must lie inside",
                 "`X.position in R` asks of the centre of `X` alone",
             )  # fmt: skip

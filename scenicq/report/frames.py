@@ -60,9 +60,13 @@ def _roles(shot: Shot) -> str:
         where: list[str] = []
         if ego is not None and member is not ego and ego.heading is not None:
             right, ahead = rotate(member.x - ego.x, member.y - ego.y, -ego.heading)
-            where = [f"{ahead:+z.1f} m ahead", f"{right:+z.1f} m right"]
+            where = [
+                f"{abs(ahead):.1f} m {'behind' if ahead < 0 else 'ahead'}",
+                f"{abs(right):.1f} m {'left' if right < 0 else 'right'}",
+            ]
             if member.heading is not None:
-                where.append(f"{math.degrees(normalize(member.heading - ego.heading)):+z.0f}\N{DEGREE SIGN} turned")
+                turned = math.degrees(normalize(member.heading - ego.heading))
+                where.append(f"turned {abs(turned):.0f}\N{DEGREE SIGN} {'right' if turned < 0 else 'left'}")
         name = element("span", escape(role.name), class_=f"chip {role.colour}")
         played = element("span", escape(member.id), class_="id") + element(
             "div", escape(member.category), class_="time"

@@ -154,18 +154,18 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
     """
     others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], objects, "")
     egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)], frames, "ego_")
-    channels = zip(_values(sensors, "channel"), _values(sensors, "path"), cameras_of(sensors), strict=True)
-    first = 0
+    channels, paths, cameras = _values(sensors, "channel"), _values(sensors, "path"), [*cameras_of(sensors)]
+    first = first_sensor = 0
     columns = [_values(frames, name) for name in LABEL_COLUMNS]
     for ego, (frame, recording, time, map_name, params, count, sensor_count, *_) in zip(
         egos, zip(*columns, strict=True), strict=True
     ):
-        files = [next(channels) for _ in range(sensor_count)]
-        paths = {channel: path for channel, path, _ in files}
-        cameras = {channel: camera for channel, _, camera in files if camera is not None}
-        mine = tuple(others[first : first + count])
-        first += count
-        yield Label(frame, recording, time, map_name, ego, mine, params, paths, cameras)
+        mine, end = tuple(others[first : first + count]), first_sensor + sensor_count
+        names, seeing = channels[first_sensor:end], cameras[first_sensor:end]
+        files = dict(zip(names, paths[first_sensor:end], strict=True))
+        known = {name: camera for name, camera in zip(names, seeing, strict=True) if camera is not None}
+        first, first_sensor = first + count, end
+        yield Label(frame, recording, time, map_name, ego, mine, params, files, known)
 
 
 def _motions(table: ArrowTable, prefix: str) -> Iterable[Motion | None]:
@@ -232,7 +232,10 @@ def _values(table: ArrowTable, name: str) -> list[Any]:
     if column.null_count == len(column):
         return [{} if is_json else None] * len(column)
     if is_json and not pa.types.is_dictionary(column.type):
-        column = column.dictionary_encode()
+        # to make a dictionary of it pyarrow would load another module
+        texts_: list[str | None] = column.to_pylist()
+        read: dict[str | None, Any] = {text: {} if text is None else json.loads(text) for text in set(texts_)}
+        return [read[text] for text in texts_]
     if pa.types.is_dictionary(column.type):
         values: list[Any] = []
         for chunk in column.chunks:

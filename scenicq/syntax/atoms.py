@@ -14,6 +14,7 @@ __all__ = ["AtomParser"]
 
 _VALUES = {"True": True, "False": False, "None": None}
 _FOREIGN = {"&&": "write `and`", "||": "write `or`", "<>": "write `!=`", "++": "write `+= 1`"}
+_ORDER = frozenset({"<", ">", "<=", ">=", "==", "!=", "="})
 
 
 class AtomParser(BindingParser):
@@ -52,6 +53,9 @@ class AtomParser(BindingParser):
                 raise self.fail("a lambda needs parentheses here")
             case text:
                 hint = _FOREIGN.get(f"{self.tokens[self.index - 1].text}{text}", "")
+                if text in _ORDER and self.index > 1 and self.tokens[self.index - 2].text == "with":
+                    name = self.tokens[self.index - 1].text
+                    hint = f"`with {name} Range(a, b)` gives an interval; `require X.{name} {text} ...` compares"
                 message = f"`{text}` cannot start an expression"
                 raise self.fail(message, label="an expression is missing here", hint=hint)
 

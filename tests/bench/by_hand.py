@@ -23,6 +23,7 @@ from fleet import Fleet, write_store
 from hand_sql import MACROS, QUESTIONS
 
 from scenicq.errors import Source
+from scenicq.garbage import seldom_collected
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match
 from scenicq.query.execution.results import record
@@ -70,6 +71,8 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=100_000)
     parser.add_argument("--stores", type=Path)
     given = parser.parse_args()
+    # as in the process of the command
+    seldom_collected()
     rows: list[dict[str, object]] = []
     with tempfile.TemporaryDirectory() as temporary:
         store = (given.stores or Path(temporary)) / f"{given.frames}"

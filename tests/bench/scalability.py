@@ -37,7 +37,7 @@ from scenicq.forest.scenario import Scenario  # noqa: E402
 from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
-from scenicq.match.verdict import Match  # noqa: E402
+from scenicq.match.verdict import Match, Unknown, Verdict  # noqa: E402
 from scenicq.smt.answer import Answer, NoAnswer, SolverSession  # noqa: E402
 from scenicq.smt.formula import Problem  # noqa: E402
 from scenicq.smt.pool import WorkerSolver  # noqa: E402
@@ -110,7 +110,7 @@ class Patient:
 
 
 @dataclass(frozen=True, slots=True)
-class HeadingAssignment:
+class Decider:
     """A way to decide labels.
 
     Attributes:
@@ -144,7 +144,7 @@ def labels(scenario: Scenario, size: int) -> Iterator[tuple[Label, Label]]:
         yield Label("frame", "recording", 0, "street", shuffled.ego, tuple(ordered)), shuffled
 
 
-def measured(way: HeadingAssignment, given: list[Label], solver: Patient) -> tuple[float, bool]:
+def measured(way: Decider, given: list[Label], solver: Patient) -> tuple[float, bool]:
     """Mean seconds a label, and whether one was cut off; no label is begun once the patience is used up."""
     solver.apart = way.apart
     started = cpu_s()
@@ -152,12 +152,12 @@ def measured(way: HeadingAssignment, given: list[Label], solver: Patient) -> tup
         # reading the clock for each label would count as much as the label
         solver.deadline = math.inf
         for label in given:
-            assert way.decide(label), "a sampled label must match"
+            assert way.decide(label), f"a sampled label must match: {way.name}"
         return (cpu_s() - started) / len(given), False
     for done, label in enumerate(given, 1):
         solver.begin()
         try:
-            assert way.decide(label), "a sampled label must match"
+            assert way.decide(label), f"a sampled label must match: {way.name}"
         except OutOfTime:
             return (cpu_s() - started) / done, True
         if cpu_s() - started > solver.patience_s:
@@ -165,26 +165,31 @@ def measured(way: HeadingAssignment, given: list[Label], solver: Patient) -> tup
     return (cpu_s() - started) / len(given), False
 
 
-def ways(scenario: Scenario, solver: Patient) -> list[HeadingAssignment]:
+def _matched(verdict: Verdict) -> bool:
+    """Whether a label matches; the matcher looks at a clock of its own, too."""
+    if isinstance(verdict, Unknown) and verdict.reason == "timeout":
+        raise OutOfTime
+    return isinstance(verdict, Match)
+
+
+def ways(scenario: Scenario, solver: Patient) -> list[Decider]:
     """All the ways to decide labels of a scenario."""
     given = {thing.name: f"object-{thing.index}" for thing in scenario.objects if thing.index != scenario.ego}
 
     def matcher(method: Method) -> Matcher:
         return Matcher(scenario, MatchOptions(method=method, timeout_s=solver.patience_s), solver)
 
-    def ours(method: Method) -> HeadingAssignment:
+    def ours(method: Method) -> Decider:
         made = matcher(method)
-        return HeadingAssignment(f"{method}, shuffled", lambda label: isinstance(made.match(label), Match))
+        return Decider(f"{method}, shuffled", lambda label: _matched(made.match(label)))
 
-    def published(variant: Variant) -> HeadingAssignment:
+    def published(variant: Variant) -> Decider:
         options = MatchOptions(timeout_s=solver.patience_s)
 
         def decide(label: Label) -> bool:
             return matches(scenario, label, variant, solver, options, solver.tick)
 
-        return HeadingAssignment(
-            variant.name, decide, apart=solver.apart_from[variant.whole] if variant.process else None
-        )
+        return Decider(variant.name, decide, apart=solver.apart_from[variant.whole] if variant.process else None)
 
     auto = matcher("auto")
 
@@ -192,8 +197,8 @@ def ways(scenario: Scenario, solver: Patient) -> list[HeadingAssignment]:
         return lambda label: isinstance(auto.match(label, given=known), Match)
 
     own = [
-        HeadingAssignment(KNOWN, by_auto(given), known=True, rounds=ROUNDS),
-        HeadingAssignment(SHUFFLED, by_auto({}), rounds=ROUNDS),
+        Decider(KNOWN, by_auto(given), known=True, rounds=ROUNDS),
+        Decider(SHUFFLED, by_auto({}), rounds=ROUNDS),
     ]
     return own if solver.alone else [*own, ours("smt"), ours("monolithic"), *map(published, VARIANTS)]
 

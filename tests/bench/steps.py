@@ -63,6 +63,8 @@ CHAINS = {
     "    last = new Car right of center by shift",
     "right edge": "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car on lane.centerline\n"
     "spot = new OrientedPoint on lane.rightEdge\nother = new Car left of spot by 0.5, facing roadDirection",
+    "near a junction": "spot = new Point on road\nrequire 4 < (distance from spot to intersection) < 20\n"
+    "ego = new Car at spot + (Range(-1, 1) @ Range(-1, 1))\nother = new Car ahead of ego by Range(4, 9)",
     "crowd of 24": "ego = new Car on road\nfor i in range(24):\n"
     "    new Pedestrian offset by (Range(-5, 5), Range(2, 60)), facing Range(-120, 120) deg relative to ego.heading",
 }
@@ -102,6 +104,7 @@ STEPS: dict[str, Off] = {
     "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
     "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
     "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
+    "trial": _set(field_solver, "probed", lambda *_: None),
     "heading propagation": _set(field_solver, "decide_directions", _undecided),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
 }

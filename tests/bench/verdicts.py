@@ -15,7 +15,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
@@ -85,6 +85,13 @@ def _labels(scenario: Scenario, seeds: Sequence[int]) -> Iterator[tuple[str, Lab
             yield f"{seed}, displaced", replace(whole, objects=tuple(moved))
 
 
+def _shown_label(label: Label) -> str:
+    """What is known of the objects: what is not says nothing, so that records outlive new columns."""
+    objects = (label.ego, *label.objects)
+    known = [{each.name: getattr(one, each.name) for each in fields(one)} for one in objects]
+    return repr([[(name, value) for name, value in one.items() if value not in (None, (), {})] for one in known])
+
+
 def _shown(verdict: Verdict) -> Record:
     match verdict:
         case Match(correspondence, witness):
@@ -106,7 +113,7 @@ def records() -> Iterator[Record]:
         for text, each in options.items():
             matcher = Matcher(scenario, each)
             for variant, label in labels:
-                digest = hashlib.sha256(repr((label.ego, label.objects)).encode()).hexdigest()[:12]
+                digest = hashlib.sha256(_shown_label(label).encode()).hexdigest()[:12]
                 asked: Record = {"asked": f"{name} | {variant} | {text}", "label": digest}
                 # through JSON, so that what is compared is what is written
                 yield json.loads(json.dumps(asked | _shown(matcher.match(label))))

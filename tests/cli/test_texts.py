@@ -117,6 +117,8 @@ FIRST_DRAFTS = {
     "in front of": "other = new Car\nrequire other in front of ego",
     "lane beside": "new Car on ego.lane.leftLane",
     "absence": "require all([(distance from ego to each) > 20 for each in vehicles])",
+    "velocity": "other = new Car\nrequire other.velocity > 5",
+    "with above": "other = new Car with speed > 10",
     "no model": "",
 }
 

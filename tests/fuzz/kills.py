@@ -16,12 +16,19 @@ from rounds import Round, cpu_seconds
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = str(ROOT / "sample_data/scenarios/02_crossing_cars.scenic")
+COMMAND = str(Path(sys.executable).with_name("scenicq"))
 _HANGS_S = 1800.0
 """After so long a run hangs, on however busy a machine."""
 
 
-def writers(work: Path, sound: Path) -> dict[str, tuple[list[str], Path]]:
-    """Every command that writes, with what it writes."""
+def writers(work: Path, sound: Path, pieces: Path) -> dict[str, tuple[list[str], Path]]:
+    """Every command that writes, with what it writes.
+
+    Args:
+        work: Where to; a copy of the dataset is there.
+        sound: The dataset.
+        pieces: What a run in shards has left of it.
+    """
     return {
         "ingest": (["ingest", str(ROOT / "sample_data/crossroads"), str(work / "made"), "-q"], work / "made"),
         "index": (["index", str(work / "copy"), "-q"], work / "copy"),
@@ -30,6 +37,9 @@ def writers(work: Path, sound: Path) -> dict[str, tuple[list[str], Path]]:
         "report": (["match", PROGRAM, str(sound), "--report", str(work / "report")], work / "report"),
         "shard": (["match", PROGRAM, str(sound), "--shard", "1/1", "-o", str(work / "pieces")], work / "pieces"),
         "export": (["match", PROGRAM, str(sound), "--export", "interchange", str(work / "handed")], work / "handed"),
+        "gather": (["gather", str(pieces), "-o", str(work / "whole.jsonl")], work / "whole.jsonl"),
+        "sample": (["sample", PROGRAM, str(sound), "-n", "3", "-o", str(work / "drawn")], work / "drawn"),
+        "show": (["show", str(sound), "03-busy-intersection/09", "-o", str(work / "frame.svg")], work / "frame.svg"),
     }
 
 
@@ -40,7 +50,6 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     chance = random.Random(options.seed)
-    command = str(Path(sys.executable).with_name("scenicq"))
     outcomes: Counter[str] = Counter()
     ended: Counter[str] = Counter()
     attack = Round(
@@ -49,28 +58,24 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         base = Path(name)
         environment = {**os.environ, "XDG_STATE_HOME": str(base / "state")}
-        sound = base / "sound"
-        subprocess.run([command, "ingest", str(ROOT / "sample_data/crossroads"), str(sound), "-q"], check=True,
-                       env=environment)  # fmt: skip
+        sound, pieces = base / "sound", base / "pieces"
+        for words in (
+            ["ingest", str(ROOT / "sample_data/crossroads"), str(sound), "-q"],
+            ["match", PROGRAM, str(sound), "--shard", "1/1", "-o", str(pieces)],
+        ):
+            subprocess.run([COMMAND, *words], check=True, env=environment, stderr=subprocess.DEVNULL)
         took: dict[str, float] = {}
         while attack.goes_on():
             work = base / "work"
             work.mkdir()
             shutil.copytree(sound, work / "copy")
-            words, target = chance.choice(sorted(writers(work, sound).values()))
-            kind = words[0] if words[0] != "match" else target.name
+            kind, (words, target) = chance.choice(sorted(writers(work, sound, pieces).items()))
             began, cost = time.monotonic(), cpu_seconds()
-            running = subprocess.Popen([command, *words], env=environment, stdout=subprocess.DEVNULL,
-                                       stderr=subprocess.DEVNULL)  # fmt: skip
-            try:
-                # the first of a kind goes on to its end, which shows how long there is to kill the others
-                running.wait(chance.uniform(0.0, took[kind]) if kind in took else _HANGS_S)
+            # the first of a kind goes on to its end, which shows how long there is to kill the others
+            if not killed(words, environment, chance.uniform(0.0, took[kind]) if kind in took else _HANGS_S):
                 took[kind] = time.monotonic() - began
                 ended[kind] += 1
-            except subprocess.TimeoutExpired:
-                running.send_signal(signal.SIGKILL)
-                running.wait()
-            outcome = _after(command, words, target, environment)
+            outcome = outcome_after(words, target, environment)
             attack.took(cpu_seconds() - cost)
             outcomes[outcome] += 1
             if outcome != "mended":
@@ -79,17 +84,29 @@ def main() -> None:
     sys.exit(outcomes.total() != outcomes["mended"])
 
 
-def _after(command: str, words: list[str], target: Path, environment: dict[str, str]) -> str:
+def killed(words: list[str], environment: dict[str, str], after_s: float) -> bool:
+    """Run a command and kill it after some seconds; whether it had not ended by itself."""
+    running = subprocess.Popen([COMMAND, *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        running.wait(after_s)
+    except subprocess.TimeoutExpired:
+        running.send_signal(signal.SIGKILL)
+        running.wait()
+        return True
+    return False
+
+
+def outcome_after(words: list[str], target: Path, environment: dict[str, str]) -> str:
     """What the next run of the same command makes of what a killed one has left."""
     more = ["--force"] if words[0] == "ingest" else []
-    if words[0] == "match" and "--export" in words and target.exists():
+    if (words[0] == "sample" or "--export" in words) and target.exists():
         shutil.rmtree(target)  # it is there completely, and is not written over
-    done = subprocess.run([command, *words, *more], env=environment, capture_output=True, text=True, timeout=_HANGS_S,
+    done = subprocess.run([COMMAND, *words, *more], env=environment, capture_output=True, text=True, timeout=_HANGS_S,
                           check=False)  # fmt: skip
     if done.returncode != 0:
         return f"exit {done.returncode} {done.stderr[:200]}"
     if words[0] in ("ingest", "index"):
-        told = subprocess.run([command, "info", str(target), "--verify"], env=environment, capture_output=True,
+        told = subprocess.run([COMMAND, "info", str(target), "--verify"], env=environment, capture_output=True,
                               check=False)  # fmt: skip
         if told.returncode:
             return "not sound"

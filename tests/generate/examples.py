@@ -21,8 +21,6 @@ TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent
 CROSSROADS = next((ROOT / "sample_data" / "crossroads" / "maps").glob("*.geojson"))
 _FENCE = re.compile(r"^```scenic(?P<options>[^\n]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
-# pages about what happens over time, which no scene shows: `tests/conformance/traces.py` draws what their like describe
-_OVER_TIME = {"dynamic", "cookbook-over-time"}
 # what the papers print is a fragment in some places: the lines that they leave to the reader
 _BEFORE = {
     "car left of spot": "ego = Car\nspot = OrientedPoint on curb\n",
@@ -89,8 +87,6 @@ def _everything() -> Iterator[Example]:
     for name, text in paper_programs().items():
         yield Example(f"paper:{name}", text)
     for path in [ROOT / "README.md", *sorted((TESTS / "language").glob("*.md"))]:
-        if path.stem in _OVER_TIME:
-            continue
         page = path.read_text(encoding="utf-8")
         for block in _FENCE.finditer(page):
             options = block["options"].split()

@@ -1,28 +1,31 @@
 """Coverage by mutation: small changes of `match/`, `query/prefilter` and `forest/`, and whether fast tests notice them.
 
-A survey comes first: all tests that may notice are run once without a change, and which fast one runs which line is
-kept. Each change is then made in a copy of the package, and the tests that run its line are run against it, the
-cheapest first, as many as cost half a minute without a change. A run that takes much longer than without a change
-counts as noticed, for a change may make a loop endless. Survivors are printed to be read. In the end the tests that
-have noticed something are run without a change once more: they must pass.
+A survey comes first: tests that may notice are run once without a change, and which fast one runs which line is kept.
+Each change is then made in a forked process, whose functions get the changed code, and the tests that run its line are
+run there, the cheapest first, as many as cost some seconds without a change; what is outside of functions is changed in
+a copy of the package. A run that takes much longer than without a change counts as noticed, for a change may make a
+loop endless. Survivors are printed to be read. In the end the tests that have noticed something are run without a
+change once more: they must pass.
 """
 
 import argparse
 import ast
-import importlib
+import gc
 import json
 import os
 import random
 import resource
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
-import time
+import traceback
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from types import CodeType, FunctionType
 from typing import Any
 
 import coverage
@@ -33,12 +36,8 @@ CHANGED = ("match", "query/prefilter", "forest")
 """The folders of the package that are changed."""
 TESTS = ("tests/forest", "tests/match", "tests/query", "tests/compiler")
 """The tests that may notice."""
-_ENOUGH_S = 30.0
-"""So many CPU seconds of tests are run against a change."""
-_SLOWEST_S = 3.0
+_SLOWEST_S = 1.0
 """A test that takes more CPU seconds than that is not fast: it is ended in the survey, and left out."""
-_PRELOADED = ("numpy", "pyarrow.parquet", "duckdb", "shapely", "click", "tqdm", "highspy", "msgspec")
-"""Libraries that every run needs, loaded once."""
 _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Add, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
@@ -86,9 +85,11 @@ class Survey:
 
     Args:
         told: For each test its CPU seconds, and the lines of each file that it runs.
+        enough_s: So many CPU seconds of tests are run against a change.
     """
 
-    def __init__(self, told: dict[str, Any]) -> None:
+    def __init__(self, told: dict[str, Any], enough_s: float) -> None:
+        self._enough_s = enough_s
         self.cost: dict[str, float] = told["cost"]
         self._tests: dict[str, dict[str, list[str]]] = told["tests"]
 
@@ -104,55 +105,197 @@ class Survey:
         spent = 0.0
         for test in sorted(found, key=lambda test: (self.cost[test], test)):
             spent += self.cost[test]
-            if spent > _ENOUGH_S:
+            if spent > self._enough_s:
                 break
             chosen.append(test)
         return chosen
 
 
-class _Failure:
-    """A plugin of pytest that writes down which test has failed."""
+class _Mutation:
+    """A plugin of pytest that, instead of running the tests, has changes run against them.
 
-    def __init__(self, told: Path) -> None:
-        self.told = told
+    Args:
+        options: Of the command line.
+        work: A folder of its own.
+    """
 
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if report.failed:
-            self.told.write_text(report.nodeid)
-
-
-class _Watch:
-    """A plugin of pytest that says to the measurement which test is run, and counts its CPU seconds."""
-
-    def __init__(self, measured: coverage.Coverage) -> None:
-        self.measured = measured
-        self.cost: dict[str, float] = {}
-        self.failed: list[str] = []
+    def __init__(self, options: argparse.Namespace, work: Path) -> None:
+        self.options = options
+        self.work = work
+        self.failed = work / "failed.txt"
+        self.measuring = False
+        self.noticed_all = False
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Write down which test has failed."""
         if report.failed:
-            self.failed.append(report.nodeid)
+            with self.failed.open("a") as file:
+                file.write(f"{report.nodeid}\n")
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self) -> Iterator[None]:
-        def end(*_: object) -> None:
-            pytest.fail("is not fast")
-
-        signal.signal(signal.SIGVTALRM, end)
-        signal.setitimer(signal.ITIMER_VIRTUAL, _SLOWEST_S)
+        """End tests that are not fast while the survey is made."""
+        signal.setitimer(signal.ITIMER_VIRTUAL, _SLOWEST_S if self.measuring else 0)
         try:
             return (yield)
         finally:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0)
 
-    @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        self.measured.switch_context(item.nodeid)
-        before = _cpu_seconds()
-        done = yield
-        self.cost[item.nodeid] = _cpu_seconds() - before
-        self.measured.switch_context("")
-        return done
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Make the survey and the changes, once the tests are known."""
+        items = {item.nodeid: item for item in session.items}
+        kept = self.options.survey or self.work / "survey.json"
+        if not kept.exists():
+            kept.write_text('{"cost": {}, "tests": {}}')
+        known = json.loads(kept.read_text())
+        if items.keys() - known["cost"].keys() and _apart(None, partial(self._survey, items, known, kept)):
+            raise SystemExit("the survey has failed")
+        survey = Survey(json.loads(kept.read_text()), self.options.enough)
+        outcomes: defaultdict[str, Counter[str]] = defaultdict(Counter)
+        useful: set[str] = set()
+        for folder, file, number in self._chosen():
+            self.failed.unlink(missing_ok=True)
+            before = _cpu_seconds()
+            what, noticed = self._attempt(file, number, survey, items)
+            useful.update(self.failed.read_text().split("\n")[:1] if self.failed.exists() else ())
+            outcomes[folder]["noticed" if noticed else "survived"] += 1
+            print(f"{'noticed' if noticed else 'SURVIVED'} ({_cpu_seconds() - before:.0f} s): {what}", flush=True)
+        if _apart(None, partial(self._run, [items[name] for name in useful if name in items])):
+            raise SystemExit("tests that have noticed something fail without a change")
+        for folder, counts in outcomes.items():
+            print(f"{folder}: {counts['noticed']} of {counts.total()} changes noticed")
+        total = sum(outcomes.values(), Counter[str]())
+        print(f"{total['noticed']} of {total.total()} changes noticed, in {_cpu_seconds():.0f} CPU s", flush=True)
+        self.noticed_all = total["noticed"] >= 0.9 * total.total()
+        return True
+
+    def _chosen(self) -> list[tuple[str, Path, int]]:
+        """The changes to be made: a folder, a file in it, and which of its changes."""
+        every = [
+            (folder, file, number)
+            for folder in CHANGED
+            for file in sorted((ROOT / "scenicq" / folder).rglob("*.py"))
+            for number, _ in enumerate(mutants(ast.parse(file.read_text())))
+        ]
+        random.Random(self.options.seed).shuffle(every)
+        return every[self.options.skip : self.options.skip + self.options.count]
+
+    def _survey(self, items: dict[str, pytest.Item], known: dict[str, Any], told: Path) -> int:
+        """Run tests that are not known in random order, and add which lines each runs; in a process of its own."""
+        measured = coverage.Coverage(data_file=None, source=[str(ROOT / "scenicq" / folder) for folder in CHANGED])
+        cost: dict[str, float] = {}
+        order = sorted(items.keys() - known["cost"].keys())
+        random.Random(0).shuffle(order)
+        measured.start()
+        began = _cpu_seconds()
+        signal.signal(signal.SIGVTALRM, lambda *_: pytest.fail("is not fast"))
+        self.measuring = True
+        for name, following in zip(order, [*order[1:], None], strict=False):
+            before = _cpu_seconds()
+            if before - began > self.options.survey_seconds:
+                break
+            measured.switch_context(name)
+            items[name].config.hook.pytest_runtest_protocol(item=items[name], nextitem=following and items[following])
+            cost[name] = _cpu_seconds() - before
+        measured.stop()
+        left_out = {*self.failed.read_text().split("\n")} if self.failed.exists() else set[str]()
+        data = measured.get_data()
+        for file in data.measured_files():
+            lines = known["tests"].setdefault(str(Path(file).relative_to(ROOT)), {})
+            for line, contexts in data.contexts_by_lineno(file).items():
+                found = [test for test in dict.fromkeys(contexts) if test and test not in left_out]
+                lines[str(line)] = lines.get(str(line), []) + found
+        known["cost"] |= cost
+        told.write_text(json.dumps(known))
+        print(
+            f"{len(known['cost'])} of {len(items)} tests in the survey, {len(left_out & {*cost})} left out", flush=True
+        )
+        return 0
+
+    def _run(self, items: list[pytest.Item]) -> int:
+        """Run tests until one fails; 1 if one does."""
+        before = self.failed.stat().st_size if self.failed.exists() else 0
+        for item, following in zip(items, [*items[1:], None], strict=False):
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+            if self.failed.exists() and self.failed.stat().st_size > before:
+                return 1
+        return 0
+
+    def _attempt(self, file: Path, number: int, survey: Survey, items: dict[str, pytest.Item]) -> tuple[str, bool]:
+        """Make one change, and run tests against it: what it is, and whether they notice it."""
+        inside = file.relative_to(ROOT)
+        tree = ast.parse(file.read_text())
+        for place, (node, what) in enumerate(mutants(tree)):
+            if place == number:
+                tests = [name for name in survey.tests(str(inside), _lines(tree, node)) if name in items]
+                limit = 10 + int(3 * sum(survey.cost[test] for test in tests))
+                ast.fix_missing_locations(tree)
+                if _in_function(tree, node):
+                    code = compile(tree, str(file), "exec")
+                    run = partial(self._run_changed, code, [items[test] for test in tests])
+                    noticed = bool(tests) and _apart(limit, run) != 0
+                else:
+                    noticed = bool(tests) and self._in_copy(inside, ast.unparse(tree), tests, limit)
+                return f"{inside}:{node.lineno} {what} ({len(tests)} tests)", noticed
+        raise AssertionError("there are as many changes as before")
+
+    def _run_changed(self, code: CodeType, items: list[pytest.Item]) -> int:
+        exchange(code)
+        return self._run(items)
+
+    def _in_copy(self, inside: Path, text: str, tests: list[str], limit: int) -> bool:
+        """Whether tests of a copy with a changed file notice it."""
+        copy = self.work / "copy"
+        if not copy.exists():
+            for part in ("scenicq", "cli", "tests", "sample_data", "pyproject.toml", "README.md"):
+                copied = shutil.copytree if (ROOT / part).is_dir() else shutil.copy
+                copy.mkdir(exist_ok=True)
+                copied(ROOT / part, copy / part)
+            (copy / "scenicq_cli").symlink_to("cli")
+        (copy / inside).write_text(text)
+        words = [sys.executable, "-m", "pytest", "-x", *_OPTIONS, "-p", "no:terminal", *tests]
+        done = subprocess.run(
+            words,
+            cwd=copy,
+            env={**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            check=False,
+            preexec_fn=partial(resource.setrlimit, resource.RLIMIT_CPU, (limit + 10, limit + 10)),
+        )
+        shutil.copy(ROOT / inside, copy / inside)
+        return done.returncode != 0
+
+
+_OPTIONS = ("-p", "no:cacheprovider", "-m", "not slow", "-o", "timeout=3600")
+
+
+def exchange(code: CodeType) -> None:
+    """Give all functions of a file the code that they have in another version of it, line by line the same.
+
+    Args:
+        code: Of the other version, as a module.
+    """
+    new = {(each.co_qualname, each.co_firstlineno): each for each in _within(code)}
+    for function in gc.get_objects():
+        if isinstance(function, FunctionType) and function.__code__.co_filename == code.co_filename:
+            other = new.get((function.__code__.co_qualname, function.__code__.co_firstlineno))
+            if other is not None and other != function.__code__:
+                function.__code__ = other
+
+
+def _within(code: CodeType) -> Iterator[CodeType]:
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield constant
+            yield from _within(constant)
+
+
+def _in_function(tree: ast.Module, node: ast.expr | ast.stmt) -> bool:
+    """Whether something is in the body of a function, and so part of its code."""
+    functions = (each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef))
+    return any(inner is node for each in functions for line in each.body for inner in ast.walk(line))
 
 
 def _cpu_seconds() -> float:
@@ -160,32 +303,14 @@ def _cpu_seconds() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def _survey(work: Path, told: Path) -> int:
-    """Run all tests in the copy, and write which lines each runs; runs in a process of its own."""
-    measured = coverage.Coverage(data_file=None, source=[str(work / "scenicq" / folder) for folder in CHANGED])
-    watch = _Watch(measured)
-    measured.start()
-    _pytest([*TESTS, "--maxfail=1000", "--tb=line"], watch)
-    measured.stop()
-    for test in watch.failed:
-        print(f"left out: {test}")
-    data = measured.get_data()
-    tests: dict[str, dict[int, list[str]]] = {}
-    for file in data.measured_files():
-        lines = data.contexts_by_lineno(file).items()
-        found = {line: [test for test in set(contexts) - {*watch.failed} if test] for line, contexts in lines}
-        tests[str(Path(file).relative_to(work))] = {line: names for line, names in found.items() if names}
-    told.write_text(json.dumps({"cost": watch.cost, "tests": tests}))
-    return 0
+def _apart(cpu_seconds: int | None, run: Callable[[], int]) -> int:
+    """Run something in a forked process; its result, below zero where it was ended.
 
-
-def _pytest(tests: list[str], *plugins: object) -> int:
-    words = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", "-o", "timeout=3600", *tests]
-    return int(pytest.main(words, list(plugins)))
-
-
-def _apart(work: Path, cpu_seconds: int | None, run: Callable[[], int]) -> int:
-    """Run something in a process of its own that sees the copy; its result, below zero where it was ended."""
+    Args:
+        cpu_seconds: After which it is ended, and what it says is not shown; without a limit it is.
+        run: What to run.
+    """
+    sys.stdout.flush()
     child = os.fork()
     if child == 0:
         code = 1
@@ -195,9 +320,9 @@ def _apart(work: Path, cpu_seconds: int | None, run: Callable[[], int]) -> int:
                 nothing = os.open(os.devnull, os.O_WRONLY)
                 os.dup2(nothing, 1)
                 os.dup2(nothing, 2)
-            os.chdir(work)
-            sys.path.insert(0, str(work))
             code = run()
+        except BaseException:
+            traceback.print_exc()
         finally:
             os._exit(code)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
@@ -215,59 +340,18 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--skip", type=int, default=0, help="how many of the chosen changes were tried before")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--survey", type=Path, help="a file that keeps the survey; it is made where it is missing")
+    parser.add_argument("--survey", type=Path, help="a file that keeps the survey; what it lacks is added")
+    parser.add_argument("--survey-seconds", type=float, default=float("inf"), help="CPU seconds of the survey at most")
+    parser.add_argument("--enough", type=float, default=30.0, help="CPU seconds of tests that are run against a change")
     options = parser.parse_args()
-    files = [file for folder in CHANGED for file in sorted((ROOT / "scenicq" / folder).rglob("*.py"))]
-    every = [(file, number) for file in files for number, _ in enumerate(mutants(ast.parse(file.read_text())))]
-    random.Random(options.seed).shuffle(every)
-    outcomes: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    if options.survey is not None:
+        options.survey = options.survey.absolute()
+    os.chdir(ROOT)
     with tempfile.TemporaryDirectory() as name:
-        work = Path(name)
-        for part in ("scenicq", "cli", "tests", "sample_data", "pyproject.toml", "README.md"):
-            copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy
-            copy(ROOT / part, work / part)
-        (work / "scenicq_cli").symlink_to("cli")
-        os.environ.update(PYTHONPATH=str(work), PYTHONDONTWRITEBYTECODE="1")
-        for library in _PRELOADED:
-            importlib.import_module(library)
-        kept = options.survey or work / "survey.json"
-        if not kept.exists() and _apart(work, None, partial(_survey, work, kept.absolute())):
-            kept.unlink(missing_ok=True)
-            raise SystemExit("the survey has failed")
-        survey, failed = Survey(json.loads(kept.read_text())), work / "failed.txt"
-        useful: set[str] = set()
-        for file, number in every[options.skip : options.skip + options.count]:
-            folder = next(each for each in CHANGED if file.is_relative_to(ROOT / "scenicq" / each))
-            began = time.monotonic()
-            failed.unlink(missing_ok=True)
-            what, noticed = _attempt(work, file, number, survey, failed)
-            if failed.exists():
-                useful.add(failed.read_text())
-            outcomes[folder]["noticed" if noticed else "survived"] += 1
-            took = time.monotonic() - began
-            print(f"{'noticed' if noticed else 'SURVIVED'} ({took:.0f} s): {what}", flush=True)
-        if useful and _apart(work, None, partial(_pytest, sorted(useful))):
-            raise SystemExit("tests that have noticed something fail without a change")
-    for folder, counts in outcomes.items():
-        print(f"{folder}: {counts['noticed']} of {counts.total()} changes noticed")
-    total = sum(outcomes.values(), Counter[str]())
-    print(f"{total['noticed']} of {total.total()} changes noticed")
-    sys.exit(total["noticed"] < 0.9 * total.total())
-
-
-def _attempt(work: Path, file: Path, number: int, survey: Survey, failed: Path) -> tuple[str, bool]:
-    """Make one change, and run tests against it: what it is, and whether they notice it."""
-    inside = file.relative_to(ROOT)
-    tree = ast.parse(file.read_text())
-    for place, (node, what) in enumerate(mutants(tree)):
-        if place == number:
-            tests = survey.tests(str(inside), _lines(tree, node))
-            limit = 30 + int(3 * sum(survey.cost[test] for test in tests))
-            (work / inside).write_text(ast.unparse(tree))
-            noticed = bool(tests) and _apart(work, limit, partial(_pytest, tests, _Failure(failed))) != 0
-            shutil.copy(file, work / inside)
-            return f"{inside}:{node.lineno} {what} ({len(tests)} tests)", noticed
-    raise AssertionError("there are as many changes as before")
+        mutation = _Mutation(options, Path(name))
+        words = [*_OPTIONS, "-s", "-p", "no:terminal", f"--basetemp={name}/tests", *TESTS]
+        ended = pytest.main(words, [mutation])
+    sys.exit(ended not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED) or not mutation.noticed_all)
 
 
 if __name__ == "__main__":

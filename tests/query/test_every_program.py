@@ -68,12 +68,25 @@ def dataset(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return open_dataset(target)
 
 
-def query(dataset: Dataset, program: Example, options: MatchOptions, *, prefilter: bool) -> Query:
+def query(
+    dataset: Dataset, program: Example, options: MatchOptions, *, prefilter: bool, proofs: bool = True
+) -> Query:  # fmt: skip
     source = Source(f"{program.name}.scenic", program.text)
     how = QueryOptions(
-        options, solver="portable", version=program.version, initial=program.initial, prefilter=prefilter
+        options,
+        solver="portable",
+        version=program.version,
+        initial=program.initial,
+        prefilter=prefilter,
+        proofs=proofs,
     )  # type: ignore[arg-type]
     return Query(dataset, source, how)
+
+
+def named(dataset: Dataset, program: Example, options: MatchOptions) -> dict[str, str]:
+    """The verdict on each frame that is not excluded, where nobody reads proofs."""
+    results = query(dataset, program, options, prefilter=True, proofs=False).results()
+    return {result.frame: str(record(result)["verdict"]) for result in results}
 
 
 def found(dataset: Dataset, program: Example, options: MatchOptions, *, prefilter: bool) -> dict[str, object] | str:
@@ -86,7 +99,7 @@ def found(dataset: Dataset, program: Example, options: MatchOptions, *, prefilte
 
 
 def compare(dataset: Dataset, chosen: list[Example]) -> tuple[list[str], int]:
-    """Frames for which the two disagree, though both know; and matches of both."""
+    """Frames for which any two ways disagree, though both know; and matches of the two with proofs."""
     told: list[str] = []
     matches = 0
     for number, program in enumerate(chosen):
@@ -100,6 +113,11 @@ def compare(dataset: Dataset, chosen: list[Example]) -> tuple[list[str], int]:
             if not any(each is not None and each["verdict"] == "unknown" for each in pair):
                 told += [f"{program.name}, {frame}: {pair[0]} is not {pair[1]}"] * (pair[0] != pair[1])
                 matches += pair[0] == pair[1]
+        bare = named(dataset, program, options)
+        for frame in with_it.keys() | bare.keys():
+            known = with_it[frame]["verdict"] if frame in with_it else None  # type: ignore[index]
+            odd = known != bare.get(frame) and "unknown" not in (known, bare.get(frame))
+            told += [f"{program.name}, {frame}: {bare.get(frame)} without proofs, {known} with them"] * odd
     return told, matches
 
 

@@ -117,13 +117,6 @@ def test_an_export_has_the_frames_of_the_interval_with_the_objects_of_the_roles(
     assert done.frames == 9
 
 
-def test_near_misses_are_of_frames_alone(town):
-    words = ["match", str(PROGRAMS / "02_cut_in.scenic"), str(town), "--near", "2"]
-    done = CliRunner().invoke(cli, words)
-    assert done.exit_code == 2
-    assert "--near" in done.stderr
-
-
 def explained(town, program, what):
     words = ["explain", str(program), str(town), what, "--tolerance", "position=0.25,heading=5deg"]
     return CliRunner().invoke(cli, words)

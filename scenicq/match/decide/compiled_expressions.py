@@ -41,6 +41,7 @@ from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.match.linear.affine_reach import ends
 
 __all__ = [
+    "VECTORS",
     "Columns",
     "CompiledExpressions",
     "Exact",
@@ -66,7 +67,7 @@ _MOST_STEPS = 400
 """Operations that a formula may take: what is shared in an expression is worked out anew for each use of it."""
 
 _NUMBERS = frozenset({"heading", "width", "length", "height", "speed"})
-_VECTORS = frozenset({"position", "velocity"})
+VECTORS = frozenset({"position", "velocity"})
 """Properties that are numbers and pairs wherever they are observed."""
 
 
@@ -337,8 +338,12 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
             return (lambda _: value) if isinstance(value, float | tuple) else None
         case Feature():
             index, name = node.object, node.property
-            fits = name in (_VECTORS if node.kind == "vector" else _NUMBERS)
-            return (lambda get: cast(float, get(index, name))) if fits else None
+            fits = name in (VECTORS if node.kind == "vector" else _NUMBERS)
+
+            def observed(get: Get) -> Value:
+                return get(index, name)
+
+            return cast(Exact, observed) if fits else None
         case _ if any(arg is None for arg in args):
             return None
         case Arithmetic():

@@ -32,8 +32,7 @@ def look_up_positions(
                 fields, regions = asked.setdefault(form.index, (set(), {}))
                 if form.field is not None:
                     fields.add(form.field)
-                if form.region is not None:
-                    regions[id(form.region)] = form.region
+                regions.update((id(region), region) for region in form.regions)
     lookups = MapLookups()
     of_fields: dict[RoadDirection, list[tuple[float, float]]] = {}
     for index, (fields, regions) in asked.items():

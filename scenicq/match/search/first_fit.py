@@ -26,7 +26,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.observation import observe, observe_params, observed_names
+from scenicq.match.problem.observation import observe, observed_names
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.store.labels import Label, LabelObject
 
@@ -40,23 +40,11 @@ _SCALARS = frozenset({"heading", "width", "length", "height"})
 T = TypeVar("T")
 Values: TypeAlias = "Value | FloatColumn | list[Value]"
 """Of many labels: one each, or the one that all have."""
-RowTruth: TypeAlias = "bool | list[bool]"
+RowTruth: TypeAlias = "bool | Sequence[bool]"
 """Of many labels likewise."""
 
 
-class _Observed(dict[int, Mapping[str, Value]]):
-    """What is observed of the objects of a label, by their numbers; worked out when it is first asked for."""
-
-    def __init__(self, label: Label) -> None:
-        super().__init__()
-        self.label = label
-
-    def __missing__(self, number: int) -> Mapping[str, Value]:
-        seen = self[number] = observe(_label_object(self.label, number))
-        return seen
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class LabelRow:
     """A label of a batch.
 
@@ -64,17 +52,22 @@ class LabelRow:
         number: Its number among the labels that were asked about.
         label: The label.
         candidates: Who may play whom.
-        observed: What is observed of each label object, by its number.
     """
 
     number: int
     label: Label
     candidates: Candidates
-    observed: _Observed = field(init=False)
+    _observed: dict[int, Mapping[str, Value]] | None = None
 
-    def __post_init__(self) -> None:
-        """Nothing is observed yet."""
-        object.__setattr__(self, "observed", _Observed(self.label))
+    def observed(self, number: int) -> Mapping[str, Value]:
+        """What is observed of a label object; worked out when it is first asked for."""
+        known = self._observed
+        if known is None:
+            known = self._observed = {}
+        seen = known.get(number)
+        if seen is None:
+            seen = known[number] = observe(_label_object(self.label, number))
+        return seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,13 +162,12 @@ class _Batch:
     def decide(self, group: GroupPlan, options: MatchOptions, lookups: MapLookups) -> tuple[RowTruth, RowTruth]:
         """For which labels a group surely holds, and for which it surely fails; keeps the witness."""
         form, size = group.closed_form, len(self.rows)
-        assert form is not None
         self.decisions += 1
-        if self.decisions > self.fit.most_decisions:
+        if form is None or self.decisions > self.fit.most_decisions:
             return False, False
         if size == 1:
             holds, fails, self.values[group] = form.evaluate_one(self._get(0), options, lookups)
-            return cast(bool, holds), cast(bool, fails)
+            return holds, fails
         if self.columns is None:
             self.columns = Columns(size, self._column)
         holds, fails, self.values[group] = form.evaluate_many(self._get, self.columns, options, lookups)
@@ -213,6 +205,11 @@ class _Batch:
     def with_next_candidate(self) -> list[_Batch]:
         """The labels with the next free candidate for the newest role that has one left, by how many are filled."""
         order = self.fit.order
+        if len(self.rows) == 1:
+            # most of the moves of a label by itself
+            following = _following(order, self.rows[0].candidates, self.numbers[0])
+            self.numbers, self.columns = [following], None
+            return [self] if following else []
         numbers = [_following(order, row.candidates, taken) for row, taken in zip(self.rows, self.numbers, strict=True)]
         lengths = _alike([*map(len, numbers)])
         if isinstance(lengths, int):
@@ -241,23 +238,33 @@ class _Batch:
 
     def _get(self, number: int) -> Get:
         """The observed values of one label."""
-        observed, numbers, ranks = self.rows[number].observed, self.numbers[number], self.fit.ranks
+        row, numbers, ranks = self.rows[number], self.numbers[number], self.fit.ranks
 
         def get(index: int, name: str) -> Value:
-            return observed[numbers[ranks[index]]][name]
+            return row.observed(numbers[ranks[index]])[name]
 
         return get
 
     def _column(self, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
         """The values of a property of the label objects that play an object."""
         rank = self.fit.ranks[index]
-        playing = zip(self.rows, self.numbers, strict=True)
-        objects = [_label_object(row.label, numbers[rank]) for row, numbers in playing]
+        playing = [(row, numbers[rank]) for row, numbers in zip(self.rows, self.numbers, strict=True)]
+        if name not in _SCALARS and name != "position":
+            return _numeric([row.observed(number)[name] for row, number in playing])
+        objects = [_label_object(row.label, number) for row, number in playing]
         if name == "position":
             return np.array([each.x for each in objects]), np.array([each.y for each in objects])
-        if name in _SCALARS:
-            return np.array([getattr(each, name) for each in objects], dtype=np.float64)
-        raise UnclearError
+        return np.array([getattr(each, name) for each in objects], dtype=np.float64)
+
+
+def _numeric(values: Sequence[Value]) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
+    """Values as a column, or as a pair of columns; `UnclearError` where they are not all numbers or all vectors."""
+    if all(isinstance(value, float) for value in values):
+        return np.array(values, dtype=np.float64)
+    if all(isinstance(value, tuple) for value in values):
+        x, y = np.array(values, dtype=np.float64).T
+        return x, y
+    raise UnclearError
 
 
 def _label_object(label: Label, number: int) -> LabelObject:
@@ -316,13 +323,13 @@ def first_fit_of(plan: MatchPlan, scenario: Scenario) -> FirstFit | None:
 
 def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[frozenset[str], ...]) -> Signature | None:
     """What is observed of all candidates, if it is the same for all of a role."""
+    params, own = _texts(tuple(label.params)), observed_names(label.ego)
+    if len(relevant) == 1:
+        return _signature(relevant, ego, own, own, params)
     objects = label.objects
     numbers = {number for index, numbers in among.items() if index != ego for number in numbers}
-    wanted = _union(relevant)
     seen = {number: observed_names(objects[number - 1]) for number in numbers}
-    known = {names & wanted for names in {*seen.values()}}
-    params: frozenset[str] = frozenset(observe_params(label)) if label.params else frozenset()
-    own = observed_names(label.ego) & wanted
+    known = {_among(names, relevant) for names in {*seen.values()}}
     if len(known) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
         return _signature(relevant, ego, own, next(iter(known)), params)
     kinds: list[frozenset[str]] = []
@@ -337,10 +344,15 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
     return (*kinds, params)
 
 
-@functools.lru_cache
-def _union(relevant: tuple[frozenset[str], ...]) -> frozenset[str]:
-    """All properties that matter of some object."""
-    return frozenset[str]().union(*relevant)
+@functools.lru_cache(maxsize=4096)
+def _among(names: frozenset[str], relevant: tuple[frozenset[str], ...]) -> frozenset[str]:
+    """Those that matter of some object of the scenario."""
+    return names & frozenset[str]().union(*relevant)
+
+
+@functools.lru_cache(maxsize=4096)
+def _texts(names: tuple[str, ...]) -> frozenset[str]:
+    return frozenset(names)
 
 
 @functools.lru_cache

@@ -9,7 +9,8 @@ from scenicq.forest.groups import Condition, Group
 from scenicq.forest.interpret import Steps, steps_of
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario
 from scenicq.forest.walk import features
-from scenicq.match.decide.closed_form import ClosedForm, closed_form_of
+from scenicq.match.decide.closed_form import ClosedForm
+from scenicq.match.decide.closed_forms import closed_form_of
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import Signature, build_groups
 from scenicq.match.problem.subgroups import parts_of

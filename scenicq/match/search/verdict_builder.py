@@ -53,8 +53,11 @@ class VerdictBuilder:
     def matches(self, fit: FirstFit, batch: FilledBatch) -> Iterator[tuple[int, Match]]:
         """The matches of labels whose roles are filled, with their places."""
         keys = self._named(batch.variables)
+        owners = sorted(fit.ranks.items())
+        ranks = [(self.scenario.objects[index].name, rank) for index, rank in owners]
         for row, numbers, values in zip(batch.rows, batch.numbers, batch.witnesses, strict=True):
-            names = self.names(row.label, dict(zip(fit.order, numbers, strict=True)))
+            objects = row.label.objects
+            names = {name: objects[numbers[rank] - 1].id if numbers[rank] else "ego" for name, rank in ranks}
             yield row.number, Match(names, _witness(keys, values))
 
     def without_match(self, label: Label, search: LabelSearch, ended: Ended | None) -> tuple[int, Verdict]:

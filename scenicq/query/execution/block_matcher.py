@@ -69,7 +69,7 @@ class CompiledMap:
         cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool, proofs: bool = True
     ) -> CompiledMap:
         """With its prefilter, which without proofs says what surely matches, too, or with one that excludes nothing."""
-        empty = Plan(network.name, (), (), ())
+        empty = Plan(network.name, (), (), None)
         plan = make_plan(scenario, network, options, deciding=not proofs) if prefilter else empty
         motion = any(_MOTION & names for names in relevant_properties(scenario, options))
         return cls(scenario, network, plan, motion)
@@ -201,7 +201,7 @@ class Decider:
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
                 return candidates(connection, plan, motion=world.motion, among=wanted)
 
-        left = Survivors(every[missed < 0], rows, plan.roles, read)
+        left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))
 
     def _matched(self, matcher: Matcher, left: Iterator[Candidate]) -> Iterator[list[Result]]:

@@ -33,7 +33,12 @@ from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
 from scenicq.temporal.interval_options import IntervalOptions
 
-__all__ = ["Query", "QueryOptions", "Stretch", "read_program"]
+__all__ = ["MAP_LACKS", "Query", "QueryOptions", "Stretch", "read_program"]
+
+MAP_LACKS = "map "
+"""How the name of what excludes frames begins where it is their map; the map's follows."""
+_NAMED_MAPS = 4
+"""Maps that one warning names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,14 +220,25 @@ class Query:
 
     def _warn(self, worlds: Mapping[str, CompiledMap | Diagnostic]) -> None:
         """Note in the funnel what the author should know, and count the frames on maps that cannot match."""
+        lacking: dict[str, list[tuple[str, str]]] = {}
         for name, told in worlds.items():
             if isinstance(told, Diagnostic):
-                count = self.dataset.manifest.by_map.get(name, Counts()).frames
-                message = f"{count} frames on map `{name}` cannot match: {told.message}"
-                self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
-                if here := self._frames(name):
+                # maps that lack the same are spoken of together
+                lacking.setdefault(told.message.replace(f"`{name}`", ""), []).append((name, told.message))
+                if here := self.frames(name):
                     self.funnel.frames += here
-                    self.funnel.excluded[f"map {name}"] += here
+                    self.funnel.excluded[f"{MAP_LACKS}{name}"] += here
+        for alike in lacking.values():
+            count = sum(self.dataset.manifest.by_map.get(name, Counts()).frames for name, _ in alike)
+            shown = ", ".join(f"`{name}`" for name, _ in alike[:_NAMED_MAPS])
+            first, message = alike[0]
+            message = (
+                f"{count} frames on map {shown} cannot match: {message}"
+                if len(alike) == 1
+                else f"{count} frames on {len(alike)} maps ({shown}{', ...' if len(alike) > _NAMED_MAPS else ''}) "
+                f"cannot match; of `{first}`: {message}"
+            )
+            self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
         compiled = [world for world in worlds.values() if isinstance(world, CompiledMap)]
         if compiled:
             compared = self.coverage()
@@ -280,7 +296,7 @@ class Query:
         stretch = {map_name: Stretch(recording, recording, frames)}
         return Query(self.dataset, self.source, options, stretch, file=self.file, _known=known)
 
-    def _frames(self, map_name: str) -> int:
+    def frames(self, map_name: str) -> int:
         """How many frames of a map are looked at."""
         if self.recordings is None:
             return self.dataset.manifest.by_map.get(map_name, Counts()).frames
@@ -298,7 +314,7 @@ class Query:
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
         worlds = self._worlds().items()
-        return [world.plan for name, world in worlds if isinstance(world, CompiledMap) and self._frames(name)]
+        return [world.plan for name, world in worlds if isinstance(world, CompiledMap) and self.frames(name)]
 
     def blocks(self, map_name: str, least: int = 1) -> list[Block]:
         """The frames of a map that are looked at, cut into blocks in the order of the store.
@@ -367,7 +383,7 @@ class Query:
             executor = BlockExecutor(self.dataset, self.options.jobs, self.decider(), _start_worker, setup)
             hands = stack.enter_context(executor)
             for name, world in worlds.items():
-                if not self._frames(name):
+                if not self.frames(name):
                     continue
                 if isinstance(world, Diagnostic):
                     yield from self._lacking(name, world, ahead.taken)
@@ -391,12 +407,12 @@ class Query:
     def _lacking(self, map_name: str, told: Diagnostic, progress: Callable[[int], None]) -> Iterator[Result]:
         """The frames of a map that lacks what the program needs, which are counted already."""
         if self.options.every:
-            cause = Cause(f"map {map_name}", told.message, told.span)
+            cause = Cause(f"{MAP_LACKS}{map_name}", told.message, told.span)
             with closing(self.dataset.connect()) as connection:
                 for block in self.blocks(map_name):
                     for frame, recording, time in names(self.dataset, connection, block):
                         yield Result(frame, recording, time, NoMatch(cause))
-        progress(self._frames(map_name))
+        progress(self.frames(map_name))
 
 
 def _start_worker(

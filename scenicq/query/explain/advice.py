@@ -29,7 +29,7 @@ from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match
 from scenicq.query.execution.block_matcher import CompiledMap
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.run import Query
+from scenicq.query.execution.run import MAP_LACKS, Query
 from scenicq.query.explain.nearest_miss import show_tolerance
 from scenicq.query.explain.prefilter_counts import spots
 from scenicq.query.prefilter.executor import candidates, hold, run_plan
@@ -54,6 +54,7 @@ _ANYWHERE = {"position": 1e5, "heading": math.pi}
 _WRITTEN = {"position": "in everywhere", "heading": "facing Range(0, 360) deg"}
 """What the program says where a property may have any value, in place of a class's default."""
 _AT_A_SIDE = re.compile(r"(ahead of|behind|left of|right of) (\w+) by (?!.*@)")
+_ATTRIBUTE = re.compile(r"\w+(?:\.\w+)+")
 _AREAS = {
     "ahead of": "Range(-2, 2) @ Range(3, 30)", "behind": "Range(-2, 2) @ Range(-30, -3)",
     "left of": "Range(-6, -1) @ Range(-5, 5)", "right of": "Range(1, 6) @ Range(-5, 5)",
@@ -126,7 +127,8 @@ class Advice:
     """What keeps frames from matching, and what would help.
 
     Attributes:
-        first: What excludes most frames, with how many.
+        first: The conditions that exclude most frames, with how many.
+        without_map: Frames on maps that lack what the program needs.
         outlooks: The changes that may leave frames, those that are known to leave most first; pairs of changes only
             where no single one does.
         complete: Whether all single changes were looked at within the time.
@@ -137,6 +139,7 @@ class Advice:
     outlooks: tuple[Outlook, ...]
     complete: bool
     hints: tuple[str, ...] = ()
+    without_map: int = 0
 
 
 class _Clock:
@@ -160,7 +163,7 @@ class _Sample:
         worlds: The scenario over their maps, by the name of the map.
         held: What holds the frames of each.
         frames: How many there are.
-        total: How many the dataset has.
+        total: How many the query has on all maps that the program fits: no change is about others.
     """
 
     worlds: Mapping[str, CompiledMap]
@@ -178,10 +181,11 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
         brief: Whether only a few changes are tried, and of each only a few frames decided.
     """
     clock = _Clock(budget_s)
-    excluded = query.funnel.excluded.most_common()
+    excluded = [each for each in query.funnel.excluded.most_common() if not each[0].startswith(MAP_LACKS)]
+    without_map = query.funnel.excluded.total() - sum(frames for _, frames in excluded)
     worlds = {world.network.name: world for world in query.fitting() if query.blocks(world.network.name)}
     if not worlds:
-        return Advice(tuple(excluded[:3]), (), complete=True)
+        return Advice(tuple(excluded[:3]), (), complete=True, without_map=without_map)
     rank = {what: place for place, (what, _) in enumerate(excluded)}
     scenario = next(iter(worlds.values())).scenario
     for what in tuple(rank):
@@ -211,7 +215,7 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
                 if outlook.most > 0:
                     found.append(outlook)
     found.sort(key=lambda each: (-each.least, -each.most))
-    return Advice(tuple(excluded[:3]), tuple(found), complete, tuple(_lines_meant(scenario, excluded)))
+    return Advice(tuple(excluded[:3]), tuple(found), complete, tuple(_lines_meant(scenario, excluded)), without_map)
 
 
 def _lines_meant(scenario: Scenario, excluded: Sequence[tuple[str, int]]) -> Iterator[str]:
@@ -236,7 +240,7 @@ def _pairs(changes: Sequence[ProgramChange], most: int) -> Iterator[ProgramChang
 
 def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int, maps: int) -> _Sample:
     """Read the frames that changes are tried on."""
-    total = query.dataset.manifest.total.frames
+    total = sum(map(query.frames, worlds))
     step = max(1, -(-len(worlds) // maps))
     chosen = dict(list(worlds.items())[::step])
     held: dict[str, duckdb.DuckDBPyConnection] = {}
@@ -257,6 +261,8 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChang
             if requirement.built_in is not None:
                 names = " and ".join(scenario.objects[index].name for index in requirement.objects)
                 text = f"{requirement.built_in.value} of {names}"
+            elif _ATTRIBUTE.fullmatch(text):
+                continue  # no statement says that `ego.lane` must be there, so that none can be dropped
             yield ProgramChange(f"without `{text}`", text, requirement.span, requirement=number)
     for name, given in scenario.params.items():
         if given.explicit and name not in options.ignore_params:

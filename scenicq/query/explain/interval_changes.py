@@ -6,10 +6,12 @@ amounts at which anything changes are the differences of its sides at the sample
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.forest.build import constant
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Compare, CompareOp, Node
@@ -48,7 +50,7 @@ class Change:
     instead_of: float | None = None
 
     def made(self, conditions: Sequence[Node]) -> tuple[Node, ...]:
-        """The conditions of a program in which the comparison is changed wherever it is used."""
+        """The conditions of a program in which the comparison is changed wherever the program says the same."""
         return tuple(transform(each, lambda node: _let(node, self.compare, self.amount)) for each in conditions)
 
     def text(self) -> str:
@@ -61,8 +63,9 @@ class Change:
 
 
 def least_changes(
-    columns: AtomColumns, formula: Formula, conditions: Sequence[Node], *, ends: bool = False, goes_on: bool = False
-) -> Iterator[Change]:
+    columns: AtomColumns, formula: Formula, conditions: Sequence[Node], *, ends: bool = False, goes_on: bool = False,
+    quick: bool = False,
+) -> Iterator[Change]:  # fmt: skip
     """For each comparison in a formula that does not hold the least change of it alone that makes it hold.
 
     Args:
@@ -71,6 +74,7 @@ def least_changes(
         conditions: Of the program, by number.
         ends: Whether the formula need only hold at some sample: of the condition of a termination.
         goes_on: Whether the interval is cut off, so that the formula need only be such that it may still hold.
+        quick: Whether to bisect, which finds the least where the formula holds for all larger changes, too.
     """
     asked = Eventually(formula) if ends else formula
     numbers = sorted({node.number for node in _atoms(formula)})
@@ -81,7 +85,7 @@ def least_changes(
     told: set[str] = set()
     for number in numbers:
         for compare in _comparisons(conditions[number]):
-            change = _least(columns, asked, known, number, conditions[number], compare, goes_on=goes_on)
+            change = _least(columns, asked, known, number, conditions[number], compare, goes_on=goes_on, quick=quick)
             if change is not None and change.text() not in told:
                 told.add(change.text())
                 yield change
@@ -124,7 +128,7 @@ def may_still_hold(formula: Formula, atom: Callable[[Atom], Truth]) -> bool:
 
 def _least(
     columns: AtomColumns, formula: Formula, known: Mapping[int, Truth], number: int, condition: Node, compare: Compare,
-    *, goes_on: bool,
+    *, goes_on: bool, quick: bool,
 ) -> Change | None:  # fmt: skip
     """The least change of one comparison that makes a formula hold; None if there is none."""
     sides = [columns.number(columns.expanded(side)) for side in (compare.left, compare.right)]
@@ -146,8 +150,12 @@ def _least(
     # just more than a difference lets its sample through, just less keeps it out
     spare = _SPARE * max(1.0, float(np.abs(amounts).max(initial=0.0)))
     tried = np.concatenate((amounts + spare, amounts - spare))
-    tried = tried[np.argsort(np.abs(tried), kind="stable")][:_MOST_TRIED]
-    enough = next((float(amount) for amount in tried if holds(float(amount))), None)
+    tried = tried[np.argsort(np.abs(tried), kind="stable")]
+    if quick:
+        ends = [_first(tried[side], holds) for side in (tried > 0, tried < 0)]
+        enough = min((each for each in ends if each is not None), key=abs, default=None)
+    else:
+        enough = next((float(amount) for amount in tried[:_MOST_TRIED] if holds(float(amount))), None)
     if enough is None:
         return None
     assert compare.span is not None
@@ -160,9 +168,19 @@ def _least(
     return Change(what, enough, compare)
 
 
+def _first(amounts: NDArray[np.float64], holds: Callable[[float], bool]) -> float | None:
+    """The first amount for which something holds that holds for all that come after it, too; None if there is none."""
+    if not len(amounts) or not holds(float(amounts[-1])):
+        return None
+    place = bisect_left(range(len(amounts)), True, key=lambda each: holds(float(amounts[each])))
+    return float(amounts[place])
+
+
 def _let(node: Node, compare: Compare, amount: float) -> Node:
-    """A comparison that lets an amount more through, if it is the one in question."""
-    if not (isinstance(node, Compare) and node.span == compare.span and node.op is compare.op):
+    """A comparison that lets an amount more through, if it is the one in question, or the program says the same."""
+    if not (isinstance(node, Compare) and node.op is compare.op and node.span is not None and compare.span is not None):
+        return node
+    if node.span != compare.span and node.span.text != compare.span.text:
         return node
     more = Arithmetic(ArithmeticOp.ADD, (node.right, constant(-amount if node.op in _GREATER else amount)))
     return Compare(node.op, node.left, more, span=node.span)

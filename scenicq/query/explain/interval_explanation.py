@@ -221,8 +221,17 @@ def _columns(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
     return AtomColumns(scenario, samples, start=np.zeros(len(samples), np.int64))
 
 
-def changes_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[Change, ...]:
-    """What would let an interval through: the requirement that is broken hold, or the program end; the least first."""
+def changes_of(
+    scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict, *, quick: bool = False
+) -> tuple[Change, ...]:
+    """What would let an interval through: the requirement that is broken hold, or the program end; the least first.
+
+    Args:
+        scenario: The scenario.
+        tracks: The recording.
+        interval: What does not match.
+        quick: As of `least_changes`.
+    """
     dynamics = scenario.dynamics
     if dynamics is None or interval.truth == TRUE:
         return ()
@@ -231,12 +240,12 @@ def changes_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVe
         change
         for each in dynamics.requirements
         if each.span == interval.broken
-        for change in least_changes(columns, each.formula, dynamics.conditions, goes_on=interval.cut_off)
+        for change in least_changes(columns, each.formula, dynamics.conditions, goes_on=interval.cut_off, quick=quick)
     ]
     if interval.cut_off and interval.broken is None:
         for each in _conditional(dynamics.terminations):
             assert each.condition is not None
-            changes += least_changes(columns, each.condition, dynamics.conditions, ends=True)
+            changes += least_changes(columns, each.condition, dynamics.conditions, ends=True, quick=quick)
     return tuple(sorted(changes, key=lambda each: abs(each.amount)))
 
 

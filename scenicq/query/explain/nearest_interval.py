@@ -1,23 +1,25 @@
 """The recordings that do not match over time but come closest, and what would let each through.
 
-What would do is either a tolerance, widened by so many metres in the sense of `nearest_miss`, under which an interval
-matches; or one number of the program, changed by so much in its own unit, where a binding misses a requirement over
-time or the end of the program. A recording's distance is the smaller of both. Whatever is told has been tried: with it
-the recording matches.
+What would do is a tolerance, widened by so many metres in the sense of `nearest_miss`, under which an interval matches;
+or one number of the program, changed by so much in its own unit, where a binding misses a requirement over time or the
+end of the program; or a shorter least duration. A recording's distance is the smallest of these. Whatever is told has
+been tried: with it the recording matches.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from scenicq.errors import Span
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch
 from scenicq.query.execution.block_matcher import CompiledMap
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
+from scenicq.query.explain.interval_changes import Change
 from scenicq.query.explain.interval_explanation import changes_of, placed
 from scenicq.query.explain.nearest_miss import FINEST_M, LADDER_M, show_tolerance, widened, with_parts
 
@@ -25,8 +27,10 @@ __all__ = ["nearest_intervals"]
 
 MOST_RECORDINGS = 200
 """Recordings that a ranking looks at for each of the two ways to let one through."""
-_PER_RECORDING = 3
-"""Bindings of a recording for which numbers are tried, those that come furthest first."""
+MOST_BINDINGS = 1000
+"""Bindings of all these for which numbers are looked for, those that come furthest first."""
+_MOST_TRIED = 10
+"""Numbers that are tried on a recording, the least first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +66,9 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
             missed.setdefault(each.recording, []).append(each)
     furthest = sorted(missed.values(), key=lambda mine: -max(map(_length, mine)))
     for mine in furthest[:MOST_RECORDINGS]:
-        _keep(near, _by_number(every, sorted(mine, key=_length, reverse=True)[:_PER_RECORDING]))
+        longest = sorted(mine, key=_length, reverse=True)
+        _keep(near, _by_number(every, longest[: max(1, MOST_BINDINGS // len(missed))]))
+        _keep(near, _by_duration(every, longest[0]))
     seen = set(matching)
     for widening_m in LADDER_M:
         nearer = _bound(near, count)
@@ -125,30 +131,51 @@ def _let_through(found: Result, amount: float, cause: Cause) -> _Near:
     return _Near(amount, replace(found, verdict=NoMatch(cause, found.verdict.correspondence)))
 
 
-def _by_number(query: Query, results: Iterable[Result]) -> _Near | None:
+def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
     """The least change of one number by which a recording matches that has these bindings.
 
     Args:
         query: The query.
-        results: Of one recording, none of which matches.
+        results: Of one recording, at least one, none of which matches.
     """
-    nearest: _Near | None = None
+    recording = results[0].recording
+    changes: list[tuple[float, Change, Span | None]] = []
     for result in results:
         scenario, tracks, interval = placed(query, result)
-        for change in changes_of(scenario, tracks, interval):
-            if nearest is not None and abs(change.amount) >= nearest.amount:
-                break
-            dynamics = scenario.dynamics
-            assert dynamics is not None
-            changed = replace(scenario, dynamics=replace(dynamics, conditions=change.made(dynamics.conditions)))
-            map_name = _map_of(query, result.recording)
-            match = query.options.match
-            world = CompiledMap.of(changed, query.world(map_name).network, match, prefilter=query.options.prefilter)
-            found = _longest(query, result.recording, map_name, world, match)
-            if found is not None:
-                nearest = _let_through(found, abs(change.amount), Cause("program", change.text(), interval.broken))
-                break
-    return nearest
+        found = changes_of(scenario, tracks, interval, quick=True)
+        changes += [(abs(each.amount), each, interval.broken) for each in found]
+    for amount, change, broken in sorted(changes, key=lambda each: each[0])[:_MOST_TRIED]:
+        map_name, match = _map_of(query, recording), query.options.match
+        world = query.world(map_name)
+        dynamics = world.scenario.dynamics
+        assert dynamics is not None
+        conditions = change.made(dynamics.conditions)
+        changed = replace(world.scenario, dynamics=replace(dynamics, conditions=conditions))
+        other = CompiledMap.of(changed, world.network, match, prefilter=query.options.prefilter)
+        longest = _longest(query, recording, map_name, other, match)
+        if longest is not None:
+            return _let_through(longest, amount, Cause("program", change.text(), broken))
+    return None
+
+
+def _by_duration(query: Query, result: Result) -> _Near | None:
+    """The least duration with which a recording matches whose longest interval is too short.
+
+    Args:
+        query: The query.
+        result: The longest interval.
+    """
+    wanted, span = query.options.time.min_duration_s, result.interval
+    if wanted is None or span is None:
+        return None
+    enough = math.floor((span.end_us - result.timestamp_us) / 1e4) / 100
+    if not 0 < enough < wanted:
+        return None
+    map_name = _map_of(query, result.recording)
+    shorter = replace(query, options=replace(query.options, time=replace(query.options.time, min_duration_s=enough)))
+    found = _longest(shorter, result.recording, map_name, query.world(map_name), query.options.match)
+    cause = Cause("--min-duration", f"would match with --min-duration {enough:g}")
+    return None if found is None else _let_through(found, wanted - enough, cause)
 
 
 def _by_tolerance(query: Query, recording: str, enough_m: float, most_m: float) -> _Near | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -30,6 +31,8 @@ from scenicq.query.explain.sides import sides
 
 __all__ = ["Violation", "allowed_values", "choices", "distance_off", "violations"]
 
+_PLACED = re.compile(r"(?:on|in) (.+)")
+_LONGEST_NAME = 60
 _FAR_M = 1000.0
 _STEPS = 40
 _FINEST = 1e-4
@@ -134,10 +137,17 @@ def _place(node: Node) -> str:
 
 
 def _region_names(node: Node) -> list[str]:
-    found = (leaf.region for leaf in leaves(node) if isinstance(leaf, PointIn))
-    values = (region.value for region in found if isinstance(region, Constant))
-    names = (getattr(value, "name", "") for value in values)
+    names = (_region_name(leaf) for leaf in leaves(node) if isinstance(leaf, PointIn))
     return list(dict.fromkeys(name for name in names if name))
+
+
+def _region_name(leaf: PointIn) -> str:
+    """What the program calls the region of a random point; what the map calls it, where that is no short name."""
+    text = " ".join(leaf.span.text.split()) if leaf.span is not None else ""
+    placed = _PLACED.fullmatch(text)
+    if placed and len(placed[1]) <= _LONGEST_NAME:
+        return placed[1]
+    return getattr(leaf.region.value, "name", "") if isinstance(leaf.region, Constant) else ""
 
 
 def choices(root: Node) -> Iterator[Node]:

@@ -324,6 +324,7 @@ def candidate_rows(connection: duckdb.DuckDBPyConnection, plan: Plan) -> Candida
         connection: The one that sifted.
         plan: The plan; with roles.
     """
+    assert plan.roles
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
     roles = ", ".join(f"r{place}" for place in range(len(plan.roles)))
     found: Any = connection.execute(f"SELECT row, {roles} FROM roles WHERE f IN {left} ORDER BY row").fetchnumpy()
@@ -356,17 +357,17 @@ def candidates(
     frames = _rows(connection, f"SELECT l.number, {of_frames} FROM {LABELS} l WHERE l.number IN {left} ORDER BY 1")
     mine = f"JOIN {LABELS} l ON s.frame = l.frame WHERE l.number IN {left} ORDER BY s.number"
     sensors = _rows(connection, f"SELECT s.channel, s.path FROM {_SENSORS} s {mine}")
-    if not plan.roles:
+    if plan.roles is None:
         objects = _rows(connection, f"SELECT {of_objects.replace('a.', 's.')} FROM {OBJECTS} s {mine}")
         for label in _assembled(frames, objects, sensors):
             yield Candidate(label, None)
         return
-    flags = "".join(f", r.r{place}" for place in range(len(plan.roles)))
-    objects = _rows(
-        connection,
-        f"SELECT {of_objects}, r.f{flags} FROM {OBJECTS} a JOIN roles r ON a.number = r.row "
-        f"WHERE r.f IN {left} ORDER BY a.number",
-    )
+    if plan.roles:
+        flags = "".join(f", r.r{place}" for place in range(len(plan.roles)))
+        who = f"{OBJECTS} a JOIN roles r ON a.number = r.row WHERE r.f IN {left}"
+    else:
+        flags, who = "", f"(SELECT *, number AS f FROM {OBJECTS} LIMIT 0) a JOIN (SELECT 0 AS f LIMIT 0) r USING (f)"
+    objects = _rows(connection, f"SELECT {of_objects}, r.f{flags} FROM {who} ORDER BY a.number")
     numbers, owners = frames["number"].to_numpy(), objects["f"].to_numpy()
     counts = np.searchsorted(owners, numbers, side="right") - np.searchsorted(owners, numbers)
     frames = frames.set_column(frames.column_names.index("object_count"), "object_count", [counts.astype(np.int32)])

@@ -75,7 +75,7 @@ class Plan:
         steps: Conditions in the order in which they are blamed.
         stages: How they are decided.
         roles: The objects for which the table `roles` then has a column `r0`, `r1` ...: whether the object in row `row`
-            may play them. Empty if every object of a frame must be looked at.
+            may play them; none where there is nobody but the ego. None if every object of a frame must be looked at.
         decision: SQL that makes the table `decided` of frames that surely match, of those that all stages have left;
             none where SQL decides nothing, or was not asked to.
     """
@@ -83,7 +83,7 @@ class Plan:
     map: str
     steps: tuple[Step, ...]
     stages: tuple[Stage, ...]
-    roles: tuple[int, ...]
+    roles: tuple[int, ...] | None
     decision: tuple[str, ...] = ()
 
     @property
@@ -206,7 +206,7 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
         network.name,
         tuple(draft.steps),
         tuple(draft.stages),
-        played if own_ego and not options.exact else (),
+        played if own_ego and not options.exact else None,
         () if proofs is None else decision(proofs, played, flags, options, tables=(LABELS, OBJECTS), left=left),
     )
 

@@ -43,7 +43,18 @@ ego = new Car on road
 other = new Car ahead of ego by Range(1, 2) + ego.speed, with speed Range(0, 30), facing Discrete({0.1: 1, 0.2: 2})
 """
 CASES = {**PROGRAMS, "rows": ROWS, "any heading": ANY_HEADING, "turned": TURNED, "faster": FASTER}
-SURE = ("ahead", "offset", "left of", "facing field", "normal", "rows", "any heading", "turned")
+SURE = (
+    "ahead",
+    "offset",
+    "left of",
+    "facing field",
+    "normal",
+    "rows",
+    "any heading",
+    "turned",
+    "visible road",
+    "speed",
+)
 """Programs of which every drawn scene is decided together with the others."""
 OPTIONS = (
     MatchOptions(),

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import random
+import re
+import shutil
+from pathlib import Path
+
 import pytest
 
 from scenicq.errors import Source
+from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.run import Query, QueryOptions
@@ -13,6 +20,7 @@ from scenicq.query.explain import prefilter_counts
 from scenicq.query.explain.advice import advice
 from scenicq.store.dataset import open_dataset
 
+SAMPLES = Path(__file__).parents[3] / "sample_data"
 TEXT = """model scenic.domains.driving.model
 roadway = network.laneRegion.union(network.intersectionRegion)
 ego = new Car on roadway
@@ -111,3 +119,76 @@ def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroad
     asked = run("match", crossing, crossroads, "--advise")
     assert asked.exit_code == 0
     assert asked.stderr.startswith("5 matches in 156 frames; ")
+
+
+def two_maps(folder, lacking=("elsewhere", "nowhere")):
+    """The sample, of which every third recording lies on each of two maps that the dataset does not have."""
+    source = Path(shutil.copytree(SAMPLES / "crossroads", folder / "source"))
+    labels = [json.loads(line) for line in (source / "labels.jsonl").read_text().splitlines()]
+    recordings = sorted({each["recording"] for each in labels})
+    for each in labels:
+        place = recordings.index(each["recording"]) % 3
+        if place:
+            each["map"] = lacking[place - 1]
+    (source / "labels.jsonl").write_text("".join(json.dumps(each) + "\n" for each in labels))
+    ingest(source, folder / "d")
+    return open_dataset(folder / "d")
+
+
+def test_frames_on_maps_that_lack_what_is_needed_are_in_no_number(tmp_path):
+    dataset = two_maps(tmp_path)
+    query = taken(dataset, TEXT)
+    found = advice(query)
+    elsewhere = sum(dataset.manifest.by_map[name].frames for name in ("elsewhere", "nowhere"))
+    assert found.without_map == elsewhere > 0
+    assert not found.first[0][0].startswith("map ")
+    assert not any(each.sampled for each in found.outlooks)
+    told = {each.change.told: each.least for each in found.outlooks}
+    without = TEXT.replace("require (distance to walker) < 2\n", "")
+    assert told["without `require (distance to walker) < 2`"] == taken(dataset, without).funnel.matches > 0
+    (warning,) = query.funnel.warnings
+    assert warning.message.startswith(f"{elsewhere} frames on 2 maps (`elsewhere`, `nowhere`) cannot match; of `else")
+
+
+CLASSES = ("Car", "Bus", "Pedestrian", "Vehicle")
+PLACES = ("on road", "on sidewalk, facing Range(0, 360) deg", "on intersection", "ahead of ego by Range(1, 30)",
+          "in everywhere, facing Range(0, 360) deg")  # fmt: skip
+REQUIREMENTS = ("(distance to a) < 12", "(distance from a to b) < 8", "a.speed > 3",
+                "abs(relative heading of b) < 60 deg", "a.position in road", "b.speed < 1")  # fmt: skip
+SPEEDS = ("", ", with speed Range(2, 6)", ", with width Range(1.5, 2.2)")
+
+
+def drawn(seed):
+    """A program of three objects and two requirements."""
+    draw = random.Random(seed)
+    lines = ["model scenic.domains.driving.model", "ego = new Car on road"]
+    lines += [f"{name} = new {draw.choice(CLASSES)} {draw.choice(PLACES)}{draw.choice(SPEEDS)}" for name in "ab"]
+    lines += [f"require {each}" for each in draw.sample(REQUIREMENTS, 2)]
+    return "\n".join(lines) + "\n"
+
+
+def rewritten(text, change):
+    """The program and the tolerance that a user would come to who does as a change says; None where it is no such."""
+    usual = "position=0.25,heading=5deg"
+    if requirement := re.fullmatch(r"without `(.+)`", change.told):
+        return text.replace(f"{requirement[1]}\n", ""), usual
+    if change.told.startswith("--tolerance "):
+        return text, change.told.removeprefix("--tolerance ")
+    if feature := re.fullmatch(r"`(\w+)\.(\w+)` not compared", change.told):
+        sizes = {"position": "100000", "heading": "180deg"}
+        return text, f"{usual},{feature[1]}.{feature[2]}={sizes.get(feature[2], '1000')}"
+    if wider := re.fullmatch(r"`(\w+)` as `(\w+)`", change.told):
+        return re.sub(rf"^{wider[1]} = new \w+", f"{wider[1]} = new {wider[2]}", text, flags=re.MULTILINE), usual
+    return None
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_whatever_the_program_a_number_is_that_of_a_run_with_the_change(dataset, seed):
+    query = taken(dataset, drawn(seed))
+    for each in advice(query).outlooks:
+        # a class of another kind may have other defaults, which a wider class alone does not change
+        found = None if each.change.both or each.change.category else rewritten(drawn(seed), each.change)
+        if found is not None:
+            again = taken(dataset, *found).funnel.matches
+            assert each.least <= again <= each.most, (drawn(seed), each.change.told)
+            assert not each.certain or again == each.least

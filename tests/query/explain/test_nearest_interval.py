@@ -88,3 +88,28 @@ def test_from_the_command_line(run, crossroads, tmp_path):
     assert "no_match: `parked.speed < 0.2` would do with" in " ".join(done.stdout.split())
     page = (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
     assert "near miss" in page
+
+
+def test_an_interval_that_is_too_short_says_which_duration_would_do(crossroads):
+    program = "other = new Car ahead of ego by Range(3, 20)\n"
+    options = replace(FOR_SECONDS, time=IntervalOptions(min_duration_s=20))
+    query = ask(crossroads, program, options)
+    assert not matching(query)
+    first = nearest_intervals(query, 1)[0]
+    told = re.fullmatch(r"would match with --min-duration ([\d.]+)", first.verdict.cause.detail)
+    shorter = replace(FOR_SECONDS, time=IntervalOptions(min_duration_s=float(told.group(1))))
+    longer = replace(FOR_SECONDS, time=IntervalOptions(min_duration_s=float(told.group(1)) + 0.02))
+    assert matching(ask(crossroads, program, shorter)) == {first.recording}
+    assert not matching(ask(crossroads, program, longer))
+
+
+def test_a_number_that_the_program_says_twice_is_one_number(crossroads):
+    program = (
+        "walker = new Pedestrian\nrequire (distance to walker) > 3\nrequire eventually (distance to walker) < 1\n"
+        "terminate when (distance to walker) < 1\n"
+    )
+    query = ask(crossroads, program)
+    assert not matching(query)
+    first = nearest_intervals(query, 1)[0]
+    told = re.fullmatch(r"`\(distance to walker\) < 1` would do with ([\d.]+) instead of 1", first.verdict.cause.detail)
+    assert matching(ask(crossroads, program.replace("< 1", f"< {float(told.group(1)) + 0.001}"))) == {first.recording}

@@ -203,6 +203,22 @@ def test_blocks_that_are_held_together_are_sifted_as_each_alone(dataset):
     assert frames
 
 
+@pytest.mark.parametrize(("options", "read"), [(MatchOptions(), False), (MatchOptions(ego="any"), True)])
+def test_objects_that_can_play_no_role_are_not_read(dataset, options, read):
+    query = Query(dataset, Source("test.scenic", HEADER + "ego = new Car on road"), QueryOptions(options))
+    (plan,) = query.plans()
+    (block,) = query.blocks(plan.map)
+    with closing(dataset.connect()) as connection:
+        run_prefilter(dataset, connection, plan, block)
+        labels = [each.label for each in candidates(connection, plan)]
+    assert labels
+    assert any(label.objects for label in labels) is read
+    matching = {each.frame for each in query.results()}
+    assert matching
+    without = Query(dataset, query.source, QueryOptions(options, prefilter=False))
+    assert matching == {each.frame for each in without.results()}
+
+
 def test_blocks_cover_every_frame_once(dataset):
     frames = dataset.manifest.total.frames
     where = {"street": [Extent(0, 0, frames, ("recording", "recording")), Extent(1, 10, 9_000, ("s", "t"))]}

@@ -1,0 +1,208 @@
+"""Closed forms of headings, other numbers and texts: sums of ranges around what is known, and a few choices."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from scenicq.forest.groups import Comparison
+from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Node, Select, Value
+from scenicq.forest.walk import postorder
+from scenicq.geometry.road_direction import RoadDirection
+from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
+from scenicq.match.decide.compiled_expressions import (
+    Columns,
+    CompiledExpressions,
+    FloatColumn,
+    Form,
+    Get,
+    UnclearError,
+    clipped,
+    spread,
+)
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.evaluation import unlike
+from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.tolerance import SLACK
+
+__all__ = ["heading", "number", "text"]
+
+_MOST_CHOICES = 8
+_STRAIGHT = (0.0,)
+"""The direction that is added where no field is asked."""
+
+
+class _Case(NamedTuple):
+    """An expression under one way that its choices come out.
+
+    Attributes:
+        chosen: The options.
+        form: The expression.
+    """
+
+    chosen: dict[Identity, Value]
+    form: Form
+
+
+def _cases(root: Node) -> list[_Case]:
+    """The ways in which the choices of an expression come out; none where there are many, or one has no form."""
+    indices = [node for node in postorder((root,)) if isinstance(node, Index)]
+    if math.prod(len(node.weights) for node in indices) > _MOST_CHOICES:
+        return []
+    cases: list[_Case] = []
+    for picked in itertools.product(*(range(len(node.weights)) for node in indices)):
+        chosen = {node.identity: float(option) for node, option in zip(indices, picked, strict=True)}
+        form = CompiledExpressions(chosen).form(root)
+        if form is None:
+            return []
+        cases.append(_Case(cast("dict[Identity, Value]", chosen), form))
+    return cases
+
+
+def number(item: Comparison) -> ClosedForm | None:
+    """A number that is no heading."""
+    cases, index, name = _cases(item.expression), item.object, item.property
+    if not cases or any(case.form.fields for case in cases):
+        return None
+
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        margin, seen = options.tolerance.of(index, name), get(index, name)
+        many, fails = isinstance(get, Columns), True
+        if (many and len(cases) > 1) or not isinstance(seen, float | np.ndarray):
+            raise UnclearError
+        for chosen, form in cases:
+            known = form.known(get)
+            value = clipped(seen, known + form.low, known + form.high)
+            off = abs(value - seen)
+            holds, misses = off <= margin.sure, off > margin.reach + SLACK
+            if many or holds:
+                return Evaluated(holds, misses, chosen | spread(form, value - known))
+            fails = fails and misses
+        return Evaluated(False, fails, {})
+
+    first = cases[0].form
+
+    def detail(get: Get, lookups: MapLookups) -> str:
+        # what the cascade tries first is what it words
+        return "" if first.terms else unlike(name, first.known(get), get(index, name))
+
+    return ClosedForm(item, evaluate, detail=detail)
+
+
+def text(item: Comparison) -> ClosedForm | None:
+    """A value that is no number, or one of some, each of which must be the label's own."""
+    node = item.expression
+    if isinstance(node, Constant):
+        options: list[tuple[dict[Identity, Value], Value]] = [({}, node.value)]
+    elif isinstance(node, Select) and isinstance(node.index, Index):
+        options = [
+            ({node.index.identity: float(place)}, option.value)
+            for place, option in enumerate(node.options)
+            if isinstance(option, Constant)
+        ]
+        if len(options) < len(node.options):
+            return None
+    else:
+        return None
+    if not all(isinstance(value, str | bool) for _, value in options):
+        return None
+    index, name = item.object, item.property
+
+    def evaluate(get: Get, options_: MatchOptions, lookups: MapLookups) -> Evaluated:
+        if isinstance(get, Columns):
+            raise UnclearError
+        seen = get(index, name)
+        for chosen, value in options:
+            if value == seen:
+                return Evaluated(True, False, chosen)
+        return Evaluated(False, True, {})
+
+    return ClosedForm(item, evaluate, detail=lambda get, _: unlike(name, options[0][1], get(index, name)))
+
+
+def heading(item: Comparison) -> ClosedForm | None:
+    """A heading, possibly along the roads where something observed is."""
+    choices: list[tuple[dict[Identity, Value], Form, float, float]] = []
+    for chosen, form in _cases(item.expression):
+        middle = 0.0 if form.unbounded else (form.low + form.high) / 2
+        choices.append((chosen, form, middle, (form.high - form.low) / 2))
+    fields = {id(node): node for _, form, *_ in choices for node in form.fields}
+    if not choices or len(fields) > 1 or any(len(form.fields) != len(fields) for _, form, *_ in choices):
+        return None
+    along = next(iter(fields.values()), None)
+    if along is not None and not _asks_for_roads(along):
+        return None
+    index, first = item.object, choices[0][1]
+    flow = cast(RoadDirection, cast(Constant, along.field).value) if along is not None else None
+    where = cast(Feature, along.point).object if along is not None else -1
+
+    def directions(get: Get, lookups: MapLookups) -> list[tuple[float, ...]]:
+        return [lookups.allowed(cast(RoadDirection, flow), place) for place in each_position(get(where, "position"))]
+
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        margin, seen = options.tolerance.of(index, "heading"), cast(float, get(index, "heading"))
+        many, fails = isinstance(get, Columns), True
+        if many and len(choices) > 1:
+            raise UnclearError
+        allowed = None if flow is None else directions(get, lookups)
+        for chosen, form, middle, half in choices:
+            rest = seen - form.known(get) - middle
+            if isinstance(rest, np.ndarray):
+                rests: list[float] = cast(FloatColumn, rest).tolist()
+                each = [_STRAIGHT] * len(rests) if allowed is None else allowed
+                offs = [_turn(*pair, half, margin.sure) for pair in zip(rests, each, strict=True)]
+                off = cast(float, np.array(offs))
+            else:
+                off = _turn(rest, _STRAIGHT if allowed is None else allowed[0], half, margin.sure)
+            beyond = abs(off) - half
+            holds, misses = beyond <= margin.sure, beyond > margin.reach + SLACK
+            if many or holds:
+                values = spread(form, middle + clipped(off, -half, half))
+                return Evaluated(holds, misses, chosen | values if chosen else values)
+            fails = fails and misses
+        return Evaluated(False, fails, {})
+
+    def detail(get: Get, lookups: MapLookups) -> str:
+        # what the cascade tries first is what it words
+        if first.terms:
+            return ""
+        direction = 0.0 if flow is None else directions(get, lookups)[0][0]
+        seen = cast(float, get(index, "heading"))
+        return unlike("heading", first.known(get) + direction, seen)
+
+    return ClosedForm(item, evaluate, field=flow, index=where, detail=detail)
+
+
+def _turn(angle: float, allowed: Sequence[float], half: float, sure: float) -> float:
+    """How far an angle is turned from the first direction that it is within reach of, or else from the nearest one.
+
+    Args:
+        angle: In radians.
+        allowed: The directions; without any the answer is NaN.
+        half: Half the range that is allowed besides; unbounded, the first direction does.
+        sure: How much further is within reach.
+    """
+    nearest = math.nan
+    for direction in allowed:
+        if math.isinf(half):
+            return angle - direction
+        off = math.remainder(angle - direction, math.tau)
+        if abs(off) - half <= sure:
+            return off
+        if not abs(off) >= abs(nearest):
+            nearest = off
+    return nearest
+
+
+def _asks_for_roads(node: DirectionAt) -> bool:
+    """Whether a field is asked for the direction of roads at an observed position."""
+    return (
+        isinstance(node.field, Constant)
+        and isinstance(node.field.value, RoadDirection)
+        and isinstance(node.point, Feature)
+        and node.point.property == "position"
+    )

@@ -1,0 +1,133 @@
+"""Regions that are known once the label is, as tests of positions: of one, or of columns of them.
+
+A position that surely lies in a region is a point of it. Within tolerance of the boundary nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.forest.nodes import (
+    Constant,
+    DiscAt,
+    Node,
+    RectangleAt,
+    RegionDifference,
+    RegionIntersection,
+    RegionUnion,
+    SectorAt,
+    Value,
+)
+from scenicq.forest.walk import children, postorder
+from scenicq.geometry.membership import distance
+from scenicq.geometry.regions import Disc, Rectangle, Region, Sector
+from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
+from scenicq.match.decide.closed_form import each_position
+from scenicq.match.decide.compiled_expressions import Columns, CompiledExpressions, Exact, Get
+from scenicq.match.problem.map_lookups import XY, MapLookups
+
+__all__ = ["RegionTest", "region_test"]
+
+_MOST_PARTS = 40
+"""Regions that one may be made of."""
+
+_Truths: TypeAlias = "bool | NDArray[np.bool_]"
+_Test: TypeAlias = Callable[[Get, Value, MapLookups, float], "tuple[_Truths, _Truths]"]
+"""From what is observed, a position, what is known of the map and the tolerance, whether the position surely lies in a
+region, and whether it surely lies further than the tolerance from it; of columns, columns."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegionTest:
+    """A region as a test.
+
+    Attributes:
+        evaluate: The test.
+        regions: Those of the map that it asks for.
+    """
+
+    evaluate: _Test
+    regions: tuple[Region, ...]
+
+
+def region_test(root: Node) -> RegionTest | None:
+    """The test of a region; None if something about it is random, or it is made of too many."""
+    formulas = CompiledExpressions({})
+    made: dict[int, _Test | None] = {}
+    regions: dict[int, Region] = {}
+    parts = 0
+    for node in postorder((root,)):
+        match node:
+            case Constant() if isinstance(node.value, Region):
+                regions[id(node.value)] = node.value
+                made[id(node)] = _constant(node.value)
+            case DiscAt() | SectorAt() | RectangleAt():
+                made[id(node)] = _placed(node, [formulas.exact(child) for child in children(node)])
+            case RegionUnion() | RegionIntersection() | RegionDifference():
+                below = [made.get(id(child)) for child in children(node)]
+                parts += len(below)
+                tests = [test for test in below if test is not None]
+                made[id(node)] = _combined(node, tests) if len(tests) == len(below) > 0 else None
+            case _:
+                continue
+    test = made.get(id(root))
+    return None if test is None or parts > _MOST_PARTS else RegionTest(test, tuple(regions.values()))
+
+
+def _constant(region: Region) -> _Test:
+    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+        # how far off a place is, is not looked up
+        if isinstance(get, Columns):
+            held = np.array([lookups.within(region, place) for place in each_position(position)], dtype=np.bool_)
+            return held, ~held if reach <= 0 else np.zeros(get.size, dtype=np.bool_)
+        within = lookups.within(region, cast(XY, position))
+        return within, not within and reach <= 0
+
+    return test
+
+
+def _placed(node: DiscAt | SectorAt | RectangleAt, known: list[Exact | None]) -> _Test | None:
+    if any(each is None for each in known):
+        return None
+    center, *numbers = cast("list[Exact]", known)
+    of_many = {DiscAt: to_discs, SectorAt: to_sectors, RectangleAt: to_rectangles}[type(node)]
+    kind = {DiscAt: Disc, SectorAt: Sector, RectangleAt: Rectangle}[type(node)]
+
+    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+        (x, y), given = cast(XY, center(get)), [number(get) for number in numbers]
+        px, py = cast(XY, position)
+        if isinstance(get, Columns):
+            off = np.broadcast_to(of_many(px - x, py - y, *given), get.size)
+        else:
+            off = distance(cast(Region, kind((x, y), *given)), px, py)  # type: ignore[arg-type]
+        return off <= 0.0, off > reach
+
+    return test
+
+
+def _combined(node: RegionUnion | RegionIntersection | RegionDifference, tests: list[_Test]) -> _Test:
+    if isinstance(node, RegionDifference):
+        base, removed = tests
+
+        def without(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+            held, missed = base(get, position, lookups, reach)
+            # whoever is surely off what is removed, by whatever little
+            _, off = removed(get, position, lookups, 0.0)
+            return held & off, missed
+
+        return without
+    each_holds = isinstance(node, RegionIntersection)
+
+    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+        held, missed = tests[0](get, position, lookups, reach)
+        for one in tests[1:]:
+            also, off = one(get, position, lookups, reach)
+            held, missed = (held & also, missed | off) if each_holds else (held | also, missed & off)
+        return held, missed
+
+    return test

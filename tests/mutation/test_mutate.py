@@ -1,0 +1,51 @@
+"""A change reaches functions that exist already, wherever they are kept."""
+
+import ast
+import importlib.util
+import sys
+
+import pytest
+
+pytest.importorskip("coverage", reason="the tools of `make mutate` are not installed")
+from mutate import exchange, mutants
+
+TEXT = """
+from functools import lru_cache
+
+def plain(a, b):
+    return a + b
+
+class Holder:
+    @property
+    def value(self):
+        return [each for each in (1, 2) if each < 2]
+
+@lru_cache
+def kept(a):
+    def inner():
+        return a * 2
+    return inner()
+"""
+
+
+def test_functions_get_the_code_of_a_changed_file(tmp_path):
+    file = tmp_path / "changing.py"
+    file.write_text(TEXT)
+    spec = importlib.util.spec_from_file_location("changing", file)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.pop("changing", None)
+    spec.loader.exec_module(module)
+    plain, holder = module.plain, module.Holder()
+    tree = ast.parse(TEXT)
+    seen = set()
+    for _, what in mutants(tree):
+        ast.fix_missing_locations(tree)
+        exchange(compile(tree, str(file), "exec"))
+        module.kept.cache_clear()
+        seen.add((what, plain(1, 2), str(holder.value), module.kept(5)))
+    assert {
+        ("Add -> Sub", -1, "[1]", 10), ("Lt -> LtE", 3, "[1, 2]", 10), ("Mult -> Add", 3, "[1]", 7),
+        ("returns None", None, "[1]", 10), ("returns None", 3, "None", 10), ("2 -> 3", 3, "[1]", 15),
+    } <= seen  # fmt: skip
+    exchange(compile(ast.parse(TEXT), str(file), "exec"))
+    assert (plain(1, 2), holder.value) == (3, [1])
