@@ -71,7 +71,7 @@ def write_pages(evaluation: Evaluation, dataset: Dataset, folder: Path, sensors:
 
 def _cell(text: str) -> str:
     """A cell of a table: a figure breaks before its interval at most."""
-    return escape(text).replace(" %", "\u00a0%").replace(", ", ",\u00a0")
+    return escape(text).replace(" %", "\u00a0%").replace(", ", ",\u00a0").replace("&lt; ", "&lt;\u00a0")
 
 
 def _table(shown: Table, graphs: Sequence[str] = ()) -> str:

@@ -30,6 +30,8 @@ __all__ = ["densities", "log_densities", "rank_results", "sample_diverse", "samp
 Reals = NDArray[np.float64]
 
 _DRAWS = 512
+_DIGITS = 10
+"""Decimals of a log-density: what differs beyond them is rounding, and equal densities keep the dataset's order."""
 
 
 def log_densities(
@@ -112,7 +114,7 @@ def _of_one_signature(
     weights = np.full(len(labels), math.nan)
     weights[inside] = log_weights(of_variables[inside], np.hstack(solved)[inside], kinds, seed)
     return [
-        LogDensity(float(log), float(error), tuple(fixed), log_weight=float(weight))
+        LogDensity(round(float(log), _DIGITS), float(error), tuple(fixed), log_weight=float(weight))
         if math.isfinite(log)
         else LogDensity(None, 0, tuple(fixed), outside)
         for log, error, weight in zip(logs, errors, weights, strict=True)
@@ -163,8 +165,7 @@ def rank_results(query: Query, results: Iterable[Result]) -> list[Result]:
 
     def order(number: int) -> tuple[float, int]:
         density = known[number].density
-        # equal densities differ by how they were rounded
-        return (math.inf if density is None or density.log is None else -round(density.log, 9), number)
+        return (math.inf if density is None or density.log is None else -density.log, number)
 
     return [known[number] for number in sorted(range(len(known)), key=order)]
 

@@ -20,14 +20,15 @@ from scenicq.evaluate.resampling import (
 )
 
 sys.path.insert(0, str(Path(__file__).parent))
-from worlds import planted, world
+from worlds import World, layered, planted, world
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("more", [0.0, 0.15])
-def test_planted_truth(more: float) -> None:
+@pytest.mark.parametrize("make", [world, layered])
+def test_planted_truth(more: float, make: World) -> None:
     """500 datasets of 30 recordings: coverage 93 to 97 %, false alarms 3.5 to 6.5 %."""
-    held, differences, alarms = planted(500, 30, 0.12, more, 2000, 1999)
+    held, differences, alarms = planted(500, 30, 0.12, more, 2000, 1999, make)
     assert 0.93 <= held <= 0.97
     assert 0.93 <= differences <= 0.97
     if more:
