@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +29,15 @@ from .report import plain
 __all__ = ["explain"]
 
 
-def _recording(query: Query, named: str) -> tuple[str, int | None] | None:
-    """The recording and time that are named, if it is not a frame."""
+def _recording(query: Query, named: str) -> tuple[str, int | float | None] | None:
+    """The recording and the timestamp in microseconds, or seconds in it, that are named, if it is not a frame."""
     recordings = query.dataset.manifest.by_recording
     name, at, time = named.rpartition("@")
-    if at and name in recordings and time.isdecimal():
-        return name, int(time)
+    if at and name in recordings:
+        if time.isdecimal():
+            return name, int(time)
+        if re.fullmatch(r"\d+(\.\d+)? ?s", time, re.ASCII):
+            return name, float(time.removesuffix("s"))
     return (named, None) if named in recordings else None
 
 
@@ -43,15 +47,16 @@ def _recording(query: Query, named: str) -> tuple[str, int | None] | None:
         "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
         "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a "
-        "program about what happens over time that of a recording, and after `@` the timestamp at which the interval "
-        "begins.",
+        "program about what happens over time that of a recording, and after `@` when the interval begins: a "
+        "timestamp, or the seconds from where the recording begins (`@3.5s`).",
     },
     exits={0: "the frame or recording matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
     topics={"What counts as a match": SHARED},
     epilog="\b\nExamples:\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.5,heading=5deg --smt2 formulas\n"
-    "  scenicq explain cut_in.scenic dataset scene-0061@1532402928147847",
+    "  scenicq explain cut_in.scenic dataset scene-0061@1532402928147847\n"
+    "  scenicq explain cut_in.scenic dataset scene-0061@3.5s",
 )
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.argument("dataset", type=click.Path())

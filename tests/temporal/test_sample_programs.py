@@ -151,3 +151,12 @@ def test_a_time_that_a_recording_does_not_have_is_refused(town):
     done = explained(town, PROGRAMS / "02_cut_in.scenic", "06-cut-in@5")
     assert done.exit_code == 2
     assert "has no frame at 5" in done.stderr
+    assert "26 frames are at 1700018000000000 (0.0 s), " in done.stderr
+    assert "has no frame at 99.5 s" in explained(town, PROGRAMS / "02_cut_in.scenic", "06-cut-in@99.5s").stderr
+
+
+@pytest.mark.parametrize("when", ["1700018003000000", "3s", "3.0s", "3.04 s", "2.8s"])
+def test_a_frame_is_named_by_its_timestamp_or_by_seconds(town, when):
+    done = explained(town, PROGRAMS / "02_cut_in.scenic", f"06-cut-in@{when}")
+    assert done.exit_code == 0
+    assert "recording 06-cut-in matches from 3.0 s to 7.0 s" in done.output

@@ -39,6 +39,9 @@ _WIDTH = 60
 _MOST_ROUNDS = 8
 """How often starts whose runs are cut off are left out."""
 
+_ROUNDED_S = 0.05
+"""Seconds are shown to a tenth."""
+
 
 @dataclass(frozen=True, slots=True)
 class Band:
@@ -151,14 +154,33 @@ class IntervalExplanation:
         return found
 
 
-def explain_recording(query: Query, solver: Solver, name: str, time_us: int | None) -> IntervalExplanation:
+def _frame_time(tracks: RecordingTracks, begins: int | float) -> int:
+    """The timestamp of the frame at a timestamp, or nearest to some seconds from where the recording begins."""
+    times, seconds = tracks.times_us.tolist(), tracks.seconds
+    if isinstance(begins, int):
+        if begins in times:
+            return begins
+        told = str(begins)
+    else:
+        place = int(np.argmin(abs(seconds - begins)))
+        apart = np.diff(seconds)
+        if abs(float(seconds[place]) - begins) <= (float(np.median(apart)) / 2 if len(apart) else 0.0) + _ROUNDED_S:
+            return times[place]
+        told = f"{begins:g} s"
+    frames = ", ".join(f"{time} ({second:.1f} s)" for time, second in zip(times[:3], seconds.tolist(), strict=False))
+    hint = f"its {len(times):,} frames are at {frames} ... to {float(seconds[-1]):.1f} s"
+    raise DataError(Diagnostic("option-invalid", f"{tracks.name} has no frame at {told}", hints=(hint,)))
+
+
+def explain_recording(query: Query, solver: Solver, name: str, begins: int | float | None) -> IntervalExplanation:
     """Explain a recording.
 
     Args:
         query: A query over time.
         solver: Decides what is not decided otherwise.
         name: Of the recording.
-        time_us: The timestamp at which the interval shall begin; anywhere by default.
+        begins: Where the interval shall begin: a timestamp in microseconds, or, as a float, the seconds from where the
+            recording begins, to half the time between two frames; anywhere by default.
 
     Raises:
         DataError: option-invalid: there is no such recording, or no frame at that time.
@@ -169,10 +191,7 @@ def explain_recording(query: Query, solver: Solver, name: str, time_us: int | No
         tracks = reader.read(first, end)
     scenario, _ = query.compile(labels[0].map)
     matcher = Matcher(scenario, query.options.match, solver)
-    if time_us is not None and time_us not in tracks.times_us.tolist():
-        times = ", ".join(map(str, tracks.times_us.tolist()[:3]))
-        hint = f"its frames are at {times} ..."
-        raise DataError(Diagnostic("option-invalid", f"{name} has no frame at {time_us}", hints=(hint,)))
+    time_us = None if begins is None else _frame_time(tracks, begins)
     failed: Counter[str] = Counter()
     examples: dict[str, str] = {}
     with TrackBlock(query.dataset, part, [(first, end)]) as block:
