@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from scenicq.forest.nodes import Identity, Value
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.decide.solver_step import encoded
 from scenicq.match.problem.conditioned import Item, conditioned
@@ -43,9 +44,15 @@ class Finding:
         search: The search that led to it; None if there were no candidates to search among.
         plan: The scenario's groups for what was observed; None without a match.
         assignment: The correspondence, numbers of label objects by index of the object; partial without a match.
+        satisfied: How each group was satisfied; none without a match.
     """
 
     verdict: Verdict
     search: LabelSearch | None = None
     plan: MatchPlan | None = None
     assignment: Mapping[int, int] = field(default_factory=dict[int, int])
+    satisfied: tuple[Satisfied, ...] = ()
+
+    def values(self) -> Mapping[Identity, Value]:
+        """The witness of a match: the value of each random variable of its groups."""
+        return {identity: value for outcome in self.satisfied for identity, value in outcome.values.items()}

@@ -109,10 +109,10 @@ class Matcher:
                 return
             yield finding
 
-    def examine(self, label: Label) -> Finding:
-        """Decide one label and keep what the verdict rests on."""
+    def examine(self, label: Label, given: Mapping[str, str] | None = None) -> Finding:
+        """Decide one label and keep what the verdict rests on; arguments as of `match`."""
         with limited(self.options.timeout_s):
-            return next(self._findings((label, None), MapLookups()))
+            return next(self._findings((label, None), MapLookups(), None, given))
 
     def relaxed(self, options: MatchOptions) -> Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
@@ -165,7 +165,9 @@ class Matcher:
                     plan = self.plans.plan(signature)
                     for solution in search.solutions(plan, candidates):
                         matched = True
-                        yield Finding(self._verdicts.match(label, solution), search, plan, solution.assignment)
+                        satisfied = tuple(outcome for _, outcome in solution.outcomes)
+                        match = self._verdicts.match(label, solution)
+                        yield Finding(match, search, plan, solution.assignment, satisfied)
             except (Exhausted, TimeIsUp) as error:
                 ended = "budget" if isinstance(error, Exhausted) else "timeout"
             weight, verdict = self._verdicts.without_match(label, search, ended)

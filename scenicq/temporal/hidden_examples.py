@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from scenicq.budget import look
 from scenicq.forest.build import constant
-from scenicq.forest.nodes import Feature, Identity, Leaf, Logic, LogicOp, Node, Value
+from scenicq.forest.nodes import Feature, Identity, Index, Logic, LogicOp, Node, Value
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.walk import leaves, postorder, transform
 from scenicq.match.matcher import Matcher
@@ -122,14 +122,18 @@ class Examples:
         if some is not None:
             wanted = [Requirement(some[0] if len(some) == 1 else Logic(LogicOp.OR, tuple(some)), None)]
         scenario = replace(self.scenario, requirements=(*self.scenario.requirements, *wanted), dynamics=None)
-        verdict = Matcher(scenario, self.match, self.solver).match(self.label, given=self.given)
+        finding = Matcher(scenario, self.match, self.solver).examine(self.label, self.given)
+        verdict = finding.verdict
         if isinstance(verdict, NoMatch):
             return False
         if not isinstance(verdict, Match):
             return None
+        # by identity: several variables may share a place in the program
+        known = finding.values()
         values: dict[Identity, Value] = {}
         for leaf in leaves(*self.conditions.values()):
-            value = verdict.witness.get(_place(leaf))
+            # of what was not chosen, any option does
+            value = known.get(leaf.identity, 0.0 if isinstance(leaf, Index) else None)
             if value is None:
                 return None
             values[leaf.identity] = value
@@ -153,7 +157,3 @@ class Examples:
 
         here = transform(self.conditions[number], observed)
         return Logic(LogicOp.NOT, (here,)) if holds else here
-
-
-def _place(leaf: Leaf) -> str:
-    return leaf.span.mark if leaf.span else type(leaf).__name__

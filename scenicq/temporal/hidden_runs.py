@@ -9,7 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from scenicq.budget import TimeIsUp, limited, look
-from scenicq.forest.nodes import Compare, CompareOp, Constant, Leaf, Logic, LogicOp, Node
+from scenicq.forest.nodes import Compare, CompareOp, Constant, Leaf, Logic, LogicOp, Node, Value
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.simplify import roots_of
 from scenicq.forest.temporal import Atom
@@ -210,9 +210,11 @@ class HiddenRuns:
             )
             ego = self.scenario.objects[self.scenario.ego].name
             given = {name: id_ for name, id_ in correspondence.items() if name != ego}
-            verdict = Matcher(scenario, self.match, self.solver).match(label, given=given)
+            finding = Matcher(scenario, self.match, self.solver).examine(label, given)
+            verdict = finding.verdict
             if isinstance(verdict, Match):
-                values = [verdict.witness.get(_place(leaf)) for leaf in joint]
+                known = finding.values()
+                values = [known.get(leaf.identity) for leaf in joint]
                 held = next((each for each in same if _holds(each[1], joint, values)), same[0])
                 return *held, ""
             if isinstance(verdict, Unknown) and undecided is None:
@@ -239,7 +241,7 @@ def _within(joint: Sequence[Leaf], some: Sequence[Cell]) -> Node:
     return options[0] if len(options) == 1 else Logic(LogicOp.OR, tuple(options))
 
 
-def _holds(cell: Cell, joint: Sequence[Leaf], values: Sequence[WitnessValue | None]) -> bool:
+def _holds(cell: Cell, joint: Sequence[Leaf], values: Sequence[Value | None]) -> bool:
     """Whether a witness has its values in a cell."""
     return all(
         isinstance(value, float) and cell.ranges[leaf.identity][0] <= value <= cell.ranges[leaf.identity][1]

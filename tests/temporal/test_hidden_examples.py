@@ -73,3 +73,30 @@ def test_a_variable_of_which_the_first_frame_says_nothing_stays_unknown(crossroa
     results = list(Query(open_dataset(crossroads), Source("program.scenic", program), options).results())
     assert {type(each.verdict) for each in results} == {Unknown}
     assert {each.verdict.reason for each in results} == {"a hidden random point in a condition over time"}
+
+
+NESTED = """model scenic.domains.driving.model
+road = Uniform(*network.roads)
+lane = Uniform(*road.lanes)
+spot = new OrientedPoint in lane.centerline
+ego = new Car at spot
+terminate when (distance to spot) > 15 and (distance to lane) < 100
+"""
+
+
+def test_choices_that_share_a_place_have_values_of_their_own(crossroads):
+    dataset = open_dataset(crossroads)
+    options = QueryOptions(solver="portable", every=True)
+    results = list(Query(dataset, Source("program.scenic", NESTED), options).results())
+    matches = [each for each in results if isinstance(each.verdict, Match)]
+    assert matches
+    assert not [each for each in results if isinstance(each.verdict, Unknown)]
+    for each in matches:
+        mine = [label for label in dataset.labels() if label.recording == each.recording]
+        mine = sorted(
+            (label for label in mine if label.timestamp_us >= each.timestamp_us), key=lambda e: e.timestamp_us
+        )
+        spot = each.verdict.witness["program.scenic:4:26"]
+        away = [math.dist((label.ego.x, label.ego.y), spot) for label in mine[: each.interval.count]]
+        assert away[0] <= TOLERANCE
+        assert away[-1] > 15 >= max(away[:-1])
