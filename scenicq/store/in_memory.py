@@ -16,6 +16,8 @@ def connect_in_memory(config: Mapping[str, bool | int | str] | None = None) -> d
         config: Settings that DuckDB takes at the start.
     """
     connection = duckdb.connect(":memory:", config={**(config or {})})
-    # where Python is interactive, DuckDB draws how far a long query has come, between whatever the program writes
-    connection.execute("SET enable_progress_bar = false")
+    # where Python is interactive, DuckDB draws how far a long query has come, between whatever the program writes;
+    # in a notebook without widgets it does not, and cannot be asked not to
+    if connection.execute("SELECT current_setting('enable_progress_bar')").fetchone() == (True,):
+        connection.execute("SET enable_progress_bar = false")
     return connection

@@ -104,7 +104,7 @@ class SideBySide:
     frames: int
     seconds: float
     found: Compared = field(default_factory=Compared)
-    _labels: dict[Block, list[Label]] = field(default_factory=dict)
+    _labels: dict[tuple[Block, bool], list[Label]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Connect once: with a small dataset, this takes longer than a query."""
@@ -140,20 +140,20 @@ class SideBySide:
             matchers = [Matcher(world.scenario, narrowed.options.match, solver) for world in worlds]
             for block in blocks(self._extents, map_name):
                 missed, left = self._prefiltered(worlds[0], block)
-                self._decide(name, matchers, self._of(block), missed, left)
+                self._decide(name, matchers, self._of(block, motion=worlds[0].motion), missed, left)
 
-    def _of(self, block: Block) -> list[Label]:
-        if block not in self._labels:
-            self._labels[block] = list(every_label(self.dataset, block))
-        return self._labels[block]
+    def _of(self, block: Block, *, motion: bool) -> list[Label]:
+        if (block, motion) not in self._labels:
+            self._labels[block, motion] = list(every_label(self.dataset, block, motion=motion))
+        return self._labels[block, motion]
 
     def _prefiltered(self, world: CompiledMap, block: Block) -> tuple[NDArray[np.int16], dict[str, Candidate]]:
         """The step that excludes each frame, -1 for none; and what is left, by frame."""
         if not world.plan.stages:
-            labels = self._of(block)
+            labels = self._of(block, motion=world.motion)
             return np.full(len(labels), -1, np.int16), {label.frame: Candidate(label, None) for label in labels}
         missed = run_prefilter(self.dataset, self._connection, world.plan, block)
-        left = candidates(self._connection, world.plan) if (missed < 0).any() else ()
+        left = candidates(self._connection, world.plan, motion=world.motion) if (missed < 0).any() else ()
         return missed, {each.label.frame: each for each in left}
 
     def _decide(
