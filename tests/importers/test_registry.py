@@ -79,7 +79,9 @@ def test_a_source_without_maps_loads_little(tmp_path: Path) -> None:
     shutil.copytree(SAMPLES / "nuscenes_tiny" / "v1.0-tiny", source / "v1.0-tiny")
     program = (
         # Arrow and DuckDB load pandas, and with it much else, where it is installed
-        "import sys\nsys.modules['pandas'] = None\nfrom scenicq.importers.ingest import ingest\n"
+        "import sys\nclass WithoutPandas:\n def find_spec(self, name, *_):\n"
+        "  if name == 'pandas': raise ModuleNotFoundError(name)\nsys.meta_path.insert(0, WithoutPandas())\n"
+        "from scenicq.importers.ingest import ingest\n"
         f"print(ingest({str(source)!r}, {str(tmp_path / 'dataset')!r}).objects)\n"
         f"print(*sorted(set(sys.modules) & {set(SLOW)!r}))"
     )
