@@ -47,8 +47,14 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
 
 
 def mutants(tree: ast.Module) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
-    """Changes that can be made: each makes the change in the tree, is handed out, and takes it back."""
+    """Changes that can be made: each makes the change in the tree, is handed out, and takes it back.
+
+    Annotations are left alone: nobody evaluates them.
+    """
+    types = {id(part) for node in ast.walk(tree) for each in _annotations(node) for part in ast.walk(each)}
     for node in ast.walk(tree):
+        if id(node) in types:
+            continue
         match node:
             case ast.Compare(ops=ops):
                 for place, op in enumerate(ops):
@@ -78,6 +84,16 @@ def mutants(tree: ast.Module) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
                 node.value = value
             case _:
                 pass
+
+
+def _annotations(node: ast.AST) -> list[ast.expr]:
+    match node:
+        case ast.arg(annotation=ast.expr() as found) | ast.AnnAssign(annotation=found):
+            return [found]
+        case ast.FunctionDef(returns=ast.expr() as found):
+            return [found]
+        case _:
+            return []
 
 
 class Survey:

@@ -49,3 +49,10 @@ def test_functions_get_the_code_of_a_changed_file(tmp_path):
     } <= seen  # fmt: skip
     exchange(compile(ast.parse(TEXT), str(file), "exec"))
     assert (plain(1, 2), holder.value) == (3, [1])
+
+
+def test_annotations_are_no_code():
+    tree = ast.parse(
+        "def f(a: int | None, *, b: dict[1, 2] = 3) -> str | None:\n    c: int | str = a | b\n    return c\n"
+    )
+    assert sorted(what for _, what in mutants(tree)) == ["3 -> 4", "BitOr -> BitAnd", "returns None"]
