@@ -48,6 +48,7 @@ class SqlBounds:
 
     columns: Columns
     _known: dict[int, Alternatives] = field(default_factory=dict["int", "Alternatives"])
+    _kept: list[Node] = field(default_factory=list[Node])
 
     def intervals(self, root: Node) -> tuple[Interval[Expr], ...]:
         """The alternatives of a scalar expression."""
@@ -83,6 +84,8 @@ class SqlBounds:
     def _value(self, root: Node) -> Alternatives:
         if id(root) not in self._known:
             domain = IntervalDomain(SQL, self._column, slack=SLACK, boxed=False)
+            # what is known by its id must stay: another node would get the id, and with it the bounds
+            self._kept.append(root)
             self._known = interpret(steps_of(root), _Alternatives(domain), self._known)
         return self._known[id(root)]
 

@@ -83,3 +83,18 @@ def test_what_a_row_lacks_is_null_and_options_are_alternatives():
     rows = asked({"speed": [2.0, None]}, [number(each.low) for each in found])
     assert rows == [(3.0, 4.0, 5.0), (None, None, None)]
     assert bounds.intervals(Feature(0, "width", "scalar")) == ((-math.inf, math.inf, False),)
+
+
+def test_conditions_that_are_gone_leave_no_bounds_behind():
+    """What is asked of nodes made for the question is not answered from others that lay at the same place in memory."""
+    columns = {(0, "speed"): "v"}
+    bounds, found = SqlBounds(columns), list[tuple[object, object]]()
+    for limit in range(300):
+        # not two nodes at a time: each may take the place of the one before
+        found.append((bounds.can_hold(_slower(limit)), SqlBounds(columns).can_hold(_slower(limit))))
+    assert [pair for pair in found if pair[0] != pair[1]] == []
+    assert len({text for text, _ in found}) == 300
+
+
+def _slower(limit: int) -> Compare:
+    return Compare(CompareOp.LT, Feature(0, "speed", "scalar"), build.constant(float(limit)))
