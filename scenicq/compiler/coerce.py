@@ -99,7 +99,7 @@ def kind_of_model(value: ModelValue) -> Kind | None:
     return None
 
 
-_VELOCITY = re.compile(r"([\w.]+)\.velocity\b")
+_VELOCITY = re.compile(r"(?<![\w.])([\w.]+)\.velocity\b")
 
 
 def _need(value: ModelValue, what: str, span: Span | None) -> Exception:

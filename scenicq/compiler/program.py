@@ -119,8 +119,8 @@ def _compiled(
 
 
 _IMPORTS = (ast.Import, ast.ImportFrom, ast.Model)
-_OWNER = re.compile(r"[\w.]+\.$")
-"""What stands before an attribute."""
+_OWNER = re.compile(r"(?<![\w.])[\w.]+\.$")
+"""What stands before an attribute; looked for once in each word, however long."""
 
 
 def _start(source: Source) -> Span:

@@ -82,3 +82,12 @@ def test_numbers_near_the_end_of_all_numbers_break_nothing(text, run, tmp_path, 
         told = run(*words)
         assert told.exit_code in (0, 1, 2)
         assert "internal error" not in told.stderr
+
+
+def test_long_words_cost_no_more_than_their_length():
+    owners = [f"car{number}" for number in range(10)]
+    lines = [f"{name} = new Car\nnew Car on {name}.lane" for name in owners]
+    text = "\n".join([HEAD, "# " + "a" * 190_000, *lines])
+    scenario = compile_scenario(Source("test.scenic", text), street())
+    told = [each.span.text for each in scenario.requirements if each.span is not None]
+    assert [each for each in told if each.endswith(".lane")] == [f"{name}.lane" for name in owners]
