@@ -16,6 +16,7 @@ from scenicq.forest.build import constant
 from scenicq.forest.nodes import Feature, Identity, Index, Logic, LogicOp, Node, Value
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.walk import leaves, postorder, transform
+from scenicq.match.explanation import Finding
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, NoMatch, WitnessValue
@@ -24,13 +25,35 @@ from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.truth import TRUE, UNKNOWN, Truth
 
-__all__ = ["Example", "Examples"]
+__all__ = ["Example", "Examples", "Remembered", "examine_start"]
+
+Remembered = tuple[Label, Mapping[str, str]]
+"""The label of a start, and its correspondence."""
 
 _MOST_ASKED = 64
 """Questions to the matcher for one start."""
 
 _Place = tuple[int, int]
 """The number of a condition and a sample."""
+
+
+def examine_start(
+    scenario: Scenario, match: MatchOptions, solver: Solver | None, start: Remembered, wanted: Node | None
+) -> Finding:
+    """Whether the label of a start matches the initial scene with its correspondence, and a condition besides.
+
+    Args:
+        scenario: The scenario; what it says of time is left out.
+        match: Options of the matcher.
+        solver: Decides what is not decided otherwise.
+        start: The start.
+        wanted: The condition, about the label at the start.
+    """
+    label, correspondence = start
+    requirements = scenario.requirements if wanted is None else (*scenario.requirements, Requirement(wanted, None))
+    ego = scenario.objects[scenario.ego].name
+    given = {name: id_ for name, id_ in correspondence.items() if name != ego}
+    return Matcher(replace(scenario, requirements=requirements, dynamics=None), match, solver).examine(label, given)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +76,10 @@ class Examples:
     """What the values of random variables can make of conditions, for one start.
 
     Attributes:
-        scenario: The scenario, without what it says of time.
+        scenario: The scenario.
         match: Options of the matcher.
         solver: Decides what is not decided otherwise.
-        label: The label at the start.
-        given: The label object of each object but the ego, by name.
+        start: The start.
         columns: Over the samples.
         conditions: Those that hang on random variables, expanded, by number.
         first: The sample of the start.
@@ -67,8 +89,7 @@ class Examples:
     scenario: Scenario
     match: MatchOptions
     solver: Solver | None
-    label: Label
-    given: Mapping[str, str]
+    start: Remembered
     columns: AtomColumns
     conditions: Mapping[int, Node]
     first: int
@@ -118,11 +139,8 @@ class Examples:
         if self._asked >= _MOST_ASKED:
             return None
         self._asked += 1
-        wanted: list[Requirement] = []
-        if some is not None:
-            wanted = [Requirement(some[0] if len(some) == 1 else Logic(LogicOp.OR, tuple(some)), None)]
-        scenario = replace(self.scenario, requirements=(*self.scenario.requirements, *wanted), dynamics=None)
-        finding = Matcher(scenario, self.match, self.solver).examine(self.label, self.given)
+        wanted = None if some is None else some[0] if len(some) == 1 else Logic(LogicOp.OR, tuple(some))
+        finding = examine_start(self.scenario, self.match, self.solver, self.start, wanted)
         verdict = finding.verdict
         if isinstance(verdict, NoMatch):
             return False

@@ -10,18 +10,16 @@ import numpy as np
 
 from scenicq.budget import TimeIsUp, limited, look
 from scenicq.forest.nodes import Compare, CompareOp, Constant, Leaf, Logic, LogicOp, Node, Value
-from scenicq.forest.scenario import Requirement, Scenario
+from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import roots_of
 from scenicq.forest.temporal import Atom
 from scenicq.forest.walk import leaves
-from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.smt.answer import Solver
-from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
 from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
-from scenicq.temporal.hidden_examples import Examples
+from scenicq.temporal.hidden_examples import Examples, Remembered, examine_start
 from scenicq.temporal.run_columns import RunColumns, Runs
 from scenicq.temporal.runs import Run
 from scenicq.temporal.stretches import Stretches
@@ -30,8 +28,6 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["Details", "HiddenRuns", "Remembered"]
 
-Remembered = tuple[Label, Mapping[str, str]]
-"""The label of a start, and its correspondence."""
 Details = dict[int, tuple[str, Mapping[str, WitnessValue]]]
 """By the number of a start why its run is unknown, and the values of random variables of conditions over time."""
 
@@ -147,12 +143,9 @@ class HiddenRuns:
         self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: Remembered, unclear: str
     ) -> tuple[Run, str, Mapping[str, WitnessValue]]:
         """The run of one start by what its label says of the variables, else why it is unknown."""
-        label, correspondence = start
-        ego = self.scenario.objects[self.scenario.ego].name
-        given = {name: id_ for name, id_ in correspondence.items() if name != ego}
         hanging = {number: each for number, each in enumerate(expanded) if any(True for _ in leaves(each))}
         first = int(one.starts[0])
-        asked = Examples(self.scenario, self.match, self.solver, label, given, columns, hanging, first)
+        asked = Examples(self.scenario, self.match, self.solver, start, columns, hanging, first)
         try:
             with limited(self.match.timeout_s):
                 certain = asked.certain()
@@ -196,21 +189,13 @@ class HiddenRuns:
         self, start: Remembered, joint: Sequence[Leaf], ranked: Sequence[tuple[Run, Cell]]
     ) -> tuple[Run, Cell, str]:
         """The best run whose values of random variables the initial scene has, too."""
-        label, correspondence = start
         undecided: tuple[Run, Cell, str] | None = None
         for (_, _), group in groupby(ranked, key=lambda each: (each[0].truth, each[0].end)):
             same = list(group)
             if same[0][0].truth == FALSE:
                 break
             within = _within(joint, [cell for _, cell in same])
-            scenario = replace(
-                self.scenario,
-                requirements=(*self.scenario.requirements, Requirement(within, None)),
-                dynamics=None,
-            )
-            ego = self.scenario.objects[self.scenario.ego].name
-            given = {name: id_ for name, id_ in correspondence.items() if name != ego}
-            finding = Matcher(scenario, self.match, self.solver).examine(label, given)
+            finding = examine_start(self.scenario, self.match, self.solver, start, within)
             verdict = finding.verdict
             if isinstance(verdict, Match):
                 known = finding.values()
