@@ -105,7 +105,7 @@ def _under(query: Query, tolerance: Tolerance) -> Iterable[Result]:
     """The intervals that match under another tolerance."""
     options = replace(query.options, match=replace(query.options.match, tolerance=tolerance), every=False)
     other = Query(query.dataset, query.source, options, file=query.file)
-    return [each for each in other.results() if isinstance(each.verdict, Match)]
+    return [each for each in other.results() if _is_match(each)]
 
 
 def _longest(query: Query, recording: str, map_name: str, world: CompiledMap, match: MatchOptions) -> Result | None:
@@ -138,17 +138,18 @@ def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
         query: The query.
         results: Of one recording, at least one, none of which matches.
     """
-    recording = results[0].recording
+    recording, match = results[0].recording, query.options.match
+    map_name = _map_of(query, recording)
+    world = query.world(map_name)
+    dynamics = world.scenario.dynamics
+    if dynamics is None:
+        return None
     changes: list[tuple[float, Change, Span | None]] = []
     for result in results:
         scenario, tracks, interval = placed(query, result)
         found = changes_of(scenario, tracks, interval, quick=True)
         changes += [(abs(each.amount), each, interval.broken) for each in found]
     for amount, change, broken in sorted(changes, key=lambda each: each[0])[:_MOST_TRIED]:
-        map_name, match = _map_of(query, recording), query.options.match
-        world = query.world(map_name)
-        dynamics = world.scenario.dynamics
-        assert dynamics is not None
         conditions = change.made(dynamics.conditions)
         changed = replace(world.scenario, dynamics=replace(dynamics, conditions=conditions))
         other = CompiledMap.of(changed, world.network, match, prefilter=query.options.prefilter)
