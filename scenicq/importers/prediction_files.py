@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.prediction_checks import NEEDED, check_predictions, duplicate_error
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, PLAIN, Predictions, Protocol
 from scenicq.store.schema import ArrowTable
 
@@ -39,7 +40,6 @@ _HINT = (
 )
 _NUMBERS = ("x", "y", "heading", "width", "length", "height", "vx", "vy", "score", "z")
 _MOST_ATTRIBUTES = 100
-_NEEDED = ("x", "y", "heading", "width", "length", "score")
 _TEXT_OR_NO_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|NaN|-?Infinity')
 
 
@@ -104,7 +104,7 @@ def read_predictions(path: Path) -> Predictions:
             raise DataError(Diagnostic("file-invalid", message, hints=(_HINT,)))
     # the pool keeps what the file's table took, twice the room of the boxes
     pa.default_memory_pool().release_unused()
-    _check(found)
+    check_predictions(found)
     return found
 
 
@@ -324,7 +324,7 @@ def _parquet(path: Path) -> Predictions:
     if "objects" in table.column_names:
         _require(path, table, ("id", "objects"))
         table, known = _unnested(path, table)
-    _require(path, table, ("frame", "class", *_NEEDED))
+    _require(path, table, ("frame", "class", *NEEDED))
     frames, frame = _frames_of(table, ("frame",))
     if known is not None:
         numbers = {name: number for number, name in enumerate(known)}
@@ -341,7 +341,7 @@ def _unnested(path: Path, table: ArrowTable) -> tuple[ArrowTable, list[str]]:
     names: list[str] = _compute.cast(table["id"], pa.string()).to_pylist()
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise _duplicate(str(path), f"frame {twice} is there more than once")
+        raise duplicate_error(str(path), f"frame {twice} is there more than once")
     objects = table["objects"].combine_chunks()
     try:
         boxes = pa.Table.from_struct_array(objects.flatten())
@@ -357,48 +357,3 @@ def _unnested(path: Path, table: ArrowTable) -> tuple[ArrowTable, list[str]]:
     except (pa.ArrowException, AttributeError, TypeError) as error:
         raise _invalid(path, f"`objects` are no boxes: {error}") from None
     return rows, names
-
-
-def _duplicate(name: str, what: str) -> DataError:
-    return DataError(Diagnostic("predictions-duplicate", f"{name}: {what}"))
-
-
-def _check(found: Predictions) -> None:
-    """Refuse what is there twice or makes no sense."""
-    if len(set(found.frames)) < len(found.frames):
-        seen: set[str] = set()
-        twice = next(name for name in found.frames if name in seen or seen.add(name))
-        raise _duplicate(found.name, f"frame {twice} is there more than once")
-    for name in _NEEDED:
-        values: Reals = getattr(found, name)
-        wrong = ~np.isfinite(values)
-        if name in ("width", "length"):
-            wrong |= values <= 0
-        if wrong.any():
-            first = int(np.argmax(wrong))
-            count = int(wrong.sum())
-            told = "a box" if count == 1 else f"{count} boxes"
-            where = f"{'in' if count == 1 else 'the first in'} frame {found.frames[found.frame[first]]}"
-            message = f"{found.name}: {told} whose `{name}` makes no sense, {where}: {values[first]:g}"
-            raise DataError(Diagnostic("predictions-invalid", message))
-    # equal boxes lie together when sorted by all that tells them apart
-    order = np.lexsort((found.y, found.x, found.category, found.frame))
-    same = np.ones(max(len(order) - 1, 0), dtype=np.bool_)
-    compared: tuple[NDArray[Any], ...] = (
-        found.frame,
-        found.category,
-        found.x,
-        found.y,
-        found.heading,
-        found.width,
-        found.score,
-    )
-    for each in compared:
-        ordered = each[order]
-        same &= ordered[1:] == ordered[:-1]
-    if same.any():
-        box = int(order[int(np.argmax(same))])
-        frame, category = found.frames[found.frame[box]], found.classes[found.category[box]]
-        raise _duplicate(
-            found.name, f"boxes are there more than once: {int(same.sum())}, the first a {category} in frame {frame}"
-        )

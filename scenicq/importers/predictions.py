@@ -1,7 +1,7 @@
 """What a model has detected, and by which rules its kind of file is evaluated.
 
-Predictions are boxes with a score in the frame of the map. `prediction_files` reads them; `scenicq.evaluate` compares
-them with labels.
+Predictions are boxes with a score in the frame of the map. `prediction_files` reads them, `prediction_checks` refuses
+what makes no sense, `scenicq.evaluate` compares them with labels.
 """
 
 from __future__ import annotations
