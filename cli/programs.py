@@ -9,7 +9,7 @@ import click
 
 from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.query.execution.option_texts import DRIVING
-from scenicq.query.execution.run import read_program
+from scenicq.query.execution.program_files import read_program
 
 __all__ = ["SCENARIO", "given_program", "read_scenario"]
 

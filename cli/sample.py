@@ -9,7 +9,7 @@ import click
 from scenicq.compiler.program import compile_scenario
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
 from scenicq.query.execution.option_texts import read_built_ins
-from scenicq.query.execution.run import beside
+from scenicq.query.execution.program_files import sibling_loader
 
 from .check import networks_of, read_version
 from .manual import Manual
@@ -61,7 +61,7 @@ def sample(scenario: Path, dataset: str | None, *, map_file: Path | None, number
     source = read_scenario(scenario)
     version = read_version(scenic)
     network = next(networks_of(dataset, map_file, source, version))
-    compiled = compile_scenario(source, network, version=version, initial=initial, loader=beside(scenario))
+    compiled = compile_scenario(source, network, version=version, initial=initial, loader=sibling_loader(scenario))
     labels = sample_labels(compiled, number, seed, read_built_ins(waive), timeout_s=timeout)
     if output is not None:
         write_sample(labels, network, scenario.stem, output)

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from scenicq.match.matcher import Matcher
     from scenicq.match.options import MatchOptions
     from scenicq.notebook.datasets import open
-    from scenicq.query.execution.run import Query, QueryOptions, read_program
+    from scenicq.query.execution.program_files import read_program
+    from scenicq.query.execution.run import Query, QueryOptions
     from scenicq.store.dataset import open_dataset
 
 __version__ = "0.1.0"

@@ -16,7 +16,8 @@ from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.notebook.frames import Frame
 from scenicq.notebook.matches import Matches
 from scenicq.query.execution.option_texts import DRIVING, OptionTexts, read_options
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.sound_notes import SoundNotes
 

@@ -8,7 +8,8 @@ from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.query.execution.interval_frames import frames_of
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.interval_explanation import Band, bands_of, placed
+from scenicq.query.explain.bands import Band, bands_of
+from scenicq.query.explain.interval_explanation import placed
 from scenicq.report.runs import FrameRun
 from scenicq.report.svg import element, escape
 

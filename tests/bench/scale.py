@@ -29,7 +29,8 @@ from fleet import NEEDLE, Fleet, write_store
 
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.prefilter.executor import run_prefilter
 from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS
 from scenicq.store.dataset import Dataset, open_dataset

@@ -9,9 +9,10 @@ import pytest
 
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT
+from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.record_reader import read_record
 from scenicq.query.execution.results import record
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
 TOLERANCE = ("--tolerance", "x=0.25,y=0.25,heading=5deg", "--classes", "coarse")

@@ -26,9 +26,10 @@ from scenicq.importers.ingest import ingest
 from scenicq.importers.motion import euler
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, Predictions
+from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.results import Result, record
-from scenicq.query.execution.run import Query, read_program
+from scenicq.query.execution.run import Query
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
 from scenicq.store.writer import write_dataset

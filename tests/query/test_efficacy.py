@@ -13,7 +13,8 @@ from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, Unknown
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,8 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.store.dataset import Dataset, open_dataset
 

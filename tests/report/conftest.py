@@ -3,7 +3,8 @@
 import pytest
 
 from scenicq.match.matcher import Matcher
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.explain.frame_explanation import explain
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import Shot

@@ -10,7 +10,8 @@ import pytest
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.report.sheet import TILES
 from scenicq.report.write import write_report

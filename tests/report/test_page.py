@@ -6,7 +6,8 @@ import pytest
 
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.report import write
 from scenicq.report.write import write_report
 from scenicq.store.dataset import open_dataset

@@ -12,7 +12,8 @@ import shapely
 from scenicq.geometry.boxes import corners
 from scenicq.geometry.regions import DifferenceOf, Disc, IntersectionOf, PolygonSet, Rectangle, Sector, UnionOf
 from scenicq.match.verdict import Match
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.distances import measured_distances
 from scenicq.report.outlines import allowed_headings, allowed_place, outline

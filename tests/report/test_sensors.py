@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from scenicq.importers.ingest import ingest
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.report import sensors, write
 from scenicq.report.sensors import SensorFiles
 from scenicq.report.write import write_report

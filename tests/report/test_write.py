@@ -16,8 +16,9 @@ from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
+from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.results import Result
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.explain.nearest_miss import nearest_misses
 from scenicq.report import write
 from scenicq.report.cards import best_frame

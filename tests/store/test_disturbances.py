@@ -28,7 +28,8 @@ import json, sys, time
 from pathlib import Path
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
 dataset, program, stop = sys.argv[1:]

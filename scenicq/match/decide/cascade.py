@@ -30,7 +30,8 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import deciding_first, leaves, postorder
 from scenicq.match.linear.affine_forms import affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
-from scenicq.match.linear.linear_relaxation import NotLinear, solve_affine
+from scenicq.match.linear.linear_program import NotLinear
+from scenicq.match.linear.linear_relaxation import solve_affine
 from scenicq.match.problem.conditioned import Item, conditioned, fact
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided

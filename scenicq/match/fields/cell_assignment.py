@@ -23,8 +23,9 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.linear.affine_forms import Affine, AffineVector, affine_scalar, affine_vector
-from scenicq.match.linear.linear_program import Row
-from scenicq.match.linear.linear_relaxation import Alternative, NotLinear, extent_affine, inside, solve_affine
+from scenicq.match.linear.linear_program import NotLinear, Row
+from scenicq.match.linear.linear_relaxation import extent_affine, solve_affine
+from scenicq.match.linear.region_rows import Alternative, polygon_rows
 from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.problem.evaluation import holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
@@ -219,7 +220,7 @@ def _cells(cases: BoxSet, number: int, node: DirectionAt) -> tuple[Bounds, list[
 
 def _within(place: AffineVector, cell: FieldCell, box: Bounds) -> list[Row]:
     """What holds of a place in a cell and a box."""
-    return [*inside(place, cell.polygon), Row(place[0], box[0], box[2]), Row(place[1], box[1], box[3])]
+    return [*polygon_rows(place, cell.polygon), Row(place[0], box[0], box[2]), Row(place[1], box[1], box[3])]
 
 
 def _middle(leaf: Leaf, cases: BoxSet, number: int) -> Value:

@@ -10,7 +10,11 @@ from typing import Any
 
 from scenicq.match.linear.affine_forms import Affine, VariableAxis
 
-__all__ = ["LinearSystem", "NotSolved", "Row"]
+__all__ = ["LinearSystem", "NotLinear", "NotSolved", "Row"]
+
+
+class NotLinear(Exception):
+    """Constraints are not affine, or linear programs do not tell."""
 
 
 class NotSolved(Exception):

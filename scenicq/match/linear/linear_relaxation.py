@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
-
-import numpy as np
-import shapely
 
 from scenicq.forest.bounds import Box, leaf_boxes, scalar_bounds
 from scenicq.forest.groups import Comparison
@@ -32,39 +29,24 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.proximity_pruning import close_boxes
 from scenicq.forest.walk import conjuncts, leaves
-from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import (
     Disc,
     IntersectionOf,
-    PointSet,
-    PolygonSet,
-    PolylineSet,
-    Rectangle,
     Region,
     Sector,
-    UnionOf,
 )
 from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import ends
-from scenicq.match.linear.linear_program import LinearSystem, NotSolved, Row
+from scenicq.match.linear.linear_program import LinearSystem, NotLinear, NotSolved, Row
+from scenicq.match.linear.region_rows import Alternative, disc_rows, region_rows, sector_rows
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import ROUNDING, SLACK, Tolerance
 
-__all__ = ["Alternative", "NotLinear", "extent_affine", "inside", "position_boxes", "solve_affine"]
+__all__ = ["extent_affine", "position_boxes", "solve_affine"]
 
-_SIDES = 32
-"""Corners of the polygons around and inside a disc."""
-_MOST_CELLS = 2000
 _MOST_EXTENTS = 16
 """Combinations of alternatives of which the ends of a number are looked for."""
-
-Alternative = list[list[Row]]
-"""Sets of linear facts, one of which holds."""
-
-
-class NotLinear(Exception):
-    """The constraints are not affine, or the linear programs do not tell."""
 
 
 def position_boxes(items: Sequence[Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> dict[Identity, Box]:
@@ -102,19 +84,6 @@ def _narrow(boxes: dict[Identity, Box], row: Row) -> None:
     low, high = limits[axis]
     limits[axis] = (max(low, ends[0] - SLACK), min(high, ends[1] + SLACK))
     boxes[identity] = (limits[0], limits[1])
-
-
-def inside(place: AffineVector, polygon: np.ndarray) -> list[Row]:
-    """Rows that keep a point in a convex polygon whose corners run counter-clockwise."""
-    rows: list[Row] = []
-    x, y = place
-    for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        length = math.hypot(bx - ax, by - ay)
-        if length > 0:
-            nx, ny = (by - ay) / length, (ax - bx) / length
-            side = x.times(nx).plus(y, ny).plus(Affine(float(nx * ax + ny * ay), {}), -1.0)
-            rows.append(Row(side, -math.inf, 0.0))
-    return rows
 
 
 def solve_affine(
@@ -280,21 +249,21 @@ class _Problem:
                 away = x.plus(Affine(-cx, {})), y.plus(Affine(-cy, {}))
                 self.discs.append((*away, part.radius))
                 if isinstance(part, Sector):
-                    self.alternatives.append(_opening(away, part))
+                    self.alternatives.append(sector_rows(away, part))
         if others:
             west, south, east, north = region_bounds(region)
             (x0, x1), (y0, y1) = box or ((west, east), (south, north))
             limits = (max(x0, west), max(y0, south), min(x1, east), min(y1, north))
             empty = limits[0] > limits[2] or limits[1] > limits[3]
-            self.alternatives.append([] if empty else _places(others[0], limits, place))
+            self.alternatives.append([] if empty else region_rows(others[0], limits, place))
 
     def solve(self) -> Mapping[tuple[Identity, int], float] | None:
         """A solution, or None if there is none."""
         ordered = sorted(self.alternatives, key=len)
         try:
-            found = _search(self.system, ordered, [*_polygons(self.discs, outer=True)])
+            found = _search(self.system, ordered, [*disc_rows(self.discs, outer=True)])
             if found is not None and self.discs:
-                found = _search(self.system, ordered, [*_polygons(self.discs, outer=False)])
+                found = _search(self.system, ordered, [*disc_rows(self.discs, outer=False)])
                 if found is None:
                     raise NotLinear
         except NotSolved:
@@ -303,7 +272,7 @@ class _Problem:
 
     def extent(self, variable: VariableAxis) -> tuple[float, float] | None:
         """The ends of a variable over all solutions, discs taken too large."""
-        around = [*_polygons(self.discs, outer=True)]
+        around = [*disc_rows(self.discs, outer=True)]
         if math.prod(map(len, self.alternatives)) > _MOST_EXTENTS:
             raise NotLinear
         found: tuple[float, float] | None = None
@@ -315,84 +284,6 @@ class _Problem:
         except NotSolved:
             raise NotLinear from None
         return found
-
-
-def _opening(away: AffineVector, sector: Sector) -> Alternative:
-    """Rows that keep a vector from the apex between the edges of a sector; two sets of them beyond half a turn."""
-    if sector.angle >= math.tau:
-        return [[]]
-    if sector.angle < 0:
-        return []
-    x, y = away
-
-    def along(heading: float) -> Affine:
-        return x.times(-math.sin(heading)).plus(y, math.cos(heading))
-
-    half, turn = sector.angle / 2, math.pi / 2
-    # left of the right edge, right of the left edge
-    edges = [
-        Row(along(sector.heading - half + turn), 0.0, math.inf),
-        Row(along(sector.heading + half - turn), 0.0, math.inf),
-    ]
-    return (
-        [[*edges, Row(along(sector.heading), 0.0, math.inf)]] if sector.angle <= math.pi else [[row] for row in edges]
-    )
-
-
-def _places(region: Region, limits: tuple[float, float, float, float], place: AffineVector) -> Alternative:
-    """One set of rows for each convex piece of a region near a box."""
-    x, y = place
-    found: Alternative = []
-    for part in region.parts if isinstance(region, UnionOf) else (region,):
-        match part:
-            case PolygonSet() | Rectangle():
-                cells = [cell for cell in convex_cells(part, limits) if _near(cell, limits)]
-                found += [inside(place, cell) for cell in cells]
-            case PolylineSet():
-                for start, end in _segments(part, limits):
-                    found.append(_on_segment(place, start, end))
-            case PointSet():
-                for px, py in shapely.get_coordinates(part.near(limits)).tolist():
-                    found.append([Row(x, px, px), Row(y, py, py)])
-            case _:
-                raise NotLinear
-        if len(found) > _MOST_CELLS:
-            raise NotLinear
-    return found
-
-
-def _near(corners: np.ndarray, limits: tuple[float, float, float, float]) -> bool:
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    west, south, east, north = limits
-    return bool(low[0] <= east and high[0] >= west and low[1] <= north and high[1] >= south)
-
-
-def _segments(lines: PolylineSet, limits: tuple[float, float, float, float]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    for piece in lines.near(limits):
-        corners = shapely.get_coordinates(piece)
-        for start, end in itertools.pairwise(corners):
-            if _near(np.array((start, end)), limits):
-                yield start, end
-
-
-def _on_segment(place: AffineVector, start: np.ndarray, end: np.ndarray) -> list[Row]:
-    x, y = place
-    length = float(np.hypot(*(end - start)))
-    if length == 0:
-        return [Row(x, float(start[0]), float(start[0])), Row(y, float(start[1]), float(start[1]))]
-    ux, uy = (float(part) for part in (end - start) / length)
-    across = float(start[0] * -uy + start[1] * ux)
-    along = float(start[0] * ux + start[1] * uy)
-    return [Row(x.times(-uy).plus(y, ux), across, across), Row(x.times(ux).plus(y, uy), along, along + length)]
-
-
-def _polygons(discs: Sequence[tuple[Affine, Affine, float]], *, outer: bool) -> Iterator[Row]:
-    """Rows that keep vectors in a regular polygon around (outer) or inside their disc."""
-    for x, y, radius in discs:
-        reach = radius if outer else radius * math.cos(math.pi / _SIDES)
-        for side in range(_SIDES):
-            angle = math.tau * side / _SIDES
-            yield Row(x.times(math.cos(angle)).plus(y, math.sin(angle)), -math.inf, reach)
 
 
 def _search(

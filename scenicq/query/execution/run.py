@@ -26,6 +26,7 @@ from scenicq.query.execution.compiled_map import about_dataset, map_remark, prog
 from scenicq.query.execution.frames_ahead import FramesAhead, telling
 from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
 from scenicq.query.execution.never_compared import Coverage, coverage
+from scenicq.query.execution.program_files import sibling_loader
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
@@ -33,7 +34,7 @@ from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
 from scenicq.temporal.interval_options import IntervalOptions
 
-__all__ = ["MAP_LACKS", "Query", "QueryOptions", "Stretch", "read_program"]
+__all__ = ["MAP_LACKS", "Query", "QueryOptions", "Stretch"]
 
 MAP_LACKS = "map "
 """How the name of what excludes frames begins where it is their map; the map's follows."""
@@ -78,35 +79,6 @@ class QueryOptions:
     strict: bool = False
     proofs: bool = True
     until: float | None = None
-
-
-def read_program(path: str | Path) -> Source:
-    """Read a scenario.
-
-    Raises:
-        DataError: file-missing, or file-invalid where it is not UTF-8 text.
-    """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise DataError(Diagnostic("file-missing", f"{path} cannot be read: {error.strerror}")) from None
-    try:
-        return Source(str(path), data.decode("utf-8-sig"))
-    except UnicodeDecodeError:
-        raise DataError(Diagnostic("file-invalid", f"{path} is not text in UTF-8")) from None
-
-
-def beside(path: Path) -> Callable[[str], Source | None]:
-    """Reads files that a program imports: those in its own folder, nothing else."""
-    folder = path.resolve().parent
-
-    def load(name: str) -> Source | None:
-        file = (folder / name).resolve()
-        if not file.is_relative_to(folder) or not file.is_file():
-            return None
-        return read_program(file)
-
-    return load
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +140,7 @@ class Query:
                 version=self.options.version,
                 initial=self.options.initial,
                 behaviors=self.options.behaviors,
-                loader=beside(self.file or Path(self.source.name)),
+                loader=sibling_loader(self.file or Path(self.source.name)),
                 model=self.options.model,
             )
         except ScenarioError as error:
@@ -357,13 +329,8 @@ class Query:
         Raises:
             ScenarioError: The program is wrong.
         """
-        for name in self.dataset.maps:
-            try:
-                return self.over_time(self.world(name))
-            except ScenarioError as error:
-                if error.diagnostics[0].code != "map-lacks":
-                    raise
-        return False
+        world = next(self.fitting(), None)
+        return world is not None and self.over_time(world)
 
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.

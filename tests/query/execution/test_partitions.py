@@ -12,8 +12,9 @@ from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
+from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.results import record
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 
 ROOT = Path(__file__).parents[3]

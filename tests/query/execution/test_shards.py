@@ -24,8 +24,9 @@ from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Unknown
 from scenicq.query.execution import dask_engine as dask
 from scenicq.query.execution.partitions import partitions
+from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.results import Funnel, record
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.execution.shards import Question, in_order, kept, run_here, shards_of
 from scenicq.query.prefilter import executor
 from scenicq.store.dataset import Dataset, open_dataset

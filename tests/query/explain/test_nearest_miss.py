@@ -13,7 +13,8 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.query.execution.run import Query, QueryOptions, read_program
+from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.explain.nearest_miss import closest, nearest_misses
 from scenicq.store.dataset import open_dataset
 

@@ -1,0 +1,134 @@
+"""Conditions and requirements over the samples of an interval, as bands of truth values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from scenicq.errors import Span
+from scenicq.forest.nodes import Compare, Node
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.temporal import Atom, Formula, Termination, Test, operands
+from scenicq.store.tracks import RecordingTracks
+from scenicq.temporal.atoms import AtomColumns, HiddenVariable
+from scenicq.temporal.intervals import IntervalVerdict
+from scenicq.temporal.ltlf import evaluate
+from scenicq.temporal.samples import Samples
+from scenicq.temporal.truth import Truth
+
+__all__ = ["Band", "bands_of", "columns_of", "conditional", "show_bands"]
+
+_WIDTH = 60
+"""Characters of a band, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A condition or requirement over the samples of an interval.
+
+    Attributes:
+        what: In the words of the program.
+        span: Where it says so.
+        values: The truth value at each sample: of a condition there, of a requirement from there to the end.
+        is_requirement: Whether it is a requirement.
+        sides: Of a condition that compares numbers, both at each sample; nan where there is none.
+    """
+
+    what: str
+    span: Span | None
+    values: tuple[int, ...]
+    is_requirement: bool = False
+    sides: tuple[tuple[float, float], ...] = ()
+
+
+def columns_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> AtomColumns:
+    """The samples of an interval, from its start as time zero."""
+    samples = Samples(tracks, dict(interval.binding), interval.start, interval.end + 1)
+    return AtomColumns(scenario, samples, start=np.zeros(len(samples), np.int64))
+
+
+def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[Band, ...]:
+    """The conditions and requirements of a program over an interval; those on hidden random variables are left out."""
+    dynamics = scenario.dynamics
+    if dynamics is None:
+        return ()
+    columns = columns_of(scenario, tracks, interval)
+    known: dict[int, Truth] = {}
+    for number, condition in enumerate(dynamics.conditions):
+        try:
+            known[number] = columns.truth(condition)
+        except HiddenVariable:
+            continue
+    found: list[Band] = []
+
+    def conditions(numbers: Sequence[int]) -> None:
+        for number in numbers:
+            condition = dynamics.conditions[number]
+            if number in known:
+                values = tuple(known[number].tolist())
+                found.append(Band(_named(condition, number), condition.span, values, sides=_sides(columns, condition)))
+
+    for requirement in dynamics.requirements:
+        numbers = _atoms(requirement.formula)
+        conditions(numbers)
+        if all(number in known for number in numbers):
+            ends = np.array([interval.end - interval.start])
+            values = evaluate(requirement.formula, lambda atom: known[atom.number], ends)[:, 0]
+            text = " ".join(requirement.span.text.split())
+            found.append(Band(text, requirement.span, tuple(values.tolist()), is_requirement=True))
+    conditions([each.condition.number for each in conditional(dynamics.terminations) if each.condition is not None])
+    conditions([s.condition.number for monitor in dynamics.monitors for s in monitor.steps if isinstance(s, Test)])
+    return tuple(found)
+
+
+def conditional(terminations: Sequence[Termination]) -> list[Termination]:
+    """The terminations that hang on a condition, and not on time alone."""
+    return [each for each in terminations if each.condition is not None]
+
+
+def _atoms(formula: Formula) -> list[int]:
+    stack: list[Formula] = [formula]
+    found: list[int] = []
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Atom):
+            found.append(node.number)
+        stack.extend(reversed(operands(node)))
+    return found
+
+
+def _named(condition: Node, number: int) -> str:
+    return f"condition {number + 1}" if condition.span is None else " ".join(condition.span.text.split())
+
+
+def _sides(columns: AtomColumns, condition: Node) -> tuple[tuple[float, float], ...]:
+    """Both sides of a comparison of numbers at each sample."""
+    if not isinstance(condition, Compare):
+        return ()
+    left, right = (columns.number(columns.expanded(side)) for side in (condition.left, condition.right))
+    return () if left is None or right is None else tuple(zip(left.tolist(), right.tolist(), strict=True))
+
+
+def show_bands(bands: Sequence[Band]) -> list[str]:
+    """Bands as text: `#` true, `.` false, `?` unknown; of many samples, each character stands for several."""
+    if not bands:
+        return []
+    width = max(len(_short(band.what)) for band in bands)
+    return [f"{_short(band.what).ljust(width)}  {_drawn(band.values)}" for band in bands]
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 48 else f"{text[:47]}\N{HORIZONTAL ELLIPSIS}"
+
+
+def _drawn(values: Sequence[int]) -> str:
+    size = min(len(values), _WIDTH)
+    edges = [round(place * len(values) / size) for place in range(size + 1)]
+    signs: list[str] = []
+    for first, end in pairwise(edges):
+        some = set(values[first:end])
+        signs.append("#" if some == {2} else "." if some == {0} else "?" if 1 in some else "+")
+    return "".join(signs)
