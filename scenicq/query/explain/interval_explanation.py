@@ -32,7 +32,7 @@ from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Band", "IntervalExplanation", "bands_of", "changes_of", "explain_recording", "placed", "show_bands"]
+__all__ = ["Band", "IntervalExplanation", "bands_of", "changes_of", "explain_recording", "placed"]
 
 _WIDTH = 60
 """Characters of a band, at most."""
@@ -111,7 +111,7 @@ class IntervalExplanation:
             lines.append(f"cut off: the recording or a track ends at {last:.1f} s, before the program does")
             lines += [f"  = {each}" for each in self.changes if interval.broken is None]
         lines += ["", *self._broken(interval)]
-        return "\n".join([*lines, *show_bands(self.bands)]).rstrip()
+        return "\n".join([*lines, *_show_bands(self.bands)]).rstrip()
 
     def _broken(self, interval: IntervalVerdict) -> list[str]:
         """The requirement that is broken, where, when, and by how much."""
@@ -391,7 +391,7 @@ def _sides(columns: AtomColumns, condition: Node) -> tuple[tuple[float, float], 
     return () if left is None or right is None else tuple(zip(left.tolist(), right.tolist(), strict=True))
 
 
-def show_bands(bands: Sequence[Band]) -> list[str]:
+def _show_bands(bands: Sequence[Band]) -> list[str]:
     """Bands as text: `#` true, `.` false, `?` unknown; of many samples, each character stands for several."""
     if not bands:
         return []
