@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -168,8 +170,63 @@ def test_a_type_has_its_name_alone():
     assert {name: files for name, files in found.items() if len(files) > 1} == {}
 
 
+ENGINE = ("match/", "query/", "forest/", "temporal/")
+
+
+def test_the_code_uses_what_the_engine_makes_public():
+    asked: set[str] = set()
+    for file in (*FILES, *sorted((ROOT / "cli").rglob("*.py")), *sorted((ROOT / "sample_data").rglob("*.py"))):
+        attributes = {node.attr for node in ast.walk(tree(file)) if isinstance(node, ast.Attribute)}
+        for node in ast.walk(tree(file)):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = {f"{node.module}.{alias.name}" for alias in node.names}
+                asked |= names | {f"{name}.{attribute}" for name in names for attribute in attributes}
+    unused: list[str] = []
+    for file in FILES:
+        if named(file).startswith(ENGINE):
+            module = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+            everywhere = loads(tree(file))
+            for node in tree(file).body:
+                inside = loads(node)
+                unused += [
+                    f"{module}.{name}"
+                    for name in top_names(node)
+                    if everywhere[name] == inside[name] and f"{module}.{name}" not in asked
+                ]
+    assert unused == []
+
+
+def top_names(statement: ast.stmt) -> list[str]:
+    """The public names that a statement of a file defines."""
+    match statement:
+        case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.AnnAssign(target=ast.Name(id=name)):
+            found = [name]
+        case ast.Assign(targets=targets):
+            found = [target.id for target in targets if isinstance(target, ast.Name)]
+        case _:
+            found = []
+    return [name for name in found if not name.startswith("_")]
+
+
+def loads(root: ast.AST) -> Counter[str]:
+    """How often each name is read."""
+    return Counter(node.id for node in ast.walk(root) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load))
+
+
+def test_docstrings_name_errors_that_exist():
+    known = {name for name, value in vars(builtins).items() if isinstance(value, type)}
+    known |= {node.name for file in FILES for node in ast.walk(tree(file)) if isinstance(node, ast.ClassDef)}
+    found: dict[str, set[str]] = {}
+    for file in FILES:
+        for _, _, node in functions(tree(file)):
+            told = (ast.get_docstring(node) or "").partition("Raises:\n")[2].partition("\n\n")[0]
+            found.setdefault(named(file), set()).update(re.findall(r"^    (\w+):", told, re.MULTILINE))
+    assert {file: names - known for file, names in found.items() if names - known} == {}
+    assert sum(map(len, found.values())) > 100
+
+
 def test_every_path_that_the_map_names_exists():
-    paths = re.findall(r"`((?:tests|scenicq|sample_data|cli)/[\w./]*[\w/])`", README)
+    paths = re.findall(r"(?<![\w/.])((?:tests|scenicq|sample_data|cli)/[\w./]*[\w/])", README)
     assert paths
     assert [path for path in paths if not (ROOT / path).exists()] == []
     inside = re.findall(

@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -23,7 +23,6 @@ __all__ = ["Annotations", "Frames", "read_annotations"]
 
 Reals = NDArray[np.float64]
 Numbers = NDArray[np.int32]
-T = TypeVar("T")
 
 _UNKNOWN = "unknown"
 _EGO = ("ego_x", "ego_y", "ego_heading", "ego_z", "ego_pitch", "ego_roll")

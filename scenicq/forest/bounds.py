@@ -17,18 +17,18 @@ from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVect
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import Constant, Identity, Node, PointIn, Rotate, Scale, VectorSum
 
-__all__ = ["EVERYTHING", "Box", "FloatInterval", "leaf_boxes", "point_boxes", "scalar_bounds", "vector_bounds"]
+__all__ = ["Box", "FloatInterval", "leaf_boxes", "point_boxes", "scalar_bounds", "vector_bounds"]
 
 FloatInterval: TypeAlias = tuple[float, float]
 Box: TypeAlias = tuple[FloatInterval, FloatInterval]
 
-EVERYTHING: FloatInterval = (-math.inf, math.inf)
-_PLANE: Box = (EVERYTHING, EVERYTHING)
+_EVERYTHING: FloatInterval = (-math.inf, math.inf)
+_PLANE: Box = (_EVERYTHING, _EVERYTHING)
 _DOMAIN = IntervalDomain(FLOATS)
 
 
 def _pair(value: IntervalValue[float]) -> FloatInterval:
-    return (value.low, value.high) if isinstance(value, Interval) else EVERYTHING
+    return (value.low, value.high) if isinstance(value, Interval) else _EVERYTHING
 
 
 def _box(value: IntervalValue[float]) -> Box:

@@ -42,10 +42,10 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.regions import Region
 
-__all__ = ["kind_of", "kind_of_value"]
+__all__ = ["kind_of"]
 
 
-def kind_of_value(value: Value) -> Kind:
+def _kind_of_value(value: Value) -> Kind:
     """The kind of a known value."""
     if isinstance(value, bool):
         return "boolean"
@@ -64,7 +64,7 @@ def kind_of(node: Node) -> Kind:
         node = node.options[0]
     match node:
         case Constant():
-            return kind_of_value(node.value)
+            return _kind_of_value(node.value)
         case Feature():
             return node.kind
         case Range() | Normal() | TruncatedNormal() | DiscreteRange() | Index() | Arithmetic() | Coordinate():

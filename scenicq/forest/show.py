@@ -28,10 +28,10 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import children, is_leaf, postorder
 
-__all__ = ["show", "show_constant", "show_forest"]
+__all__ = ["show", "show_forest"]
 
 
-def show_constant(value: Value) -> str:
+def _show_constant(value: Value) -> str:
     """A known value as text; regions and fields by their name."""
     if isinstance(value, float):
         return f"{value:.12g}"
@@ -72,7 +72,7 @@ def _show(
 ) -> str:
     match node:
         case Constant():
-            return show_constant(node.value)
+            return _show_constant(node.value)
         case Feature():
             return f"{objects.get(node.object, node.object)}.{node.property}"
         case Arithmetic() if len(args) == 2 and not node.op.value[0].isalpha():

@@ -15,24 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.store.dataset import Dataset
-from scenicq.store.labels import Label, LabelObject
 from scenicq.store.reader import MOTION_COLUMNS, RowFile
 from scenicq.store.schema import ArrowTable
 
-__all__ = ["RecordingTracks", "TrackKey", "TrackReader", "track_of"]
+__all__ = ["RecordingTracks", "TrackKey", "TrackReader"]
 
 TrackKey: TypeAlias = tuple[str, str]
 """("ego", ""), ("track", its name), or ("object", frame and id) for a label object without a track."""
 
 _NUMBERS = ("x", "y", "heading", "width", "length", "height", *MOTION_COLUMNS[:-1])
 Numbers = NDArray[np.float64]
-
-
-def track_of(label: Label, member: LabelObject) -> TrackKey:
-    """The track of a label object."""
-    if member is label.ego:
-        return ("ego", "")
-    return ("object", f"{label.frame}\n{member.id}") if member.track is None else ("track", member.track)
 
 
 @dataclass(eq=False)

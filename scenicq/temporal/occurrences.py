@@ -21,7 +21,7 @@ from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next
 from scenicq.temporal.folding import folded
 from scenicq.temporal.truth import TRUE, Truth, negated
 
-__all__ = ["Clause", "FormulaPart", "PartKind", "bounds", "clauses_of", "joined", "next_at", "present_value"]
+__all__ = ["Clause", "FormulaPart", "PartKind", "bounds", "clauses_of", "joined", "next_at"]
 
 _MOST_CLAUSES = 16
 Places = NDArray[np.int64]
@@ -136,7 +136,7 @@ def _is_plain(formula: Formula) -> bool:
     return True
 
 
-def present_value(formula: Formula, atom: Callable[[Atom], Truth]) -> Truth:
+def _present_value(formula: Formula, atom: Callable[[Atom], Truth]) -> Truth:
     """The value of a formula without operators of time at each place."""
 
     def value(node: Formula, parts: list[Truth]) -> Truth:
@@ -176,7 +176,7 @@ def bounds(part: FormulaPart, atom: Callable[[Atom], Truth], at_least: int, star
     """
 
     def holds(formula: Formula, *, positive: bool, least: int = at_least) -> NDArray[np.bool_]:
-        value = present_value(formula, atom)
+        value = _present_value(formula, atom)
         return (value if positive else negated(value)) >= least
 
     if part.kind in (PartKind.UNTIL, PartKind.NOT_UNTIL):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FALSE", "TRUE", "UNKNOWN", "Truth", "all_of", "negated"]
+__all__ = ["FALSE", "TRUE", "UNKNOWN", "Truth", "negated"]
 
 Truth = NDArray[np.int8]
 """Truth values of any shape."""
@@ -19,11 +19,3 @@ FALSE, UNKNOWN, TRUE = np.int8(0), np.int8(1), np.int8(2)
 def negated(values: Truth) -> Truth:
     """`not`, of each."""
     return TRUE - values
-
-
-def all_of(*parts: Truth) -> Truth:
-    """`and` of some arrays that go together, at least one."""
-    found = parts[0]
-    for part in parts[1:]:
-        found = np.minimum(found, part)
-    return found

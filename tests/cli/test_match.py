@@ -11,6 +11,7 @@ import pytest
 
 from scenicq.forest.scenario import BuiltIn
 from scenicq.query.execution.result_tables import read_row
+from scenicq.query.execution.run import Query
 
 KEYS = ["frame", "recording", "timestamp_us", "verdict", "correspondence", "witness", "sensors", "dataset"]
 FRAMES = [f"03-busy-intersection/{number:02}" for number in range(9, 14)]
@@ -92,6 +93,26 @@ def test_formats(run, crossroads, crossing, tmp_path):
     assert table[0].split() == ["FRAME", "RECORDING", "TIME", "VERDICT", "OBJECTS", "SENSOR"]
     assert len({line.index(" match ") for line in table[1:]}) == 1
     assert "\x1b" not in "".join(table)
+
+
+@pytest.mark.parametrize(
+    ("words", "read"),
+    [
+        ("--format ids", False), ("--format jsonl", True), ("--format ids --all-matches", True),
+        ("--format ids --export interchange OUT", True), ("--format ids --report OUT", True),
+        ("--format ids --resume -o OUT", True),
+    ],
+)  # fmt: skip
+def test_of_ids_alone_nobody_reads_proofs(run, crossroads, crossing, tmp_path, monkeypatch, words, read):
+    told = []
+
+    def noted(dataset, source, options, **more):
+        told.append(options.proofs)
+        return Query(dataset, source, options, **more)
+
+    monkeypatch.setattr("scenicq_cli.match.Query", noted)
+    assert run("match", crossing, crossroads, *words.replace("OUT", str(tmp_path / "out")).split()).exit_code == 0
+    assert told[0] is read
 
 
 def test_a_file_s_extension_says_its_format(run, crossroads, crossing, tmp_path):

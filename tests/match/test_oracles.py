@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from dataclasses import replace
 
@@ -9,8 +10,10 @@ import pytest
 from programs import HEADER, PROGRAMS
 from scenes import compiled, drawn, label_of
 
+from scenicq.forest.walk import leaves
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.evaluation import replay
 from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.solver import open_solver
@@ -32,6 +35,45 @@ def test_a_drawn_scene_matches_among_distractors(name, solver):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=3)
         verdict = matcher.match(label)
         assert isinstance(verdict, Match), (seed, verdict)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_the_witness_of_a_match_satisfies_the_program_in_plain_evaluation(name, solver):
+    scenario = compiled(HEADER + PROGRAMS[name])
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
+    for seed in range(3):
+        label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=3)
+        found = matcher.examine(label)
+        for group in found.plan.groups:
+            items = found.search.items(group.group, found.assignment)
+            # where a field allows several directions at what is observed, one of them is chosen each time
+            known = found.values()
+            open_ = {leaf for _, node, _ in items for leaf in leaves(node) if leaf.identity not in known}
+            ways = itertools.product(*(enumerate(leaf.weights) for leaf in open_))
+            assert any(
+                replay(
+                    items,
+                    {**known, **{leaf.identity: float(number) for leaf, (number, _) in zip(open_, way, strict=True)}},
+                    EXACT,
+                    matcher.options.precision,
+                )
+                for way in ways
+            ), (seed, group)
+
+
+def test_a_verdict_does_not_hang_on_what_was_matched_before(solver):
+    for name in list(PROGRAMS)[::3]:
+        scenario = compiled(HEADER + PROGRAMS[name])
+        labels = []
+        for seed in range(3):
+            label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=2)
+            moved = tuple(replace(each, x=each.x + 1.0) for each in label.objects)
+            labels += [label, replace(label, objects=moved)]
+        alone = [Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(label) for label in labels]
+        matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
+        assert [matcher.match(label) for label in labels] == alone, name
+        assert [matcher.match(label) for label in reversed(labels)] == alone[::-1], name
+        assert list(matcher.match_all([(label, None) for label in labels])) == alone, name
 
 
 @pytest.mark.parametrize("name", PROGRAMS)

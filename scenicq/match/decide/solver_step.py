@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # takes long to load, and most queries ask no solver
     from scenicq.smt.answer import Solver
     from scenicq.smt.encode import Encoding, Target
 
-__all__ = ["ask", "encoded", "target_of"]
+__all__ = ["ask", "encoded"]
 
 _ATTEMPTS = 3
 _REFINED = 100.0
@@ -35,7 +35,7 @@ def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: 
     """
     from scenicq.smt.encode import encode  # noqa: PLC0415 - takes long to load
 
-    targets = [[(target_of(c, options), node, value) for c, node, value in group] for group in items]
+    targets = [[(_target_of(c, options), node, value) for c, node, value in group] for group in items]
     return encode(targets, borders=borders)
 
 
@@ -83,7 +83,7 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
     return Undecided(blame, "precision")
 
 
-def target_of(constraint: Constraint, options: MatchOptions) -> Target:
+def _target_of(constraint: Constraint, options: MatchOptions) -> Target:
     """How a constraint's expression is compared with the label."""
     from scenicq.smt.encode import Target  # noqa: PLC0415 - takes long to load
 

@@ -104,7 +104,7 @@ def extent(
 ) -> FloatInterval | None:
     """Between which values a random number lies in the solutions of a part, if it lies in an interval.
 
-    A little too much, never too little, but for what `Way.exact` excepts; None if there are none.
+    A little too much, never too little, but for what `HeadingAssignment.exact` excepts; None if there are none.
     """
     rows = [Row(Affine(0.0, {(number, 0): 1.0}), *limits), *_rows(way, strict=False)]
     try:

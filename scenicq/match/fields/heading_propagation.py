@@ -65,7 +65,7 @@ def directed(start: BoxSet) -> Iterator[BoxSet]:
     """The cases in which every field has one direction and something is left, those found first at once.
 
     Raises:
-        TooMany: There are too many cases.
+        LimitError: There are too many cases.
     """
     todo, seen = [start], 0
     while todo:
@@ -105,7 +105,7 @@ def halved(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
         below: The random variables that come into question.
 
     Raises:
-        TooMany: There is none.
+        LimitError: There is none.
     """
     found = _widest(cases, below)
     if found is None or found[0] <= _FINEST:

@@ -11,11 +11,10 @@ from scenicq.geometry.membership import contains, contains_many
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
 
-__all__ = ["XY", "Disc", "MapLookups"]
+__all__ = ["XY", "MapLookups"]
 
-Disc = tuple[tuple[float, float], float]
-"""The area that is looked at: centre and radius."""
 XY = tuple[float, float]
+"""A place in metres."""
 
 
 @dataclass(eq=False, slots=True)

@@ -48,7 +48,6 @@ __all__ = [
     "conditions",
     "difference",
     "object_columns",
-    "summands",
     "turned_within",
 ]
 
@@ -256,7 +255,7 @@ class ConditionReader:
         own = bounds.columns[index, "heading"]
         assert isinstance(own, str)
         alias = own.removesuffix("heading")
-        rest: list[Node] = summands(node)
+        rest: list[Node] = _summands(node)
         fields = [term for term in rest if isinstance(term, DirectionAt)]
         along = len(fields) == 1 and self.own_direction(fields[0], index)
         if along:
@@ -339,7 +338,7 @@ def turned_within(own: str, alternatives: Sequence[Interval[Expr]], width: float
 _MOST_SUMMANDS = 64
 
 
-def summands(node: Node) -> list[Node]:
+def _summands(node: Node) -> list[Node]:
     """The terms of a sum; the sum itself if it has very many: terms that are shared count again and again."""
     found: list[Node] = []
     stack = [node]

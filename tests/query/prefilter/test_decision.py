@@ -12,6 +12,7 @@ import pytest
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.forest.scenario import BuiltIn
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
@@ -21,7 +22,9 @@ from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.prefilter.decision import decided_frames
 from scenicq.query.prefilter.executor import blocks, extents, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
-from scenicq.store.dataset import Dataset
+from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.labels import Label, LabelObject, Recording
+from scenicq.store.writer import write_dataset
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[2] / "match"))
@@ -130,6 +133,57 @@ def test_sql_decides_what_it_can(dataset, name):
 @pytest.mark.parametrize("name", ["twice", "cancels", "turned", "shared"])
 def test_a_variable_that_is_used_twice_is_left_to_the_matcher(name):
     assert not plan_of(SINGLE[name], OPTIONS["default"])[0].decision
+
+
+CAR = "ego = new Car\nother = new Car ahead of ego by Range(1, 10)"
+LEFT: dict[str, tuple[str, str, MatchOptions]] = {
+    # what is not decided by SQL, with a text that is
+    "mutated": (f"{CAR}\nmutate other", CAR, MatchOptions()),
+    "any ego": (CAR, CAR, MatchOptions(ego="any")),
+    "exact": (CAR, CAR, MatchOptions(exact=True)),
+    "solver": (CAR, CAR, MatchOptions(method="smt")),
+    "boxes": (CAR, CAR, MatchOptions(enforce=frozenset({BuiltIn.COLLISION}))),
+    "filter over what a choice leads to": (
+        "lane = Uniform(*network.lanes)\nego = new Car\n"
+        "turn = Uniform(*filter(lambda each: each.type is ManeuverType.STRAIGHT, lane.maneuvers))\n"
+        "other = new Car on turn.endLane",
+        "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car\nother = new Car on lane",
+        MatchOptions(),
+    ),
+    "three in a group": (
+        "gap = Range(1, 9)\nego = new Car\na = new Car ahead of ego by gap\nb = new Car behind ego by gap\n"
+        "c = new Car left of ego by gap",
+        "ego = new Car\na = new Car ahead of ego by Range(1, 9)\nb = new Car behind ego by Range(1, 9)\n"
+        "c = new Car left of ego by Range(1, 9)",
+        MatchOptions(),
+    ),
+    "four roles tied together": (
+        "ego = new Car\na = new Car\nb = new Car\nc = new Car\nd = new Car\n"
+        "require (distance from a to b) < 9\nrequire (distance from c to d) < 9",
+        "ego = new Car\na = new Car\nb = new Car\nc = new Car\nrequire (distance from a to b) < 9",
+        MatchOptions(),
+    ),
+}
+
+
+@pytest.mark.parametrize("why", LEFT)
+def test_what_sql_cannot_decide_is_left_to_the_matcher(why):
+    text, other, options = LEFT[why]
+    assert plan_of(other, MatchOptions())[0].decision
+    assert not plan_of(text, options)[0].decision
+
+
+def test_what_a_label_lacks_and_what_is_among_its_attributes_proves_nothing(tmp_path):
+    text = f"{CAR}, with speed Range(0, 2), with width 2, with parked True"
+    ego = LabelObject("ego", "Car", "car", 1.75, 50.0, 0.0, 2.0, 4.5)
+    ahead = LabelObject("a", "Car", "car", 1.75, 60.0, 0.0, 2.0, 4.5, velocity=(0.0, 1.0))
+    objects = {"all": ahead, "no speed": replace(ahead, velocity=None), "no width": replace(ahead, width=None)}
+    objects["attribute"] = replace(ahead, attributes={"parked": True})
+    labels = [Label(name, "r", at, "street", ego, (each,)) for at, (name, each) in enumerate(objects.items())]
+    write_dataset(tmp_path / "d", [Recording("r", "street", tuple(labels))], {"street": STREET.features}, name="d")
+    plan, matcher = plan_of(text, OPTIONS["default"])
+    assert all(isinstance(matcher.match(label), Match) for label in labels)
+    assert sure_frames(open_dataset(tmp_path / "d"), plan) == (["all"], 3)
 
 
 @pytest.mark.parametrize("name", ["ahead", "view", "crossing", "range"])
