@@ -36,6 +36,8 @@ SIMULATION_S = 60.0
 """Processor time that Scenic may take to compile and simulate one program."""
 HIDDEN = re.compile(r"^# hidden:", re.MULTILINE)
 """In a program whose requirements hang on random numbers: Scenic replays one of their values, scenicq asks for any."""
+OVER_TIME = re.compile(r"^(behavior|monitor|terminate|require (always|monitor))\b|\bbehavior ", re.MULTILINE)
+"""In a program that says something of time; others match frames, not intervals."""
 COUNTS_STEPS = re.compile(r"\bterminate after \d+ steps\b")
 """In Scenic a step is a sample; here it is a time, so that thinned traces are not compared."""
 
@@ -183,6 +185,8 @@ def programs(arguments: argparse.Namespace) -> Iterator[tuple[str, Path, Path]]:
         return
     towns = maps_of([arguments.checkout / "assets", *arguments.maps])
     for program, own in published_programs(arguments.checkout):
+        if not OVER_TIME.search((arguments.checkout / program).read_text(encoding="utf-8")):
+            continue
         town = next((name for name in (own, *SECOND) if name in towns), None)
         if town is None:
             raise SystemExit(f"no town for {program}: give --maps")
