@@ -24,6 +24,9 @@ JITTER = (0.05, math.radians(0.3))
 """Metres and radians of noise. What is 20 m ahead of an object turned by this is 0.1 m aside: with the noise of both
 ends 0.2 m, within the tolerance of 0.25 m."""
 
+BEGINS = "trace_begins"
+"""A global parameter that is 1 at the first sample of a recording, and 0 at all others."""
+
 States = list[list[list[float]]]
 """For each sample and object: x, y, heading, velocity east and north."""
 
@@ -136,6 +139,7 @@ def write(folder: Path, chart: Path, objects: list[dict[str, Any]], recorded: li
                     "recording": each.name,
                     "timestamp_us": round(number * each.time_step * 1e6),
                     "map": "town",
+                    "params": {BEGINS: int(number == 0)},
                     "ego": things[0],
                     "objects": things[1:],
                 }

@@ -344,23 +344,27 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
             continue
     found: list[Band] = []
 
-    def conditions(numbers: Sequence[int]) -> None:
-        for number in numbers:
-            condition = dynamics.conditions[number]
-            if number in known:
-                values = tuple(known[number].tolist())
-                found.append(Band(_named(condition, number), condition.span, values, sides=_sides(columns, condition)))
+    def add(number: int, what: str = "") -> None:
+        condition = dynamics.conditions[number]
+        if number in known:
+            values = tuple(known[number].tolist())
+            told = what or _named(condition, number)
+            found.append(Band(told, condition.span, values, sides=_sides(columns, condition)))
 
     for requirement in dynamics.requirements:
         numbers = _atoms(requirement.formula)
-        conditions(numbers)
+        for number in numbers:
+            add(number)
         if all(number in known for number in numbers):
             ends = np.array([interval.end - interval.start])
             values = evaluate(requirement.formula, lambda atom: known[atom.number], ends)[:, 0]
             text = " ".join(requirement.span.text.split())
             found.append(Band(text, requirement.span, tuple(values.tolist()), is_requirement=True))
-    conditions([each.condition.number for each in _conditional(dynamics.terminations) if each.condition is not None])
-    conditions([s.condition.number for monitor in dynamics.monitors for s in monitor.steps if isinstance(s, Test)])
+    for termination in dynamics.terminations:
+        if termination.condition is not None:
+            add(termination.condition.number, " ".join(termination.span.text.split()))
+    for number in dict.fromkeys(s.condition.number for m in dynamics.monitors for s in m.steps if isinstance(s, Test)):
+        add(number)
     return tuple(found)
 
 
