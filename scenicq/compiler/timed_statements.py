@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol, cast
 
+from scenicq.compiler.assignment import assign
 from scenicq.compiler.environment import Environment
+from scenicq.compiler.items import items_of
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition, graph_of
 from scenicq.compiler.requirements import Requirer, deferred
 from scenicq.compiler.temporal import TimedStatements
@@ -99,7 +101,16 @@ def _watch(run: Timer, timed: TimedStatements, call: MonitorCall, span: Span) ->
     """Require a monitor with values of its parameters."""
     scope = Environment(dict(call.given), cast(Environment, call.monitor.environment))
     body = cast("tuple[ast.Statement, ...]", call.monitor.body)
-    timed.watch(graph_of(timed, body, lambda wanted: deferred(run, wanted, scope, span), span))
+
+    def rounds(node: ast.For, around: Environment) -> list[Environment]:
+        inner: list[Environment] = []
+        for item in items_of(run, run.evaluate(node.iterable, around), node.iterable.span):
+            run.budget.step(node.span)
+            inner.append(Environment({}, around))
+            assign(run, node.target, item, inner[-1])
+        return inner
+
+    timed.watch(graph_of(timed, body, scope, lambda wanted, names: deferred(run, wanted, names, span), rounds, span))
 
 
 def _seconds(run: Timer, node: ast.DynamicStatement, scope: Environment) -> float:

@@ -16,7 +16,7 @@ from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.frame_explanation import explain
+from scenicq.query.explain.frame_explanation import explain, explain_match
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.cards import TILE_LETTERS, Card, best_frame, draw_card, draw_tile
 from scenicq.report.frames import variable_texts
@@ -274,13 +274,16 @@ class _Report:
                 yield draw_card(card)
 
     def explained(self, matcher: Matcher, shot: Shot) -> Shot:
-        """A frame with why it matches or does not, but for a match that is explained by another correspondence."""
-        if isinstance(shot.verdict, Unknown):
-            return shot
-        why = explain(matcher, shot.label)
-        if isinstance(shot.verdict, Match) and why.correspondence != shot.verdict.correspondence:
-            return shot
-        return replace(shot, explanation=why)
+        """A frame with why it matches or does not, but for one within an interval that is no initial scene."""
+        why = None
+        match shot.verdict:
+            case Match(correspondence):
+                why = explain_match(matcher, shot.label, correspondence)
+            case NoMatch():
+                why = explain(matcher, shot.label)
+            case _:
+                pass
+        return shot if why is None else replace(shot, explanation=why)
 
     def picture(self, shot: Shot, backdrop: Backdrop, letters: float = LETTERS) -> str:
         """Write a picture beside the page; its address."""

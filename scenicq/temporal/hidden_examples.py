@@ -2,13 +2,14 @@
 
 The matcher gives one example of values with which the label at the start matches. With it every condition has a value
 at every sample, and the matcher is asked for others: values with which some of these turn out otherwise, many at once,
-then fewer. What no values turn is certain, however the variables come out; what some turn is unknown. A run that is
-decided so is decided for all values, and one of an example that matches is a proof.
+then fewer. What no values turn is certain, however the variables come out. What some turn is assumed to hold and not to
+hold, one after the other from the first sample on, where the matcher has an example of all that is assumed, until the
+run is decided: so all that can become of it is found, each with values that make it so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from scenicq.budget import look
@@ -23,9 +24,10 @@ from scenicq.match.verdict import Match, NoMatch, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns
-from scenicq.temporal.truth import TRUE, UNKNOWN, Truth
+from scenicq.temporal.runs import Run
+from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Example", "Examples", "Remembered", "examine_start"]
+__all__ = ["Example", "Examples", "Outcome", "Remembered", "examine_start"]
 
 Remembered = tuple[Label, Mapping[str, str]]
 """The label of a start, and its correspondence."""
@@ -35,6 +37,8 @@ _MOST_ASKED = 64
 
 _Place = tuple[int, int]
 """The number of a condition and a sample."""
+_Case = tuple[Mapping[int, Truth], tuple[Node, ...], Sequence["Example"]]
+"""What conditions are, what is assumed of them, and examples for which it is so."""
 
 
 def examine_start(
@@ -71,6 +75,14 @@ class Example:
     truth: Mapping[int, Truth]
 
 
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What some values make of a run, with an example of them."""
+
+    run: Run
+    example: Example
+
+
 @dataclass(slots=True)
 class Examples:
     """What the values of random variables can make of conditions, for one start.
@@ -83,6 +95,7 @@ class Examples:
         columns: Over the samples.
         conditions: Those that hang on random variables, expanded, by number.
         first: The sample of the start.
+        decide: The run, given conditions that hang on random variables.
         found: Examples so far.
     """
 
@@ -93,10 +106,56 @@ class Examples:
     columns: AtomColumns
     conditions: Mapping[int, Node]
     first: int
+    decide: Callable[[Mapping[int, Truth]], Run]
     found: list[Example] = field(default_factory=list[Example])
     _asked: int = 0
 
-    def certain(self) -> Mapping[int, Truth] | None:
+    def outcomes(self) -> list[Outcome] | None:
+        """All that becomes of the run, of which some may be unknown; None without an example."""
+        certain = self._certain()
+        if certain is None:
+            return None
+        found: list[Outcome] = []
+        cases: list[_Case] = [(certain, (), self.found[:])]
+        while cases:
+            look()
+            known, assumed, examples = cases.pop()
+            run = self.decide(known)
+            place = None if run.truth != UNKNOWN else self._open_place(known, examples[0])
+            if place is None:
+                found.append(Outcome(run, examples[0]))
+                continue
+            for truth in (FALSE, TRUE):
+                further = (*assumed, self._that(*place, holds=bool(truth == TRUE)))
+                fit = [each for each in examples if each.truth[place[0]][place[1]] == truth]
+                answer = bool(fit) or self._ask(Logic(LogicOp.AND, further) if assumed else further[0])
+                if answer and not fit:
+                    fit = [each for each in self.found[-1:] if each.truth[place[0]][place[1]] == truth]
+                if fit:
+                    number, sample = place
+                    more = {**known, number: known[number].copy()}
+                    more[number][sample] = truth
+                    cases.append((more, further, fit))
+                elif answer is not False:
+                    found.append(Outcome(run, examples[0]))
+        return found
+
+    def _open_place(self, known: Mapping[int, Truth], example: Example) -> _Place | None:
+        """Where the first condition is that values can make hold or not; None where only observations are missing."""
+        samples = range(self.first, len(self.columns.samples))
+        return next(
+            (
+                (number, sample)
+                for sample in samples
+                for number in self.conditions
+                if known[number][sample] == UNKNOWN
+                and example.truth[number][sample] != UNKNOWN
+                and self._is_observed(number, sample)
+            ),
+            None,
+        )
+
+    def _certain(self) -> Mapping[int, Truth] | None:
         """For each condition its value at each sample where it has only one, else unknown; None without an example."""
         if self._ask(None) is not True:
             return None
@@ -115,7 +174,8 @@ class Examples:
             block = [each for each in block if each not in open_]
             if not block:
                 continue
-            answer = self._ask([self._otherwise(n, k, holds=bool(base[n][k] == TRUE)) for n, k in block])
+            otherwise = [self._that(n, k, holds=bool(base[n][k] != TRUE)) for n, k in block]
+            answer = self._ask(otherwise[0] if len(block) == 1 else Logic(LogicOp.OR, tuple(otherwise)))
             if answer is False:
                 continue
             if answer is True:
@@ -134,12 +194,11 @@ class Examples:
             certain[number][sample] = UNKNOWN
         return certain
 
-    def _ask(self, some: Sequence[Node] | None) -> bool | None:
-        """Whether there are values for which one of some conditions holds, which are kept; None if not known."""
+    def _ask(self, wanted: Node | None) -> bool | None:
+        """Whether there are values for which a condition holds, which are kept; None if not known."""
         if self._asked >= _MOST_ASKED:
             return None
         self._asked += 1
-        wanted = None if some is None else some[0] if len(some) == 1 else Logic(LogicOp.OR, tuple(some))
         finding = examine_start(self.scenario, self.match, self.solver, self.start, wanted)
         verdict = finding.verdict
         if isinstance(verdict, NoMatch):
@@ -166,12 +225,12 @@ class Examples:
         read = [each for each in nodes if isinstance(each, Feature) and each.current]
         return all(self.columns.observed(each, sample) is not None for each in read)
 
-    def _otherwise(self, number: int, sample: int, *, holds: bool) -> Node:
-        """That a condition comes out otherwise at a sample."""
+    def _that(self, number: int, sample: int, *, holds: bool) -> Node:
+        """That a condition holds at a sample, or that it does not."""
 
         def observed(node: Node) -> Node:
             # what is read at the start is observed by the label
             return constant(self.columns.observed(node, sample)) if isinstance(node, Feature) and node.current else node
 
         here = transform(self.conditions[number], observed)
-        return Logic(LogicOp.NOT, (here,)) if holds else here
+        return here if holds else Logic(LogicOp.NOT, (here,))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import groupby
+from typing import TypeVarTuple
 
 import numpy as np
 
@@ -19,20 +20,36 @@ from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
 from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
-from scenicq.temporal.hidden_examples import Examples, Remembered, examine_start
+from scenicq.temporal.hidden_examples import Examples, Outcome, Remembered, examine_start
 from scenicq.temporal.run_columns import RunColumns, Runs
 from scenicq.temporal.runs import Run
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.thresholds import thresholds_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Details", "HiddenRuns", "Remembered"]
+__all__ = ["Detail", "HiddenFound", "HiddenRuns", "Remembered"]
 
-Details = dict[int, tuple[str, Mapping[str, WitnessValue]]]
-"""By the number of a start why its run is unknown, and the values of random variables of conditions over time."""
+_Rest = TypeVarTuple("_Rest")
+Detail = tuple[str, Mapping[str, WitnessValue]]
+"""Why a run is unknown, and the values of random variables of conditions over time."""
 
 _MOST_JOINT = 32
 """Starts of one binding that are matched again with values of random variables that the initial scene has, too."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class HiddenFound:
+    """What became of runs whose conditions hang on random variables.
+
+    Attributes:
+        runs: The best that any values make of each start.
+        others: Matches that other values make of some starts, each with the number of the start among all and its end.
+        details: By the number of a start in its table and the last place of its run.
+    """
+
+    runs: Runs
+    others: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    details: dict[tuple[int, int], Detail] = field(default_factory=dict["tuple[int, int]", Detail])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -44,17 +61,19 @@ class HiddenRuns:
         scenario: The scenario.
         match: Options of the matcher.
         solver: Decides what is not decided otherwise.
+        every: Whether all matches of a start are wanted, not only the longest.
     """
 
     runs: RunColumns
     scenario: Scenario
     match: MatchOptions
     solver: Solver | None
+    every: bool = False
 
     def follow(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
         remember: Callable[[int], Remembered],
-    ) -> tuple[Runs, Details]:  # fmt: skip
+    ) -> HiddenFound:  # fmt: skip
         """What becomes of the runs from all starts.
 
         Args:
@@ -67,26 +86,32 @@ class HiddenRuns:
         shared = {leaf.identity for leaf in leaves(*roots_of(replace(self.scenario, dynamics=None)))}
         joint = [leaf for leaf in variables if leaf.identity in shared]
         known = None if joint else thresholds_of(self.runs, stretches, columns, expanded, variables)
-        found = Runs.unknown(stretches.starts.copy())
-        details: Details = {}
-        thin = np.ones(len(stretches.starts), np.bool_)
+        found = HiddenFound(Runs.unknown(stretches.starts.copy()) if known is None else known.runs)
+        thin = np.ones(len(stretches.starts), np.bool_) if known is None else known.thin
+        numbers: list[int] = stretches.numbers.tolist()
         if known is not None:
-            found, thin = known.runs, known.thin
-            for number, value in zip(stretches.numbers.tolist(), known.values.tolist(), strict=True):
-                details[number] = "", {_place(variables[0]): value}
+            # where it ends hangs on no variable, so that a start has one end
+            ends: list[int] = known.runs.ends.tolist()
+            for number, end, value in zip(numbers, ends, known.values.tolist(), strict=True):
+                found.details[number, end] = "", {_place(variables[0]): value}
         for places, mine in stretches.apart():
             if not thin[mine].any():
                 continue
             one = stretches.some(np.arange(int(places.start), int(places.stop), dtype=np.int64))
             own = AtomColumns(self.scenario, one.places, start=one.heads())
-            found.put(mine, [*self._of_binding(one, own, expanded, variables, joint, remember, details)], places.start)
-        return found, details
+            outcomes = list(self._of_binding(one, own, expanded, variables, joint, remember))
+            found.runs.put(mine, [each[0][0] for each in outcomes], places.start)
+            for start, each in zip(range(mine.start, mine.stop), outcomes, strict=True):
+                for run, detail in each:
+                    found.details[numbers[start], places.start + run.end] = detail
+                found.others.extend((start, places.start + run.end) for run, _ in each[1:])
+        return found
 
     def _of_binding(
         self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node], variables: Sequence[Leaf],
-        joint: Sequence[Leaf], remember: Callable[[int], Remembered], details: Details,
-    ) -> Iterator[Run]:  # fmt: skip
-        """The runs of one stretch, by cells of values."""
+        joint: Sequence[Leaf], remember: Callable[[int], Remembered],
+    ) -> Iterator[list[tuple[Run, Detail]]]:  # fmt: skip
+        """The runs of one stretch, by cells of values: of each start the best, then other matches."""
         numbers, starts = stretch.numbers.tolist(), stretch.starts.tolist()
         try:
             with limited(self.match.timeout_s):
@@ -97,26 +122,26 @@ class HiddenRuns:
                 one = replace(
                     stretch, starts=stretch.starts[start : start + 1], numbers=stretch.numbers[start : start + 1]
                 )
-                run, why, witness = self._by_examples(one, columns, expanded, remember(number), str(error))
-                details[number] = why, witness
-                yield run
+                yield self._by_examples(one, columns, expanded, remember(number), str(error))
             return
         except (HiddenVariable, TimeIsUp) as error:
             reason = "timeout" if isinstance(error, TimeIsUp) else str(error) or "a hidden random variable over time"
-            for number, start in zip(numbers, starts, strict=True):
-                details[number] = reason, {}
-                yield Run(start, len(stretch.labels) - 1, int(UNKNOWN))
+            for start in starts:
+                yield [(Run(start, len(stretch.labels) - 1, int(UNKNOWN)), (reason, {}))]
             return
-        for number, (run, cell, reason) in zip(numbers, best, strict=True):
-            values = {_place(leaf): cell.values[leaf.identity] for leaf in variables}
-            details[number] = reason, {key: value for key, value in values.items() if isinstance(value, float)}
-            yield run
+        for outcomes in best:
+            found: list[tuple[Run, Detail]] = []
+            for run, cell, reason in outcomes:
+                values = {_place(leaf): cell.values[leaf.identity] for leaf in variables}
+                witness = {key: value for key, value in values.items() if isinstance(value, float)}
+                found.append((run, (reason, witness)))
+            yield found
 
     def _over_cells(
         self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node], joint: Sequence[Leaf],
         remember: Callable[[int], Remembered],
-    ) -> Iterator[tuple[Run, Cell, str]]:  # fmt: skip
-        """The best that any cell makes of each start."""
+    ) -> Iterator[list[tuple[Run, Cell, str]]]:  # fmt: skip
+        """What cells make of each start: the best, then other matches if they are wanted."""
         starts = stretch.starts.tolist()
         found: list[list[tuple[Run, Cell]]] = [[] for _ in starts]
         for cell in cells(columns, expanded):
@@ -131,36 +156,40 @@ class HiddenRuns:
             ranked = sorted(mine, key=lambda each: (-each[0].truth, -each[0].end))
             best, cell = ranked[0]
             if not joint or best.truth == FALSE:
-                yield best, cell, ""
+                matches = [(run, own, "") for run, own in ranked if run.truth == TRUE]
+                yield _one_each(matches, every=self.every) or [(best, cell, "")]
                 continue
             matched_again += 1
             if matched_again > _MOST_JOINT:
-                yield replace(best, truth=int(UNKNOWN)), cell, "budget"
+                yield [(replace(best, truth=int(UNKNOWN)), cell, "budget")]
             else:
                 yield self._jointly(remember(number), joint, ranked)
 
     def _by_examples(
         self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: Remembered, unclear: str
-    ) -> tuple[Run, str, Mapping[str, WitnessValue]]:
-        """The run of one start by what its label says of the variables, else why it is unknown."""
+    ) -> list[tuple[Run, Detail]]:
+        """The matches of a start by what its label says of the variables, the longest first, else why there is none."""
         hanging = {number: each for number, each in enumerate(expanded) if any(True for _ in leaves(each))}
         first = int(one.starts[0])
-        asked = Examples(self.scenario, self.match, self.solver, start, columns, hanging, first)
+
+        def decide(known: Mapping[int, Truth]) -> Run:
+            return self._run(one, columns, expanded, known)
+
+        asked = Examples(self.scenario, self.match, self.solver, start, columns, hanging, first, decide)
+        outcomes: list[Outcome] | None = None
         try:
             with limited(self.match.timeout_s):
-                certain = asked.certain()
-                runs = None if certain is None else self._run(one, columns, expanded, certain)
-                if runs is not None and runs.truth != UNKNOWN:
-                    return runs, "", asked.found[0].witness if runs.truth == TRUE else {}
+                outcomes = asked.outcomes()
         except (HiddenVariable, TimeIsUp):
             pass
-        # an example is a proof, although others may be longer
-        found = [(self._run(one, columns, expanded, each.truth), each) for each in asked.found]
-        matches = [(run, each) for run, each in found if run.truth == TRUE]
-        if not matches:
-            return Run(first, len(one.labels) - 1, int(UNKNOWN)), unclear, {}
-        run, example = max(matches, key=lambda each: each[0].end)
-        return run, "", example.witness
+        if outcomes and all(each.run.truth == FALSE for each in outcomes):
+            return [(max((each.run for each in outcomes), key=lambda run: (run.cut_off, run.end)), ("", {}))]
+        # an example is a proof, whatever else there may be
+        outcomes = [*(outcomes or ()), *(Outcome(decide(each.truth), each) for each in asked.found)]
+        proven = [(each.run, ("", each.example.witness)) for each in outcomes if each.run.truth == TRUE]
+        proven.sort(key=lambda each: -each[0].end)
+        none = Run(first, len(one.labels) - 1, int(UNKNOWN)), (unclear, dict[str, WitnessValue]())
+        return _one_each(proven, every=self.every) or [none]
 
     def _run(self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], known: Mapping[int, Truth]) -> Run:
         """The run of one start, given some conditions at each sample."""
@@ -187,12 +216,13 @@ class HiddenRuns:
 
     def _jointly(
         self, start: Remembered, joint: Sequence[Leaf], ranked: Sequence[tuple[Run, Cell]]
-    ) -> tuple[Run, Cell, str]:
-        """The best run whose values of random variables the initial scene has, too."""
+    ) -> list[tuple[Run, Cell, str]]:
+        """The best runs whose values of random variables the initial scene has, too."""
         undecided: tuple[Run, Cell, str] | None = None
-        for (_, _), group in groupby(ranked, key=lambda each: (each[0].truth, each[0].end)):
+        found: list[tuple[Run, Cell, str]] = []
+        for (truth, _), group in groupby(ranked, key=lambda each: (each[0].truth, each[0].end)):
             same = list(group)
-            if same[0][0].truth == FALSE:
+            if truth == FALSE or (found and (truth == UNKNOWN or not self.every)):
                 break
             within = _within(joint, [cell for _, cell in same])
             finding = examine_start(self.scenario, self.match, self.solver, start, within)
@@ -201,11 +231,18 @@ class HiddenRuns:
                 known = finding.values()
                 values = [known.get(leaf.identity) for leaf in joint]
                 held = next((each for each in same if _holds(each[1], joint, values)), same[0])
-                return *held, ""
+                found.append((*held, ""))
             if isinstance(verdict, Unknown) and undecided is None:
                 undecided = replace(same[0][0], truth=int(UNKNOWN)), same[0][1], verdict.reason
         run, cell = ranked[-1]
-        return undecided or (replace(run, truth=int(FALSE)), cell, "")
+        return found or [undecided or (replace(run, truth=int(FALSE)), cell, "")]
+
+
+def _one_each(matches: Sequence[tuple[Run, *_Rest]], *, every: bool) -> list[tuple[Run, *_Rest]]:
+    """Of matches of one start, the longest first, one for each end, or the first alone."""
+    found = {each[0].end: each for each in reversed(matches)}
+    ordered = sorted(found.values(), key=lambda each: -each[0].end)
+    return ordered if every else ordered[:1]
 
 
 def _place(leaf: Leaf) -> str:

@@ -26,10 +26,10 @@ from scenicq.smt.answer import Solver
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
-from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
+from scenicq.temporal.hidden_runs import Detail, HiddenFound, HiddenRuns, Remembered
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.presence import by_presence
-from scenicq.temporal.run_columns import RunColumns, Runs
+from scenicq.temporal.run_columns import RunColumns
 from scenicq.temporal.samples import MOVING
 from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
@@ -76,7 +76,7 @@ class _Found:
     origins: NDArray[np.int64]
     broken: NDArray[np.object_]
     cut_off: NDArray[np.bool_]
-    details: Mapping[int, tuple[str, Mapping[str, WitnessValue]]]
+    details: Mapping[tuple[int, int], Detail]
 
 
 @dataclass(eq=False)
@@ -149,20 +149,18 @@ class IntervalMatcher:
         remember: Callable[[int], Remembered],
     ) -> _Found:  # fmt: skip
         assert self._runs is not None
-        details: dict[int, tuple[str, Mapping[str, WitnessValue]]] = {}
         if random_variables(expanded):
-            hidden = HiddenRuns(self._runs, self.scenario, self.match, self.solver)
-            runs, details = hidden.follow(stretches, columns, expanded, remember)
-        else:
-            known: dict[int, Truth] = {}
+            every = self.options.intervals == "all"
+            hidden = HiddenRuns(self._runs, self.scenario, self.match, self.solver, every)
+            return _found(stretches, table, hidden.follow(stretches, columns, expanded, remember))
+        known: dict[int, Truth] = {}
 
-            def atom(each: Atom) -> Truth:
-                if each.number not in known:
-                    known[each.number] = columns.truth_of(expanded[each.number])
-                return known[each.number]
+        def atom(each: Atom) -> Truth:
+            if each.number not in known:
+                known[each.number] = columns.truth_of(expanded[each.number])
+            return known[each.number]
 
-            runs = self._runs.follow(stretches, atom)
-        return _found(stretches, table, runs, details)
+        return _found(stretches, table, HiddenFound(self._runs.follow(stretches, atom)))
 
     def _reported(
         self, parts: Sequence[_Found], table: StartTable, bindings: NDArray[np.int64]
@@ -195,14 +193,15 @@ class IntervalMatcher:
             yield [
                 self._interval(
                     table, int(origins[each]), (int(starts[each]), int(ends[each])), verdict,
-                    details.get(int(origins[each]), ("", {})), broken[each], cut_off=bool(cut_off[each]),
+                    details.get((int(origins[each]), int(ends[each])), ("", {})), broken[each],
+                    cut_off=bool(cut_off[each]),
                 )
                 for each, verdict in zip(numbers, verdicts, strict=True)
             ]  # fmt: skip
 
     def _interval(
         self, table: StartTable, origin: int, span: tuple[int, int], truth: int,
-        detail: tuple[str, Mapping[str, WitnessValue]], broken: Span | None, *, cut_off: bool,
+        detail: Detail, broken: Span | None, *, cut_off: bool,
     ) -> IntervalVerdict:  # fmt: skip
         block = table.block
         recording = int(block.recording_of[span[0]])
@@ -231,13 +230,21 @@ def _sorted(table: StartTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return distinct[order], np.concatenate(([0], np.cumsum(changes))) if len(order) else np.empty(0, np.int64)
 
 
-def _found(
-    stretches: Stretches, table: StartTable, runs: Runs, details: Mapping[int, tuple[str, Mapping[str, WitnessValue]]]
-) -> _Found:
+def _found(stretches: Stretches, table: StartTable, found: HiddenFound) -> _Found:
     """The runs of stretches as labels of their block; a start that is not sure makes a run that is not."""
-    truth = np.minimum(runs.truth, np.where(table.sure[stretches.numbers], TRUE, UNKNOWN))
-    starts, ends = stretches.labels[stretches.starts], stretches.labels[runs.ends]
-    return _Found(starts, ends, truth, stretches.numbers, runs.broken, runs.cut_off, details)
+    runs, labels = found.runs, stretches.labels
+    which, ends = np.arange(len(stretches.starts)), runs.ends
+    truth, broken, cut_off = runs.truth, runs.broken, runs.cut_off
+    if found.others:
+        n = len(found.others)
+        others = np.array(found.others, dtype=np.int64)
+        which, ends = np.append(which, others[:, 0]), np.append(ends, others[:, 1])
+        truth, cut_off = np.append(truth, np.full(n, TRUE)), np.append(cut_off, np.zeros(n, np.bool_))
+        broken = np.append(broken, np.full(n, None, dtype=object))
+    origins = stretches.numbers[which]
+    truth = np.minimum(truth, np.where(table.sure[origins], TRUE, UNKNOWN))
+    details = {(number, int(labels[end])): each for (number, end), each in found.details.items()}
+    return _Found(labels[stretches.starts[which]], labels[ends], truth, origins, broken, cut_off, details)
 
 
 def _static(stretches: Stretches, table: StartTable) -> _Found:

@@ -18,9 +18,14 @@ MORE_S = 1.0
 """Seconds by which a recording goes on after the program has ended, all objects as they moved last."""
 THINNED = 5
 """Every so many-th sample is left: 2 of 10 a second."""
+MOST_CHANGED = 4
+"""Objects that are changed, one after the other: the ego and those that the program names first."""
 JITTER = (0.05, math.radians(0.3))
 """Metres and radians of noise. What is 20 m ahead of an object turned by this is 0.1 m aside: with the noise of both
 ends 0.2 m, within the tolerance of 0.25 m."""
+
+BEGINS = "trace_begins"
+"""A global parameter that is 1 at the first sample of a recording, and 0 at all others."""
 
 States = list[list[list[float]]]
 """For each sample and object: x, y, heading, velocity east and north."""
@@ -61,7 +66,7 @@ def recordings(trace: dict[str, Any], seed: int) -> Iterator[Recorded]:
     yield Recorded("thinned", longer[::THINNED], step * THINNED)
     yield Recorded("jitter", _jittered(longer, seed), step)
     yield Recorded("cut", states[: max(2, 2 * len(states) // 3)], step)
-    for number in range(len(states[0])):
+    for number in range(min(MOST_CHANGED, len(states[0]))):
         yield Recorded(f"late-{number}", _late(longer, number, round(1.5 / step)), step)
         yield Recorded(f"stops-{number}", _stops(longer, number, len(states) // 3), step)
         yield Recorded(f"aside-{number}", _aside(longer, number, 6.0), step)
@@ -134,6 +139,7 @@ def write(folder: Path, chart: Path, objects: list[dict[str, Any]], recorded: li
                     "recording": each.name,
                     "timestamp_us": round(number * each.time_step * 1e6),
                     "map": "town",
+                    "params": {BEGINS: int(number == 0)},
                     "ego": things[0],
                     "objects": things[1:],
                 }

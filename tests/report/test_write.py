@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from scenicq.errors import DataError, ScenicqError
+from scenicq.errors import DataError, ScenicqError, Source
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
@@ -209,6 +209,19 @@ def test_bands_of_an_interval_say_all_of_what_holds(crossroads, tmp_path):
     assert "require eventually abs(to_the_left(other)) < 0.5" in page.texts
     shown = [text for text in page.texts if "always" in text or "eventually" in text]
     assert not any(text.endswith("\N{HORIZONTAL ELLIPSIS}") for text in shown)
+
+
+def test_each_interval_shows_what_the_label_says_of_its_own_objects(crossroads, tmp_path):
+    text = "ego = new Car\nwalker = new Pedestrian\nrequire (distance to walker) < 40\nterminate after 5 seconds\n"
+    program = Source("program.scenic", f"model scenic.domains.driving.model\n{text}")
+    query = Query(open_dataset(crossroads), program, OPTIONS)
+    results = list(query.results())
+    starts = Counter(each.frame for each in results)
+    assert max(starts.values()) > 1
+    page = write_report(query, results, tmp_path / "r").read_text(encoding="utf-8")
+    cards = page.split('<article class="run"')[1:]
+    assert len(cards) == len(results)
+    assert all("What the label shows" in card for card in cards)
 
 
 def test_what_is_left_out_is_told(query, tmp_path, monkeypatch):

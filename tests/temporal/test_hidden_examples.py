@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -10,6 +11,7 @@ from scenicq.errors import Source
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
+from scenicq.temporal.interval_options import IntervalOptions
 
 PROGRAM = """model scenic.domains.driving.model
 spot = new Point on road
@@ -55,6 +57,28 @@ def test_a_match_is_proven_by_its_point(found, crossroads):
             away = [math.dist((label.ego.x, label.ego.y), spot) for label in mine[: each.interval.count]]
             assert away[-1] > 40
             assert max(away[:-1]) <= 40
+
+
+def test_every_end_that_some_point_makes_is_found(crossroads):
+    dataset = open_dataset(crossroads)
+    options = QueryOptions(solver="portable", time=IntervalOptions(intervals="all"))
+    results = list(Query(dataset, Source("program.scenic", PROGRAM), options).results())
+    ends: dict[tuple[str, str], set[int]] = {}
+    for each in results:
+        ends.setdefault((each.frame, each.verdict.correspondence["other"]), set()).add(each.interval.count)
+    assert max(map(len, ends.values())) > 1
+    labels = sorted(dataset.labels(), key=lambda label: (label.recording, label.timestamp_us))
+    for each in results:
+        place = next(n for n, label in enumerate(labels) if label.frame == each.frame)
+        roles = each.verdict.correspondence
+        other = next(thing for thing in labels[place].objects if roles["other"] in (thing.track, thing.id))
+        longer = [label for label in labels[place:] if label.recording == each.recording]
+        possible = set[int]()
+        for offset, aside, along in itertools.product(range(-20, 21), (-0.2, 0.0, 0.2), (-0.1, 0.0, 0.1)):
+            spot = other.x - offset / 10 + along, other.y + aside
+            away = [math.dist((a.ego.x, a.ego.y), spot) for a in longer]
+            possible |= {next(n for n, far in enumerate(away, 1) if far > 40)} if max(away) > 40 else set()
+        assert ends[each.frame, roles["other"]] >= possible, each.frame
 
 
 def test_what_is_cut_off_has_no_point_that_ends_it(found, crossroads):

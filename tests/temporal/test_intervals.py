@@ -44,7 +44,7 @@ def truth_of(trace: Trace, binding, d, completion):
     return truth
 
 
-def best_ends(program: Program, trace: Trace, binding, completion_seed):
+def ends_of(program: Program, trace: Trace, binding, completion_seed):
     """For each start the ends that some value of D allows, in one completion for each value."""
     found = {}
     for d in D_VALUES if program.hidden else [0.0]:
@@ -70,7 +70,7 @@ def check_whole(folder: Path, traces: dict[str, Trace], program: Program) -> int
     for name, trace in traces.items():
         for binding in bindings(program, trace):
             roles = name, tuple(sorted(binding.items())), "Match"
-            spans = [(i, max(ends)) for i, ends in best_ends(program, trace, binding, 0).items()]
+            spans = [(i, j) for i, ends in ends_of(program, trace, binding, 0).items() for j in ends]
             expected_all += [(roles, span) for span in spans]
             expected_longest += [(roles, span) for span in longest(trace, spans)]
     every = found_by_query(folder, program, time=IntervalOptions(intervals="all"))
@@ -84,20 +84,20 @@ def check_gaps(folder: Path, traces: dict[str, Trace], program: Program) -> tupl
     matched, unknown = {}, set()
     for roles, (i, j) in found_by_query(folder, program, time=IntervalOptions(intervals="all")):
         if roles[2] == "Match":
-            matched[roles[:2], i] = j
+            matched.setdefault((roles[:2], i), set()).add(j)
         else:
             unknown.add((roles[:2], i))
     for name, trace in traces.items():
         for binding, seed in itertools.product(bindings(program, trace), range(COMPLETIONS)):
             roles = name, tuple(sorted(binding.items()))
-            ends = best_ends(program, trace, binding, seed)
+            ends = ends_of(program, trace, binding, seed)
             for i in range(len(trace)):
-                if (roles, i) in matched:
+                for j in matched.get((roles, i), ()):
                     # one that may go on may go on further where more holds, or with another value of D
                     further = not program.terminates or program.hidden
-                    held = {j for j in ends.get(i, ()) if j == matched[roles, i] or (further and j > matched[roles, i])}
+                    held = {end for end in ends.get(i, ()) if end == j or (further and end > j)}
                     assert held, (program.text(), name, i)
-                elif i in ends:
+                if (roles, i) not in matched and i in ends:
                     assert (roles, i) in unknown, (program.text(), name, i, ends[i])
     return len(matched), len(unknown)
 

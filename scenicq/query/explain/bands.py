@@ -11,7 +11,7 @@ import numpy as np
 from scenicq.errors import Span
 from scenicq.forest.nodes import Compare, Node
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import Atom, Formula, Termination, Test, operands
+from scenicq.forest.temporal import Atom, Formula, Test, operands
 from scenicq.store.tracks import RecordingTracks
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
 from scenicq.temporal.intervals import IntervalVerdict
@@ -19,7 +19,7 @@ from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import Truth
 
-__all__ = ["Band", "bands_of", "columns_of", "conditional", "show_bands"]
+__all__ = ["Band", "bands_of", "columns_of", "show_bands"]
 
 _WIDTH = 60
 """Characters of a band, at most."""
@@ -64,29 +64,28 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
             continue
     found: list[Band] = []
 
-    def conditions(numbers: Sequence[int]) -> None:
-        for number in numbers:
-            condition = dynamics.conditions[number]
-            if number in known:
-                values = tuple(known[number].tolist())
-                found.append(Band(_named(condition, number), condition.span, values, sides=_sides(columns, condition)))
+    def add(number: int, what: str = "") -> None:
+        condition = dynamics.conditions[number]
+        if number in known:
+            values = tuple(known[number].tolist())
+            told = what or _named(condition, number)
+            found.append(Band(told, condition.span, values, sides=_sides(columns, condition)))
 
     for requirement in dynamics.requirements:
         numbers = _atoms(requirement.formula)
-        conditions(numbers)
+        for number in numbers:
+            add(number)
         if all(number in known for number in numbers):
             ends = np.array([interval.end - interval.start])
             values = evaluate(requirement.formula, lambda atom: known[atom.number], ends)[:, 0]
             text = " ".join(requirement.span.text.split())
             found.append(Band(text, requirement.span, tuple(values.tolist()), is_requirement=True))
-    conditions([each.condition.number for each in conditional(dynamics.terminations) if each.condition is not None])
-    conditions([s.condition.number for monitor in dynamics.monitors for s in monitor.steps if isinstance(s, Test)])
+    for termination in dynamics.terminations:
+        if termination.condition is not None:
+            add(termination.condition.number, " ".join(termination.span.text.split()))
+    for number in dict.fromkeys(s.condition.number for m in dynamics.monitors for s in m.steps if isinstance(s, Test)):
+        add(number)
     return tuple(found)
-
-
-def conditional(terminations: Sequence[Termination]) -> list[Termination]:
-    """The terminations that hang on a condition, and not on time alone."""
-    return [each for each in terminations if each.condition is not None]
 
 
 def _atoms(formula: Formula) -> list[int]:

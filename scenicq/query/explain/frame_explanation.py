@@ -32,7 +32,7 @@ from scenicq.smt.encode import UnsupportedError
 from scenicq.smt.smtlib import to_smtlib
 from scenicq.store.labels import Label
 
-__all__ = ["Explanation", "GroupScript", "Proof", "explain", "show_explanation"]
+__all__ = ["Explanation", "GroupScript", "Proof", "explain", "explain_match", "show_explanation"]
 
 _WIDEST = 60
 
@@ -93,16 +93,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
     """
     finding = matcher.examine(label)
     if isinstance(finding.verdict, Match):
-        assert finding.search is not None
-        assert finding.plan is not None
-        return Explanation(
-            label.frame,
-            finding.verdict,
-            finding.verdict.correspondence,
-            _proofs(finding),
-            margins(matcher, finding.search, finding.plan, finding.assignment),
-            formulas=_formulas(matcher, finding) if formulas else (),
-        )
+        return _of_match(matcher, label, finding, finding.verdict, formulas=formulas)
     nearest = closest(matcher, label)
     if nearest is None or not isinstance(nearest.finding.verdict, Match):
         return _without_match(matcher, label, finding, formulas=formulas)
@@ -116,6 +107,34 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
         violations=_violations(matcher, found),
         closest=nearest,
         formulas=_formulas(matcher, found) if formulas else (),
+    )
+
+
+def explain_match(matcher: Matcher, label: Label, correspondence: Mapping[str, str]) -> Explanation | None:
+    """Explain why a label matches by one correspondence; None where it does not.
+
+    Args:
+        matcher: The matcher.
+        label: The label.
+        correspondence: The label object of each role, by their names.
+    """
+    ego = matcher.scenario.objects[matcher.scenario.ego].name
+    finding = matcher.examine(label, {name: id_ for name, id_ in correspondence.items() if name != ego})
+    if not isinstance(finding.verdict, Match) or dict(finding.verdict.correspondence) != dict(correspondence):
+        return None
+    return _of_match(matcher, label, finding, finding.verdict, formulas=False)
+
+
+def _of_match(matcher: Matcher, label: Label, finding: Finding, verdict: Match, *, formulas: bool) -> Explanation:
+    assert finding.search is not None
+    assert finding.plan is not None
+    return Explanation(
+        label.frame,
+        verdict,
+        verdict.correspondence,
+        _proofs(finding),
+        margins(matcher, finding.search, finding.plan, finding.assignment),
+        formulas=_formulas(matcher, finding) if formulas else (),
     )
 
 

@@ -19,7 +19,7 @@ from scenicq.query.execution.recording_matcher import CUT_OFF
 from scenicq.query.execution.recording_starts import DecidedStart, start_table, starts_of
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.bands import Band, bands_of, columns_of, conditional, show_bands
+from scenicq.query.explain.bands import Band, bands_of, columns_of, show_bands
 from scenicq.query.explain.interval_changes import Change, least_changes, may_still_hold
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -232,8 +232,9 @@ def changes_of(
         for change in least_changes(columns, each.formula, dynamics.conditions, goes_on=interval.cut_off, quick=quick)
     ]
     if interval.cut_off and interval.broken is None:
-        for each in conditional(dynamics.terminations):
-            assert each.condition is not None
+        for each in dynamics.terminations:
+            if each.condition is None:
+                continue
             changes += least_changes(columns, each.condition, dynamics.conditions, ends=True, quick=quick)
     return tuple(sorted(changes, key=lambda each: abs(each.amount)))
 
