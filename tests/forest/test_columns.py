@@ -18,7 +18,7 @@ from test_intervals import observing
 from scenicq.compiler.default_street import street
 from scenicq.forest import build
 from scenicq.forest.column_domain import ColumnDomain
-from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Column, Placed, column_of, constant_column
+from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Coded, Column, Placed, column_of, constant_column
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.interpret import interpret, steps_of
@@ -216,3 +216,32 @@ def test_directions_are_picked_where_a_field_allows_several():
 def test_a_heading_of_a_vector():
     values = {(0, "x"): column_of([0.0, -1.0, 0.0]), (0, "y"): column_of([1.0, 0.0, 0.0])}
     assert computed(Bearing(AT), domain_of(values)).data.tolist() == pytest.approx([0.0, math.pi / 2, 0.0])
+
+
+@pytest.mark.parametrize("kind", ["scalar", "boolean", "vector", "other"])
+@pytest.mark.parametrize(
+    "seen",
+    [["much", 2.0, None], ["much"] * 3, [True, False, True], [1.0, 2.0, 3.0], [(1.0, 2.0)] * 3, [(1.0, 2.0), "a", 1.0]],
+)
+def test_what_is_observed_is_undefined_where_it_is_of_another_kind(kind, seen):
+    mood = Feature(0, "mood", kind)
+    column = computed(mood, domain_of({(0, "mood"): column_of(seen)}))
+    for place, value in enumerate(seen):
+        if value is None:
+            assert at(column.status, place, (3,)) == UNKNOWN
+            continue
+        expected = evaluate(mood, {}, {(0, "mood"): value})
+        if isinstance(expected, Undefined | float | bool | tuple):
+            assert not isinstance(column.data, Coded) or column.data.options[column.data.which[place]] == expected
+            if not isinstance(column.data, Coded):
+                assert agrees(column, place, (3,), expected)
+        else:
+            assert kind == "other"
+            assert isinstance(column.data, Coded)
+
+
+@pytest.mark.parametrize("text", ["much", ""])
+def test_directions_at_what_is_no_point_are_undefined(text):
+    root = DirectionAt(build.constant(street().roadDirection), Feature(0, "mood", "vector"))
+    column = computed(root, domain_of({(0, "mood"): column_of([text, (1.75, 20.0), text])}))
+    assert np.broadcast_to(column.status, (3,)).tolist() == [UNDEFINED, DEFINED, UNDEFINED]
