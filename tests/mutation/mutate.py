@@ -91,16 +91,26 @@ def mutants(tree: ast.Module) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
 
 
 def _unnoticeable(node: ast.AST) -> list[ast.expr]:
-    """Annotations, which nobody evaluates; and how values are stored, or that nothing is lost in a `zip`."""
+    """What changes no value.
+
+    Annotations, which nobody evaluates; how much is stored, and how; guards of our own mistakes, as that nothing is
+    lost in a `zip`, or that nobody assigns a field of what is frozen (where equality makes it hashable, that counts).
+    """
     match node:
         case ast.arg(annotation=ast.expr() as found) | ast.AnnAssign(annotation=found):
             return [found]
         case ast.FunctionDef(returns=ast.expr() as found):
             return [found]
-        case ast.keyword(arg="slots" | "maxsize", value=found):
+        case ast.keyword(arg="slots" | "maxsize" | "repr", value=found):
             return [found]
         case ast.keyword(arg="strict", value=ast.Constant(value=True) as found):
             return [found]
+        case ast.Call(func=ast.Name(id="dataclass"), keywords=given):
+            match {each.arg: each.value for each in given}:
+                case {"eq": ast.Constant(value=False), "frozen": found}:
+                    return [found]
+                case _:
+                    return []
         case _:
             return []
 
