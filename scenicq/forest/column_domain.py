@@ -35,6 +35,7 @@ from scenicq.forest.columns import (
 )
 from scenicq.forest.compute import CannotEvaluate, compute, directions
 from scenicq.forest.interpret import OnMap, RegionNode
+from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
@@ -48,6 +49,7 @@ from scenicq.forest.nodes import (
     DiscAt,
     Distance,
     Feature,
+    Kind,
     Leaf,
     LogicOp,
     Norm,
@@ -69,6 +71,7 @@ from scenicq.geometry.terms import UndecidedError
 __all__ = ["ColumnDomain"]
 
 _NOTHING = Constant(None)
+_MEANT: Mapping[Kind, type] = {"scalar": np.ndarray, "boolean": np.ndarray, "vector": tuple}
 _ORDER: Mapping[CompareOp, Callable[[Array, Array], Array]] = {
     CompareOp.LT: np.less,
     CompareOp.LE: np.less_equal,
@@ -131,8 +134,12 @@ class ColumnDomain:
         return constant_column(value)
 
     def feature(self, node: Feature) -> Column:
-        """What is observed."""
-        return self.observed(node)
+        """What is observed, as the kind that it is meant to be."""
+        found = self.observed(node)
+        meant = _MEANT.get(node.kind)
+        if meant is None or isinstance(found.data, meant):
+            return found
+        return self._each(lambda values: as_kind(node, values[0]), [found])
 
     def variable(self, node: Leaf, args: Sequence[Column]) -> Column:
         """What is drawn."""

@@ -12,6 +12,7 @@ import operator
 from collections.abc import Callable
 from typing import cast
 
+from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
@@ -163,11 +164,17 @@ def _encloses(outer: Region, inner: Region) -> bool:
 
 
 def directions(field: Value, point: Value) -> tuple[float, ...] | Undefined:
-    """The headings that a vector field allows at a point, at least one; `Undefined` where it has none."""
+    """The headings that a vector field allows at a point, at least one; `Undefined` where it has none.
+
+    Raises:
+        CannotEvaluate: If they are no field and no point.
+    """
     for arg in (field, point):
         if isinstance(arg, Undefined):
             return arg
-    x, y = cast(Vector, point)
+    if kind_of_value(field) != "field" or not isinstance(point, tuple):
+        raise CannotEvaluate(f"the direction of {field!r} at {point!r}")
+    x, y = point
     allowed = cast(VectorField, field).values(x, y)
     name = getattr(field, "name", "the field")
     return allowed or Undefined(f"`{name}` is undefined at ({x:.2f}, {y:.2f})")
@@ -188,7 +195,11 @@ def compute(node: Node, args: tuple[Value, ...]) -> Value:
             return node.value
         case Select():
             picked = args[0]
-            return picked if isinstance(picked, Undefined) else args[1 + int(cast(float, picked))]
+            if isinstance(picked, Undefined):
+                return picked
+            if not isinstance(picked, float | bool):
+                raise CannotEvaluate(f"what {picked!r} picks")
+            return args[1 + int(picked)]
         case Logic():
             return _logic(node.op, args)
         case _:
@@ -257,7 +268,7 @@ def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
         case Encloses(), (outer, inner):
             return _encloses(cast(Region, outer), cast(Region, inner))
         case _:
-            raise AssertionError(f"no value for {type(node).__name__} of {args!r}")
+            raise TypeError(f"no value for {args!r}")
 
 
 def fold(node: Node) -> Node:

@@ -12,6 +12,7 @@ from typing import cast
 
 from scenicq.forest.compute import compute, directions
 from scenicq.forest.evaluate import Observation
+from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
     Constant,
     DirectionAt,
@@ -81,7 +82,7 @@ def condition(
             return node
         if isinstance(node, Feature):
             key = (node.object, node.property)
-            return Constant(observed[key], span=node.span) if key in observed else node
+            return Constant(as_kind(node, observed[key]), span=node.span) if key in observed else node
         return _fold(node)
 
     return transform(root, step, memo)

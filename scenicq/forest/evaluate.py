@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import cast
 
 from scenicq.forest.compute import CannotEvaluate, compute, directions
+from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
     DirectionAt,
     DiscreteRange,
@@ -72,7 +73,7 @@ def evaluate_all(
             key = (node.object, node.property)
             if observed is None or key not in observed:
                 raise CannotEvaluate(f"`{node.property}` of an object has no value")
-            values[id(node)] = observed[key]
+            values[id(node)] = as_kind(node, observed[key])
         elif isinstance(node, DirectionAt):
             values[id(node)] = _direction(node, args, choose)
         else:

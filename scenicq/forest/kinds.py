@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import assert_never
+from typing import assert_never, cast
 
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -42,7 +42,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.regions import Region
 
-__all__ = ["kind_of"]
+__all__ = ["as_kind", "kind_of"]
 
 
 def _kind_of_value(value: Value) -> Kind:
@@ -56,6 +56,20 @@ def _kind_of_value(value: Value) -> Kind:
     if value is None or isinstance(value, str | Undefined):
         return "other"
     return "region" if isinstance(value, Region) else "field"
+
+
+def as_kind(feature: Feature, value: Value) -> Value:
+    """What is observed of a property as a program means it; undefined where a label says something of another kind."""
+    given = _kind_of_value(value)
+    match feature.kind, given:
+        case ("scalar", "boolean"):
+            return float(cast(bool, value))
+        case ("other", _) | ("boolean", "scalar"):
+            return value
+        case _ if feature.kind == given or isinstance(value, Undefined):
+            return value
+        case _:
+            return Undefined(f"`{feature.property}` is {value!r} in the label, which is no {feature.kind}")
 
 
 def kind_of(node: Node) -> Kind:

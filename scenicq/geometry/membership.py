@@ -119,7 +119,9 @@ def distance(region: Region, x: float, y: float) -> float:
         case PolygonSet() | PolylineSet() | PointSet():
             if not region.pieces:
                 return math.inf
-            return float(shapes.tree_nearest(region.tree, shapes.array([shapes.point(x, y)]))[2][0])
+            _, _, nearest = shapes.tree_nearest(region.tree, shapes.array([shapes.point(x, y)]))
+            # none is nearest to a point so far away that the distance is no number
+            return float(nearest[0]) if len(nearest) else math.inf
         case UnionOf():
             return min((distance(part, x, y) for part in region.parts), default=math.inf)
         case IntersectionOf() | DifferenceOf():

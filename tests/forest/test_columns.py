@@ -18,7 +18,7 @@ from test_intervals import observing
 from scenicq.compiler.default_street import street
 from scenicq.forest import build
 from scenicq.forest.column_domain import ColumnDomain
-from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Column, Placed, column_of, constant_column
+from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Coded, Column, Placed, column_of, constant_column
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.interpret import interpret, steps_of
@@ -40,10 +40,13 @@ from scenicq.forest.nodes import (
     Norm,
     RectangleAt,
     RegionUnion,
+    Rotate,
+    Scale,
     SectorAt,
     Select,
     Undefined,
     VectorOf,
+    VectorSum,
 )
 from scenicq.geometry.membership import contains, contains_many, distance
 from scenicq.geometry.regions import Disc, Rectangle, Sector
@@ -216,3 +219,74 @@ def test_directions_are_picked_where_a_field_allows_several():
 def test_a_heading_of_a_vector():
     values = {(0, "x"): column_of([0.0, -1.0, 0.0]), (0, "y"): column_of([1.0, 0.0, 0.0])}
     assert computed(Bearing(AT), domain_of(values)).data.tolist() == pytest.approx([0.0, math.pi / 2, 0.0])
+
+
+@pytest.mark.parametrize("kind", ["scalar", "boolean", "vector", "other"])
+@pytest.mark.parametrize(
+    "seen",
+    [["much", 2.0, None], ["much"] * 3, [True, False, True], [1.0, 2.0, 3.0], [(1.0, 2.0)] * 3, [(1.0, 2.0), "a", 1.0]],
+)
+def test_what_is_observed_is_undefined_where_it_is_of_another_kind(kind, seen):
+    mood = Feature(0, "mood", kind)
+    column = computed(mood, domain_of({(0, "mood"): column_of(seen)}))
+    for place, value in enumerate(seen):
+        if value is None:
+            assert at(column.status, place, (3,)) == UNKNOWN
+            continue
+        expected = evaluate(mood, {}, {(0, "mood"): value})
+        if isinstance(expected, Undefined | float | bool | tuple):
+            assert not isinstance(column.data, Coded) or column.data.options[column.data.which[place]] == expected
+            if not isinstance(column.data, Coded):
+                assert agrees(column, place, (3,), expected)
+        else:
+            assert kind == "other"
+            assert isinstance(column.data, Coded)
+
+
+@pytest.mark.parametrize("text", ["much", ""])
+def test_directions_at_what_is_no_point_are_undefined(text):
+    root = DirectionAt(build.constant(street().roadDirection), Feature(0, "mood", "vector"))
+    column = computed(root, domain_of({(0, "mood"): column_of([text, (1.75, 20.0), text])}))
+    assert np.broadcast_to(column.status, (3,)).tolist() == [UNDEFINED, DEFINED, UNDEFINED]
+
+
+class _Fork:
+    """Three headings to the right, one in the middle, none to the left."""
+
+    name = "fork"
+
+    def values(self, x, y):
+        return (0.1, 0.2, 0.3) if x > 1 else (0.5,) if x >= -1 else ()
+
+    def cells(self, bounds):
+        return []
+
+
+@pytest.mark.parametrize("wanted", [0, 1, 2, 7])
+def test_the_heading_that_is_picked_is_taken_or_the_last(wanted):
+    values = {(0, "x"): column_of([2.0, 0.0, -2.0, 3.0]), (0, "y"): column_of([0.0] * 4)}
+    root = DirectionAt(build.constant(_Fork()), AT)
+    found = computed(root, domain_of(values, pick=lambda node, counts: np.full(1, wanted)))
+    assert found.status.tolist() == [DEFINED, DEFINED, UNDEFINED, DEFINED]
+    taken = (0.1, 0.2, 0.3)[min(wanted, 2)]
+    assert [found.data[place] for place in (0, 1, 3)] == [taken, 0.5, taken]
+
+
+NUMERIC = {
+    "vector": AT, "sum": VectorSum(AT, AT), "scale": Scale(AT, X), "rotate": Rotate(AT, Y), "norm": Norm(AT),
+    "coordinate": Coordinate(VectorSum(AT, AT), 1), "bearing": Bearing(AT), "compare": Compare(CompareOp.LT, X, Y),
+    "arithmetic": Arithmetic(ArithmeticOp.ATAN2, (X, Y)), "one": Arithmetic(ArithmeticOp.COS, (X,)),
+    "not": Logic(LogicOp.NOT, (Compare(CompareOp.LT, X, Y),)), "select": Select(Compare(CompareOp.LT, X, Y), (X, Y)),
+    "vectors": Select(Compare(CompareOp.LT, X, Y), (AT, VectorSum(AT, AT))), "disc": Contains(DiscAt(AT, X), AT),
+    "box": Distance(RectangleAt(AT, X, X, Y), VectorSum(AT, AT)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NUMERIC)
+def test_numbers_and_vectors_are_computed_for_all_places_together(name):
+    rng = np.random.default_rng(3)
+    values = {(0, key): Column(rng.uniform(0.5, 9, 50), np.full(1, DEFINED)) for key in "xy"}
+    found = computed(NUMERIC[name], domain_of(values, most=0))
+    for place in range(50):
+        seen = {key: float(column.data[place]) for key, column in values.items()}
+        assert agrees(found, place, (50,), evaluate(NUMERIC[name], {}, seen))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -89,3 +91,61 @@ def test_what_is_not_observed_is_unbounded_and_what_has_no_value_says_nothing():
     assert domain.feature(Feature(0, "colour", "other")) is None
     assert domain.divide(FLOATS.between(1.0, 1.0), FLOATS.between(0.0, 0.0)) == (-np.inf, np.inf, False)
     assert domain.divide(FLOATS.between(1.0, 1.0), FLOATS.between(-1.0, 2.0)) == (-np.inf, np.inf, False)
+
+
+_SEEN = [Feature(0, name, "scalar") for name in "abc"]
+_COMPARED = st.builds(
+    Compare, st.sampled_from([*CompareOp]), st.sampled_from(_SEEN), st.sampled_from([*_SEEN, build.constant(1.0)])
+)
+_CONDITIONS = st.recursive(
+    _COMPARED,
+    lambda parts: st.one_of(
+        parts.map(lambda part: Logic(LogicOp.NOT, (part,))),
+        st.builds(lambda op, args: Logic(op, tuple(args)), st.sampled_from([LogicOp.AND, LogicOp.OR]),
+                  st.lists(parts, min_size=1, max_size=3)),
+    ),
+    max_leaves=6,
+)  # fmt: skip
+_ENDS = st.tuples(st.integers(-2, 3), st.integers(0, 3)).map(lambda ends: (float(ends[0]), float(sum(ends))))
+
+
+@given(_CONDITIONS, st.tuples(_ENDS, _ENDS, _ENDS))
+@settings(max_examples=150, deadline=None, derandomize=True)
+def test_a_condition_can_hold_or_fail_where_some_values_make_it(root, limits):
+    known = {f"{name}": Interval(low, high, low == high) for name, (low, high) in zip("abc", limits, strict=True)}
+    domain = IntervalDomain(FLOATS, lambda node: known[node.property])
+    truth = interpret(steps_of(root), domain)[id(root)]
+    said = set()
+    for values in itertools.product(*({low, (low + high) / 2, high} for low, high in limits)):
+        seen = {(0, name): value for name, value in zip("abc", values, strict=True)}
+        said.add(evaluate(root, {}, seen))
+    assert isinstance(truth, Truth)
+    assert said <= ({True} if truth.can_hold else set()) | ({False} if truth.can_fail else set())
+    if isinstance(root, Compare) and root.left is not root.right and root.op not in (CompareOp.EQ, CompareOp.NE):
+        # of numbers apart an order is known as well as can be
+        assert (bool(truth.can_hold), bool(truth.can_fail)) == (True in said, False in said)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "product", "quotient"),
+    [
+        ((1.0, 2.0), (4.0, 8.0), (4.0, 16.0), (0.125, 0.5)),
+        ((-1.0, 2.0), (4.0, 8.0), (-8.0, 16.0), (-0.25, 0.5)),
+        ((-2.0, -1.0), (-8.0, -4.0), (4.0, 16.0), (0.125, 0.5)),
+        ((1.0, 2.0), (4.0, 4.0), (4.0, 8.0), (0.25, 0.5)),
+        ((1.0, 2.0), (-4.0, -4.0), (-8.0, -4.0), (-0.5, -0.25)),
+        ((8.0, 8.0), (2.0, 4.0), (16.0, 32.0), (2.0, 4.0)),
+    ],
+)
+@pytest.mark.parametrize("columns", [False, True])
+def test_products_and_quotients_are_no_wider_than_they_are(one, other, product, quotient, columns):
+    domain = IntervalDomain(ARRAYS if columns else FLOATS)
+
+    def between(low, high):
+        ends = (np.full(2, low), np.full(2, high)) if columns else (low, high)
+        return Interval(*ends, low == high)
+
+    for operation, expected in ((domain.multiply, product), (domain.divide, quotient)):
+        low, high, _ = operation(between(*one), between(*other))
+        assert np.all(low == expected[0])
+        assert np.all(high == expected[1])

@@ -28,6 +28,8 @@ from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
+    Compare,
+    CompareOp,
     Constant,
     DirectionAt,
     Feature,
@@ -155,6 +157,24 @@ def test_an_undefined_part_makes_a_conjunction_undefined_unless_it_is_false_anyw
     assert condition(Logic(LogicOp.OR, (nowhere, true)), {}).value is True
 
 
+@given(st.sampled_from([LogicOp.AND, LogicOp.OR]), st.lists(st.sampled_from(["yes", "no", "lost", "open"]), min_size=1))
+def test_what_is_left_of_a_combination_of_truth_values_decides_as_before(op, parts):
+    variable = interval(0, 1)
+    made = {
+        "yes": build.constant(True),
+        "no": build.constant(False),
+        "lost": Constant(Undefined("far from roads")),
+        "open": Compare(CompareOp.LT, variable, build.constant(0.5)),
+    }
+    root = Logic(op, tuple(made[part] for part in parts))
+    left = condition(root, {})
+    for number in (0.2, 0.8):
+        before, after = (evaluate(each, {variable.identity: number}) for each in (root, left))
+        # what has no value does not hold
+        assert (before is True) == (after is True)
+        assert "lost" in parts or before is after
+
+
 class _Fork:
     name = "fork"
 
@@ -254,3 +274,11 @@ def test_a_point_times_the_tiniest_number_may_lie_anywhere_its_product_allows():
     (((west, east), (south, north)),) = boxes.values()
     assert (west, east) == pytest.approx((1.0, 2.0))
     assert (south, north) == (0.0, 0.0)
+
+
+def test_operators_are_shown_between_what_they_join_and_functions_before():
+    a, b = build.constant(1.0), Feature(0, "width", "scalar")
+    assert show(Arithmetic(ArithmeticOp.ADD, (b, a))) == "(0.width + 1)"
+    assert show(Arithmetic(ArithmeticOp.MAX, (b, a))) == "max(0.width, 1)"
+    assert show(Arithmetic(ArithmeticOp.NEG, (b,))) == "neg(0.width)"
+    assert show(Arithmetic(ArithmeticOp.ADD, (b, a, b))) == "+(0.width, 1, 0.width)"

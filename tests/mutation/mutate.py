@@ -2,10 +2,10 @@
 
 A survey comes first: tests that may notice are run once without a change, and which fast one runs which line is kept.
 Each change is then made in a forked process, whose functions get the changed code, and the tests that run its line are
-run there, the cheapest first, as many as cost some seconds without a change; what is outside of functions is changed in
-a copy of the package. A run that takes much longer than without a change counts as noticed, for a change may make a
-loop endless. Survivors are printed to be read. In the end the tests that have noticed something are run without a
-change once more: they must pass.
+run there, one of each kind before the next of any, as many as cost some seconds without a change; what is outside of
+functions is changed in a copy of the package. A run that takes much longer than without a change counts as noticed, for
+a change may make a loop endless. Survivors are printed to be read, and can be tried again with more tests (`--only`).
+In the end the tests that have noticed something are run without a change once more: they must pass.
 """
 
 import argparse
@@ -14,6 +14,7 @@ import gc
 import json
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -34,9 +35,12 @@ import pytest
 ROOT = Path(__file__).parents[2]
 CHANGED = ("match", "query/prefilter", "forest")
 """The folders of the package that are changed."""
-TESTS = ("tests/forest", "tests/match", "tests/query", "tests/compiler")
+TESTS = (
+    "tests/forest", "tests/match", "tests/query", "tests/compiler", "tests/oracle", "tests/generate", "tests/temporal",
+    "tests/smt", "tests/test_language.py", "tests/test_cookbook.py", "tests/cli",
+)  # fmt: skip
 """The tests that may notice."""
-_SLOWEST_S = 1.0
+_SLOWEST_S = 3.0
 """A test that takes more CPU seconds than that is not fast: it is ended in the survey, and left out."""
 _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
@@ -49,11 +53,11 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
 def mutants(tree: ast.Module) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
     """Changes that can be made: each makes the change in the tree, is handed out, and takes it back.
 
-    Annotations are left alone: nobody evaluates them.
+    What no test can notice is left alone (`_unnoticeable`).
     """
-    types = {id(part) for node in ast.walk(tree) for each in _annotations(node) for part in ast.walk(each)}
+    left_alone = {id(part) for node in ast.walk(tree) for each in _unnoticeable(node) for part in ast.walk(each)}
     for node in ast.walk(tree):
-        if id(node) in types:
+        if id(node) in left_alone:
             continue
         match node:
             case ast.Compare(ops=ops):
@@ -86,12 +90,27 @@ def mutants(tree: ast.Module) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
                 pass
 
 
-def _annotations(node: ast.AST) -> list[ast.expr]:
+def _unnoticeable(node: ast.AST) -> list[ast.expr]:
+    """What changes no value.
+
+    Annotations, which nobody evaluates; how much is stored, and how; guards of our own mistakes, as that nothing is
+    lost in a `zip`, or that nobody assigns a field of what is frozen (where equality makes it hashable, that counts).
+    """
     match node:
         case ast.arg(annotation=ast.expr() as found) | ast.AnnAssign(annotation=found):
             return [found]
         case ast.FunctionDef(returns=ast.expr() as found):
             return [found]
+        case ast.keyword(arg="slots" | "maxsize" | "repr", value=found):
+            return [found]
+        case ast.keyword(arg="strict", value=ast.Constant(value=True) as found):
+            return [found]
+        case ast.Call(func=ast.Name(id="dataclass"), keywords=given):
+            match {each.arg: each.value for each in given}:
+                case {"eq": ast.Constant(value=False), "frozen": found}:
+                    return [found]
+                case _:
+                    return []
         case _:
             return []
 
@@ -100,30 +119,38 @@ class Survey:
     """Which tests run which lines without a change, and what each test costs.
 
     Args:
-        told: For each test its CPU seconds, and the lines of each file that it runs.
+        told: For each test its CPU seconds, and for each file the lines that it runs, as the bits of a number in hex.
         enough_s: So many CPU seconds of tests are run against a change.
     """
 
     def __init__(self, told: dict[str, Any], enough_s: float) -> None:
         self._enough_s = enough_s
-        self.cost: dict[str, float] = told["cost"]
-        self._tests: dict[str, dict[str, list[str]]] = told["tests"]
+        self.cost: dict[str, float] = {test: known["cost"] for test, known in told.items()}
+        self._lines: defaultdict[str, dict[str, int]] = defaultdict(dict)
+        for test, known in told.items():
+            for file, bits in known["lines"].items():
+                self._lines[file][test] = int(bits, 16)
 
     def tests(self, file: str, lines: range) -> list[str]:
-        """The tests to run against a change of some lines, the cheapest first.
+        """The tests to run against a change of some lines: one of each function, the cheapest, then another of each.
 
-        Where no test runs them, for they are run when the module is loaded, those that run anything of the file.
+        Where no test runs them, for they are run when the module is loaded, those that run anything of the file; any
+        where there is nothing else in it.
         """
-        of_line = self._tests.get(file, {})
-        found = {test for line in lines for test in of_line.get(str(line), [])}
-        found = found or {test for tests in of_line.values() for test in tests}
+        changed = sum(1 << line for line in lines)
+        found = [test for test, ran in self._lines[file].items() if ran & changed]
+        found = found or [*self._lines[file]] or [*self.cost]
+        rounds: Counter[str] = Counter()
+        order: list[tuple[int, float, str]] = []
+        for test in sorted(found, key=lambda test: (self.cost[test], test)):
+            order.append((rounds[test.split("[")[0]], self.cost[test], test))
+            rounds[test.split("[")[0]] += 1
         chosen: list[str] = []
         spent = 0.0
-        for test in sorted(found, key=lambda test: (self.cost[test], test)):
-            spent += self.cost[test]
-            if spent > self._enough_s:
-                break
-            chosen.append(test)
+        for _, cost, test in sorted(order):
+            if spent + cost <= self._enough_s:
+                spent += cost
+                chosen.append(test)
         return chosen
 
 
@@ -163,17 +190,21 @@ class _Mutation:
         items = {item.nodeid: item for item in session.items}
         kept = self.options.survey or self.work / "survey.json"
         if not kept.exists():
-            kept.write_text('{"cost": {}, "tests": {}}')
+            kept.write_text("{}")
         known = json.loads(kept.read_text())
-        if items.keys() - known["cost"].keys() and _apart(None, partial(self._survey, items, known, kept)):
+        if items.keys() - known.keys() and _apart(None, partial(self._survey, items, known, kept)):
             raise SystemExit("the survey has failed")
         survey = Survey(json.loads(kept.read_text()), self.options.enough)
         outcomes: defaultdict[str, Counter[str]] = defaultdict(Counter)
         useful: set[str] = set()
+        again = {*_SURVIVED.findall(self.options.only.read_text())} if self.options.only else None
         for folder, file, number in self._chosen():
             self.failed.unlink(missing_ok=True)
             before = _cpu_seconds()
-            what, noticed = self._attempt(file, number, survey, items)
+            attempt = self._attempt(file, number, survey, items, again)
+            if attempt is None:
+                continue
+            what, noticed = attempt
             useful.update(self.failed.read_text().split("\n")[:1] if self.failed.exists() else ())
             outcomes[folder]["noticed" if noticed else "survived"] += 1
             print(f"{'noticed' if noticed else 'SURVIVED'} ({_cpu_seconds() - before:.0f} s): {what}", flush=True)
@@ -201,7 +232,7 @@ class _Mutation:
         """Run tests that are not known in random order, and add which lines each runs; in a process of its own."""
         measured = coverage.Coverage(data_file=None, source=[str(ROOT / "scenicq" / folder) for folder in CHANGED])
         cost: dict[str, float] = {}
-        order = sorted(items.keys() - known["cost"].keys())
+        order = sorted(items.keys() - known.keys())
         random.Random(0).shuffle(order)
         measured.start()
         began = _cpu_seconds()
@@ -216,17 +247,16 @@ class _Mutation:
             cost[name] = _cpu_seconds() - before
         measured.stop()
         left_out = {*self.failed.read_text().split("\n")} if self.failed.exists() else set[str]()
+        known |= {test: {"cost": seconds, "lines": {}} for test, seconds in cost.items()}
         data = measured.get_data()
         for file in data.measured_files():
-            lines = known["tests"].setdefault(str(Path(file).relative_to(ROOT)), {})
+            ran: Counter[str] = Counter()
             for line, contexts in data.contexts_by_lineno(file).items():
-                found = [test for test in dict.fromkeys(contexts) if test and test not in left_out]
-                lines[str(line)] = lines.get(str(line), []) + found
-        known["cost"] |= cost
+                ran.update(dict.fromkeys({*contexts} & cost.keys() - left_out, 1 << line))
+            for test, bits in ran.items():
+                known[test]["lines"][str(Path(file).relative_to(ROOT))] = f"{bits:x}"
         told.write_text(json.dumps(known))
-        print(
-            f"{len(known['cost'])} of {len(items)} tests in the survey, {len(left_out & {*cost})} left out", flush=True
-        )
+        print(f"{len(known)} of {len(items)} tests in the survey, {len(left_out & {*cost})} left out", flush=True)
         return 0
 
     def _run(self, items: list[pytest.Item]) -> int:
@@ -238,14 +268,22 @@ class _Mutation:
                 return 1
         return 0
 
-    def _attempt(self, file: Path, number: int, survey: Survey, items: dict[str, pytest.Item]) -> tuple[str, bool]:
-        """Make one change, and run tests against it: what it is, and whether they notice it."""
+    def _attempt(
+        self, file: Path, number: int, survey: Survey, items: dict[str, pytest.Item], again: set[str] | None
+    ) -> tuple[str, bool] | None:
+        """Make one change, and run tests against it: what it is, and whether they notice it.
+
+        None where it is not among those to be tried again.
+        """
         inside = file.relative_to(ROOT)
         tree = ast.parse(file.read_text())
         for place, (node, what) in enumerate(mutants(tree)):
             if place == number:
+                name = f"{inside}:{node.lineno}:{node.col_offset} {what}"
+                if again is not None and name not in again:
+                    return None
                 tests = [name for name in survey.tests(str(inside), _lines(tree, node)) if name in items]
-                limit = 10 + int(3 * sum(survey.cost[test] for test in tests))
+                limit = 5 + int(2 * sum(survey.cost[test] for test in tests))
                 ast.fix_missing_locations(tree)
                 if _in_function(tree, node):
                     code = compile(tree, str(file), "exec")
@@ -253,7 +291,7 @@ class _Mutation:
                     noticed = bool(tests) and _apart(limit, run) != 0
                 else:
                     noticed = bool(tests) and self._in_copy(inside, ast.unparse(tree), tests, limit)
-                return f"{inside}:{node.lineno} {what} ({len(tests)} tests)", noticed
+                return f"{name} ({len(tests)} tests)", noticed
         raise AssertionError("there are as many changes as before")
 
     def _run_changed(self, code: CodeType, items: list[pytest.Item]) -> int:
@@ -284,6 +322,7 @@ class _Mutation:
         return done.returncode != 0
 
 
+_SURVIVED = re.compile(r"^SURVIVED \([^)]*\): (.*) \(\d+ tests\)$", re.MULTILINE)
 _OPTIONS = ("-p", "no:cacheprovider", "-m", "not slow", "-o", "timeout=3600")
 
 
@@ -344,12 +383,16 @@ def _apart(cpu_seconds: int | None, run: Callable[[], int]) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
+class _NotFast(BaseException):
+    """Ends a test: nothing that looks for failing examples takes it for a failure."""
+
+
 def _end_slow_test(_: int, frame: FrameType | None) -> None:
     if frame is not None and Path(frame.f_code.co_filename).is_relative_to(Path(coverage.__file__).parent):
         # it holds a lock, which nobody would give back
         signal.setitimer(signal.ITIMER_VIRTUAL, 0.01)
         return
-    pytest.fail("is not fast")
+    raise _NotFast
 
 
 def _lines(tree: ast.Module, node: ast.expr | ast.stmt) -> range:
@@ -366,6 +409,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--survey", type=Path, help="a file that keeps the survey; what it lacks is added")
     parser.add_argument("--survey-seconds", type=float, default=float("inf"), help="CPU seconds of the survey at most")
+    parser.add_argument("--tests", nargs="+", default=TESTS, help="the tests that may notice")
+    parser.add_argument("--only", type=Path, help="what an earlier run printed: what survived there is tried again")
     parser.add_argument("--enough", type=float, default=30.0, help="CPU seconds of tests that are run against a change")
     options = parser.parse_args()
     if options.survey is not None:
@@ -373,7 +418,7 @@ def main() -> None:
     os.chdir(ROOT)
     with tempfile.TemporaryDirectory() as name:
         mutation = _Mutation(options, Path(name))
-        words = [*_OPTIONS, "-s", "-p", "no:terminal", f"--basetemp={name}/tests", *TESTS]
+        words = [*_OPTIONS, "-s", "-p", "no:terminal", f"--basetemp={name}/tests", *options.tests]
         ended = pytest.main(words, [mutation])
     sys.exit(ended not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED) or not mutation.noticed_all)
 

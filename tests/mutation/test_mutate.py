@@ -7,7 +7,7 @@ import sys
 import pytest
 
 pytest.importorskip("coverage", reason="the tools of `make mutate` are not installed")
-from mutate import exchange, mutants
+from mutate import Survey, exchange, mutants
 
 TEXT = """
 from functools import lru_cache
@@ -56,3 +56,30 @@ def test_annotations_are_no_code():
         "def f(a: int | None, *, b: dict[1, 2] = 3) -> str | None:\n    c: int | str = a | b\n    return c\n"
     )
     assert sorted(what for _, what in mutants(tree)) == ["3 -> 4", "BitOr -> BitAnd", "returns None"]
+
+
+def test_what_changes_no_value_is_left_alone():
+    tree = ast.parse(
+        "@dataclass(frozen=True, slots=True, eq=False)\nclass A:\n    b: int = field(default=1, repr=False)\n"
+        "@dataclass(frozen=True)\nclass B:\n    pass\n"
+        "@lru_cache(maxsize=8)\ndef f(a):\n    zip(a, a, strict=True)\n    zip(a, a, strict=False)\n"
+    )
+    assert sorted(what for _, what in mutants(tree)) == ["1 -> 2", "False -> True", "False -> True", "True -> False"]
+
+
+def told(cost, **lines):
+    return {"cost": cost, "lines": {"f.py": f"{sum(1 << each for each in lines['f']):x}"} if lines else {}}
+
+
+def test_one_test_of_each_function_comes_before_the_next_of_any():
+    survey = Survey(
+        {
+            "t.py::a[1]": told(1.0, f=[3]), "t.py::a[2]": told(0.5, f=[3, 4]), "t.py::b": told(2.0, f=[3]),
+            "t.py::c": told(3.0, f=[9]), "t.py::d": told(4.0),
+        },
+        4.0,
+    )  # fmt: skip
+    assert survey.tests("f.py", range(3, 4)) == ["t.py::a[2]", "t.py::b", "t.py::a[1]"]
+    assert survey.tests("f.py", range(4, 5)) == ["t.py::a[2]"]
+    assert survey.tests("f.py", range(7, 8)) == ["t.py::a[2]", "t.py::b", "t.py::a[1]"]
+    assert survey.tests("g.py", range(7, 8)) == ["t.py::a[2]", "t.py::b", "t.py::a[1]"]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from scenicq.forest.compute import compute
 from scenicq.forest.groups import PARAMS
+from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
@@ -231,9 +232,17 @@ def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[G
         case Constant():
             value = node.value
             return lambda _: value
-        case Feature():
-            index, name = node.object, node.property
+        case Feature(object=index, property=name) if name in VECTORS | _NUMBERS:
             return lambda get: get(index, name)
+        case Feature(object=index, property=name):
+
+            def observed(get: Get) -> Value:
+                found = as_kind(node, get(index, name))
+                if isinstance(found, Undefined):
+                    raise UnclearError
+                return found
+
+            return observed
         case _:
 
             def computed(get: Get) -> Value:

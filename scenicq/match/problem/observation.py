@@ -11,6 +11,11 @@ from scenicq.store.labels import Label, LabelObject
 
 __all__ = ["observe", "observe_params", "observed_names"]
 
+_IN_COLUMNS = frozenset({
+    "position", "heading", "width", "length", "height", "velocity", "speed", "acceleration", "angularSpeed",
+})  # fmt: skip
+"""What a label says in columns alone: an attribute of such a name is none of these."""
+
 
 def observe(label_object: LabelObject) -> Mapping[str, Value]:
     """The properties that a label object has, by Scenic's names; what the source lacks is left out."""
@@ -36,7 +41,8 @@ def observe(label_object: LabelObject) -> Mapping[str, Value]:
         if motion.yaw_rate is not None:
             seen["angularSpeed"] = motion.yaw_rate
     for name, value in label_object.attributes.items():
-        seen.setdefault(name, value if isinstance(value, str | bool) else float(value))
+        if name not in _IN_COLUMNS:
+            seen[name] = value if isinstance(value, str | bool) else float(value)
     return seen
 
 
@@ -59,7 +65,8 @@ def observed_names(label_object: LabelObject) -> frozenset[str]:
 def _names(present: tuple[bool, ...], attributes: tuple[str, ...]) -> frozenset[str]:
     parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"), ("acceleration",))
     named = zip((*parts, ("angularSpeed",)), present, strict=False)
-    return frozenset(("position", *attributes, *(name for names, there in named if there for name in names)))
+    measured = ("position", *(name for names, there in named if there for name in names))
+    return frozenset(measured).union(name for name in attributes if name not in _IN_COLUMNS)
 
 
 def observe_params(label: Label) -> Mapping[str, Value]:

@@ -12,7 +12,7 @@ from scenes import compiled, drawn, label_of
 from scenicq.match.fields import field_solver
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import EXACT
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch
 
 AHEAD = (
@@ -42,6 +42,42 @@ def test_a_spot_on_a_centreline_is_found_by_trial(found):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed))
         assert isinstance(matcher.match(label), Match)
     assert any(found), "most witnesses are found so"
+
+
+class Tried(Exception):
+    """A trial is over: what comes after it does not matter here."""
+
+
+ON_LINES = {
+    "ahead": (AHEAD, Tolerance(), 15),
+    "whole steps": ("new Car following roadDirection from spot for DiscreteRange(5, 15)", Tolerance(), 14),
+    "edges": (
+        AHEAD.replace("lane.centerline", "lane.centerline.union(lane.leftEdge)"), Tolerance(x=0.4, y=0.3), 13,
+    ),
+    "a known way": (BENDS["a known way"], Tolerance(x=0.4, y=0.3), 17),
+    "facing as there": (BENDS["facing as there"], Tolerance(), 13),
+    "two ways": (BENDS["two ways"], EXACT, 7),
+}  # fmt: skip
+"""Programs with a tolerance, and of how many of twenty labels trial finds a witness."""
+
+
+@pytest.mark.parametrize("name", ON_LINES)
+def test_trial_finds_most_witnesses(name, monkeypatch):
+    text, tolerance, expected = ON_LINES[name]
+    probed, answers = field_solver.probed, []
+
+    def noted(start, margins):
+        answers.append(probed(start, margins))
+        raise Tried
+
+    monkeypatch.setattr(field_solver, "probed", noted)
+    scenario = compiled(ON_BEND + text, BEND)
+    matcher = Matcher(scenario, MatchOptions(tolerance=tolerance))
+    for seed in range(20):
+        with pytest.raises(Tried):
+            matcher.match(label_of(scenario, drawn(scenario, seed), random.Random(seed)))
+    # what is drawn is the same each time, but for how a machine rounds
+    assert sum(map(bool, answers)) >= expected - 1
 
 
 @pytest.mark.parametrize("name", BENDS)
