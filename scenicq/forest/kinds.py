@@ -42,10 +42,10 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.regions import Region
 
-__all__ = ["as_kind", "kind_of"]
+__all__ = ["as_kind", "kind_of", "kind_of_value"]
 
 
-def _kind_of_value(value: Value) -> Kind:
+def kind_of_value(value: Value) -> Kind:
     """The kind of a known value."""
     if isinstance(value, bool):
         return "boolean"
@@ -60,7 +60,7 @@ def _kind_of_value(value: Value) -> Kind:
 
 def as_kind(feature: Feature, value: Value) -> Value:
     """What is observed of a property as a program means it; undefined where a label says something of another kind."""
-    given = _kind_of_value(value)
+    given = kind_of_value(value)
     match feature.kind, given:
         case ("scalar", "boolean"):
             return float(cast(bool, value))
@@ -78,7 +78,7 @@ def kind_of(node: Node) -> Kind:
         node = node.options[0]
     match node:
         case Constant():
-            return _kind_of_value(node.value)
+            return kind_of_value(node.value)
         case Feature():
             return node.kind
         case Range() | Normal() | TruncatedNormal() | DiscreteRange() | Index() | Arithmetic() | Coordinate():
