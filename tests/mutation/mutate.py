@@ -82,7 +82,7 @@ def mutants(tree: ast.Module) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
                 node.value = value + 1
                 yield node, f"{value} -> {value + 1}"
                 node.value = value
-            case ast.Return(value=ast.expr() as value):
+            case ast.Return(value=ast.expr() as value) if not (isinstance(value, ast.Constant) and value.value is None):
                 node.value = ast.Constant(None)
                 yield node, "returns None"
                 node.value = value
