@@ -184,6 +184,19 @@ def test_a_bearing_behind_may_be_on_either_side(low, high):
         assert left.size or not holds
 
 
+def test_a_choice_that_is_made_leaves_its_option():
+    index = Index((1.0, 1.0))
+    for name, options, seen in (
+        ("size", (B, op("+", B, number(2))), 4.2),
+        ("position", (VectorOf(B, A), VectorOf(op("+", B, number(2)), A)), (4.2, 1.0)),
+    ):
+        node = Select(index, options)
+        network = ConstraintNetwork([(Comparison(0, name, node, None), node, seen)], CLOSE)
+        cases = BoxSet.start(network, {B.identity: [(2.0, 2.5)] * 3})
+        cases.chosen[id(index)] = np.array([0.0, 1.0, 0.0])
+        assert cases.narrowed().chosen[id(index)].tolist() == [1.0]
+
+
 def test_cases_start_from_intervals_and_near_values():
     network = ConstraintNetwork([(Comparison(0, "size", op("+", A, B), None), op("+", A, B), 6.0)], CLOSE)
     cases = BoxSet.start(network, {A.identity: [(0.0, 1.0), (3.0, 3.8), (3.5, 9.0)]}).narrowed()
