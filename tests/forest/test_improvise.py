@@ -13,6 +13,7 @@ import pytest
 from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
+from scenicq.forest import improvise
 from scenicq.forest.draws import draw_leaf
 from scenicq.forest.evaluate import evaluate_all
 from scenicq.forest.improvise import Improviser
@@ -208,3 +209,29 @@ def test_boxes_that_touch_do_not_collide(turn: int) -> None:
     rng = random.Random(0)
     assert Improviser(compiled(ego + "new Object ahead of ego\n"), ALL).draw(rng, 10) is not None
     assert Improviser(compiled(ego + "new Object ahead of ego by -0.01\n"), ALL).draw(rng, 10) is None
+
+
+@pytest.mark.parametrize(("prune", "plans"), [(True, 2), (False, 1)])
+def test_drawing_is_planned_once_and_once_more_when_boxes_rarely_fit(prune, plans, monkeypatch) -> None:
+    laid_out = []
+
+    def noted(*args):
+        laid_out.append(lay_out(*args))
+        return laid_out[-1]
+
+    lay_out = improvise.lay_out
+    monkeypatch.setattr(improvise, "lay_out", noted)
+    turned = "ego = new Car on road, with width 6.5, with length 9, facing 45 deg relative to roadDirection\n"
+    improviser, rng = Improviser(compiled(DRIVING + turned), prune=prune), random.Random(1)
+    for _ in range(30):
+        assert improviser.draw(rng, 10_000) is not None
+    assert sum(improviser.rejected.values()) > 30
+    assert len(laid_out) == plans
+
+
+def test_what_geometry_cannot_make_is_no_scene() -> None:
+    # a disc of a negative radius is only made when the property is put in
+    scenario = compiled("ego = new Object at (0, 0), with reach Uniform(-1, -2)\n"
+                        "other = new Object at (3, 3), with reach -1\n"
+                        "require ego in CircularRegion(ego.position, other.reach)\n")  # fmt: skip
+    assert Improviser(scenario).draw(random.Random(1), 20) is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import sys
 from pathlib import Path
 
@@ -149,3 +150,17 @@ def test_products_and_quotients_are_no_wider_than_they_are(one, other, product, 
         low, high, _ = operation(between(*one), between(*other))
         assert np.all(low == expected[0])
         assert np.all(high == expected[1])
+
+
+@pytest.mark.parametrize("columns", [False, True])
+def test_a_known_vector_has_a_known_heading_but_near_the_seam(columns):
+    domain = IntervalDomain(ARRAYS if columns else FLOATS, slack=1e-6)
+    for x, y, heading in ((0.0, 5.0, 0.0), (-3.0, 0.0, math.pi / 2), (2.0, 2.0, -math.pi / 4)):
+        ends = (np.full(2, x), np.full(2, y)) if columns else (x, y)
+        low, high, _ = domain.bearing(IntervalVector(*(Interval(end, end, True) for end in ends)))
+        assert np.allclose([low, high], heading)
+    for x, y in ((0.0, -5.0), (0.0, 0.0)):
+        ends = (np.full(2, x), np.full(2, y)) if columns else (x, y)
+        low, high, _ = domain.bearing(IntervalVector(*(Interval(end, end, True) for end in ends)))
+        assert np.all(low <= -math.pi)
+        assert np.all(high >= math.pi)

@@ -322,6 +322,23 @@ def test_a_worker_that_is_killed_is_replaced(monkeypatch):
 # --- necessary conditions
 
 
+def test_thinning_looks_along_the_ego():
+    """On a slant: what lies off the line is inside of the box of all that lies on it."""
+    ego = replace(EGO, heading=-0.785398)
+    scenario = compiled(HEADER + "ego = new Car\nother = new Car ahead of ego by Range(0, 20)\nthird = new Car\n"
+                        "require (distance from other to third) < 40")  # fmt: skip
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
+    # the middle of a car ahead is half a length of both away
+    things = [car("on", 1.75 + 10.0, 60.0, -0.785398), car("off", 1.75 + 13.0, 53.0, -0.785398)]
+    label = frame(*things, car("third", 20.0, 60.0), ego=ego)
+    cast = find_candidates(scenario, label, 0, matcher.options, {})
+    ((signature, candidates),) = cast.signatures(relevant_properties(scenario, matcher.options))
+    wanted = {index: numbers for index, numbers in candidates.items() if index != scenario.ego}
+    left, _ = thinned(matcher.plans.plan(signature), wanted, cast, scenario.ego, Tolerance())
+    (role,) = [thing.index for thing in scenario.objects if thing.name == "other"]
+    assert left[role] == (1,)
+
+
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_thinning_never_removes_a_right_candidate(name):
     scenario = compiled(HEADER + PROGRAMS[name])

@@ -122,6 +122,23 @@ def test_the_text_of_a_tolerance_says_the_same(text):
 
 
 @pytest.mark.parametrize(
+    ("tolerance", "text"),
+    [
+        (Tolerance(position=0.12345, heading=math.radians(4.999)), "position=0.124,heading=5deg"),
+        (Tolerance(position=2 / 3, heading=math.radians(1 / 3)), "position=0.667,heading=0.34deg"),
+        (Tolerance(position=0.25, heading=4.0), "position=0.25,heading=180deg"),
+        (Tolerance(x=0.1, y=0.2004, other=0.5), "0.5,x=0.1,y=0.201,heading=5deg"),
+        (
+            Tolerance(rules=(("", "speed", 1.0001), ("ego", "heading", 0.1))),
+            "position=0.25,heading=5deg,speed=1.001,ego.heading=5.73deg",
+        ),
+    ],
+)
+def test_a_tolerance_is_shown_rounded_up(tolerance, text):
+    assert str(tolerance) == text
+
+
+@pytest.mark.parametrize(
     ("scope", "tolerant"),
     [("lead", {"Car"}), ("person", {"Pedestrian"}), ("Pedestrian", {"Pedestrian"}), ("Object", {"Car", "Pedestrian"})],
 )

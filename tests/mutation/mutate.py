@@ -82,7 +82,7 @@ def mutants(tree: ast.Module) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
                 node.value = value + 1
                 yield node, f"{value} -> {value + 1}"
                 node.value = value
-            case ast.Return(value=ast.expr() as value):
+            case ast.Return(value=ast.expr() as value) if not (isinstance(value, ast.Constant) and value.value is None):
                 node.value = ast.Constant(None)
                 yield node, "returns None"
                 node.value = value
@@ -197,14 +197,10 @@ class _Mutation:
         survey = Survey(json.loads(kept.read_text()), self.options.enough)
         outcomes: defaultdict[str, Counter[str]] = defaultdict(Counter)
         useful: set[str] = set()
-        again = {*_SURVIVED.findall(self.options.only.read_text())} if self.options.only else None
         for folder, file, number in self._chosen():
             self.failed.unlink(missing_ok=True)
             before = _cpu_seconds()
-            attempt = self._attempt(file, number, survey, items, again)
-            if attempt is None:
-                continue
-            what, noticed = attempt
+            what, noticed = self._attempt(file, number, survey, items)
             useful.update(self.failed.read_text().split("\n")[:1] if self.failed.exists() else ())
             outcomes[folder]["noticed" if noticed else "survived"] += 1
             print(f"{'noticed' if noticed else 'SURVIVED'} ({_cpu_seconds() - before:.0f} s): {what}", flush=True)
@@ -220,13 +216,17 @@ class _Mutation:
     def _chosen(self) -> list[tuple[str, Path, int]]:
         """The changes to be made: a folder, a file in it, and which of its changes."""
         every = [
-            (folder, file, number)
+            (folder, file, number, _named(file, node, what))
             for folder in CHANGED
             for file in sorted((ROOT / "scenicq" / folder).rglob("*.py"))
-            for number, _ in enumerate(mutants(ast.parse(file.read_text())))
+            for number, (node, what) in enumerate(mutants(ast.parse(file.read_text())))
         ]
+        if self.options.only:
+            again = {*_SURVIVED.findall(self.options.only.read_text())}
+            return [(folder, file, number) for folder, file, number, name in every if name in again]
         random.Random(self.options.seed).shuffle(every)
-        return every[self.options.skip : self.options.skip + self.options.count]
+        some = every[self.options.skip : self.options.skip + self.options.count]
+        return [(folder, file, number) for folder, file, number, _ in some]
 
     def _survey(self, items: dict[str, pytest.Item], known: dict[str, Any], told: Path) -> int:
         """Run tests that are not known in random order, and add which lines each runs; in a process of its own."""
@@ -268,20 +268,12 @@ class _Mutation:
                 return 1
         return 0
 
-    def _attempt(
-        self, file: Path, number: int, survey: Survey, items: dict[str, pytest.Item], again: set[str] | None
-    ) -> tuple[str, bool] | None:
-        """Make one change, and run tests against it: what it is, and whether they notice it.
-
-        None where it is not among those to be tried again.
-        """
+    def _attempt(self, file: Path, number: int, survey: Survey, items: dict[str, pytest.Item]) -> tuple[str, bool]:
+        """Make one change, and run tests against it: what it is, and whether they notice it."""
         inside = file.relative_to(ROOT)
         tree = ast.parse(file.read_text())
         for place, (node, what) in enumerate(mutants(tree)):
             if place == number:
-                name = f"{inside}:{node.lineno}:{node.col_offset} {what}"
-                if again is not None and name not in again:
-                    return None
                 tests = [name for name in survey.tests(str(inside), _lines(tree, node)) if name in items]
                 limit = 5 + int(2 * sum(survey.cost[test] for test in tests))
                 ast.fix_missing_locations(tree)
@@ -291,7 +283,7 @@ class _Mutation:
                     noticed = bool(tests) and _apart(limit, run) != 0
                 else:
                     noticed = bool(tests) and self._in_copy(inside, ast.unparse(tree), tests, limit)
-                return f"{name} ({len(tests)} tests)", noticed
+                return f"{_named(file, node, what)} ({len(tests)} tests)", noticed
         raise AssertionError("there are as many changes as before")
 
     def _run_changed(self, code: CodeType, items: list[pytest.Item]) -> int:
@@ -345,6 +337,11 @@ def _within(code: CodeType) -> Iterator[CodeType]:
         if isinstance(constant, CodeType):
             yield constant
             yield from _within(constant)
+
+
+def _named(file: Path, node: ast.expr | ast.stmt, what: str) -> str:
+    """A change by its place and what it is."""
+    return f"{file.relative_to(ROOT)}:{node.lineno}:{node.col_offset} {what}"
 
 
 def _in_function(tree: ast.Module, node: ast.expr | ast.stmt) -> bool:

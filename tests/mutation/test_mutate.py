@@ -83,3 +83,9 @@ def test_one_test_of_each_function_comes_before_the_next_of_any():
     assert survey.tests("f.py", range(4, 5)) == ["t.py::a[2]"]
     assert survey.tests("f.py", range(7, 8)) == ["t.py::a[2]", "t.py::b", "t.py::a[1]"]
     assert survey.tests("g.py", range(7, 8)) == ["t.py::a[2]", "t.py::b", "t.py::a[1]"]
+
+
+def test_what_returns_nothing_already_is_not_changed():
+    assert [what for _, what in mutants(ast.parse("def f(a):\n    if a:\n        return None\n    return a\n"))] == [
+        "condition inverted", "returns None",
+    ]  # fmt: skip

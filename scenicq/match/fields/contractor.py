@@ -56,6 +56,7 @@ from scenicq.match.fields.interval_domain import (
     times,
     turning,
     turns_near,
+    wrapped,
 )
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import SLACK
@@ -235,7 +236,7 @@ class BoxSet:
             case Coordinate():
                 return self._vector(node.vector)[node.axis]
             case Bearing():
-                return angle_of(self._vector(node.vector))
+                return wrapped(angle_of(self._vector(node.vector)))
             case Norm():
                 return lengths(self._vector(node.vector))
             case DirectionAt():
@@ -272,10 +273,7 @@ class BoxSet:
             case ArithmeticOp.DIV:
                 return divide(args[0], args[1])
             case ArithmeticOp.WRAP:
-                low, high = args[0]
-                turns = math.tau * np.round(np.where(np.isfinite(low + high), (low + high) / 2 / math.tau, 0.0))
-                found, turn = args[0] - turns, np.array([[-math.pi], [math.pi]])
-                return np.where((found[0] > -math.pi) & (found[1] <= math.pi), found, turn)
+                return wrapped(args[0])
             case ArithmeticOp.ABS:
                 low, high = args[0]
                 return np.stack([np.maximum(np.maximum(low, -high), 0.0), np.maximum(-low, high)])

@@ -33,6 +33,7 @@ __all__ = [
     "times",
     "turning",
     "turns_near",
+    "wrapped",
 ]
 
 Enclosure: TypeAlias = NDArray[np.float64]
@@ -138,6 +139,13 @@ def angle_of(box: Enclosure) -> Enclosure:
     off = np.remainder(corners - middle + math.pi, math.tau) - math.pi
     found = middle + np.stack([off.min(axis=(0, 1)), off.max(axis=(0, 1))])
     return np.where(vague, everything(found), found)
+
+
+def wrapped(angles: Enclosure) -> Enclosure:
+    """Angles in (-pi, pi]; all of these where the ends are not of one turn."""
+    middle = (angles[0] + angles[1]) / 2
+    found = angles - math.tau * np.round(np.where(np.isfinite(middle), middle / math.tau, 0.0))
+    return np.where((found[0] > -math.pi) & (found[1] <= math.pi), found, [[-math.pi], [math.pi]])
 
 
 def turns_near(a: Enclosure, within: Enclosure) -> Enclosure:

@@ -215,6 +215,15 @@ def test_a_witness_needs_no_value_of_what_is_not_picked():
     assert isinstance(check([compared("width", node, 3.0)]), Refuted)
 
 
+def test_what_cancels_out_has_a_value_all_the_same():
+    gap, shift = between(2, 3), between(0, 1)
+    node = build.arithmetic(ArithmeticOp.ADD, build.arithmetic(ArithmeticOp.SUB, gap, gap), shift)
+    outcome = check([compared("width", node, 0.5)])
+    assert isinstance(outcome, Satisfied)
+    assert 2 <= outcome.values[gap.identity] <= 3
+    assert isinstance(check([compared("width", node, 1.5)]), Refuted)
+
+
 def test_very_many_choices_are_left_to_a_solver():
     picks = [Select(Index((1.0, 1.0)), (c(1.0), c(1.5))) for _ in range(400)]
     total = picks[0]

@@ -162,6 +162,17 @@ def test_offsets_without_end():
     assert reach_position(anywhere, leaves, (70.0, -90.0), margin).possible is None
 
 
+def test_a_mean_that_is_not_known_is_no_centre():
+    one = Normal(build.constant(1.0), build.constant(1.0))
+    other = Normal(Feature(0, "width", "scalar"), build.constant(1.0))
+    form = Affine(1.0, {(one.identity, 0): 2.0, (other.identity, 0): -3.0})
+    for leaves in ((one, other), (other, one)):
+        form = Affine(1.0, {(leaf.identity, 0): 2.0 for leaf in leaves})
+        found = reach_number(form, {leaf.identity: leaf for leaf in leaves}, 9.0, 0.0)
+        assert found.possible
+        assert value_of(form, found.values) == pytest.approx(9.0)
+
+
 def test_what_is_no_similarity_is_not_decided():
     leaf = PointIn(Constant(TRIANGLE))
     for rows in (

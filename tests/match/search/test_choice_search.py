@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from functools import cache
 from pathlib import Path
 
 import pytest
 
+from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.geometry.membership import contains
 from scenicq.geometry.network import Network
 from scenicq.importers.base import read_maps
 from scenicq.importers.report import Report
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import parse_tolerance
+from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.store.labels import Label, LabelObject
 
 from .nested_choices import REACH, Composer, clear, label_for, small_map
 
 MAP = Path(__file__).parents[3] / "sample_data" / "crossroads" / "maps"
 LABELS = 3
+MODEL = "model scenic.domains.driving.model\nego = new Car\n"
 
 
 @cache
@@ -77,3 +82,28 @@ def test_a_search_that_takes_too_long_ends_as_unknown() -> None:
 def test_verdicts_are_those_of_all_combinations_of_many_programs() -> None:
     found = [each for seed in range(40, 400) for each in check(seed)]
     assert len(found) > 800
+
+
+def test_two_cars_on_one_random_lane_are_on_one() -> None:
+    text = "a = new Car on lane\nb = new Car on lane\n"
+    lanes = street().lanes
+    scenario = compile_scenario(Source("lane.scenic", f"{MODEL}lane = Uniform(*network.lanes)\n{text}"), street())
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
+    places = [lane.centerline.pieces[0].interpolate(0.4, normalized=True) for lane in lanes[::5]]
+    things = [
+        LabelObject(
+            str(number), "Car", "car", place.x, place.y, street().roadDirection.values(place.x, place.y)[0], 2, 4
+        )
+        for number, place in enumerate(places)
+    ]
+    ego = LabelObject("ego", "Car", "car", places[0].x, places[0].y, things[0].heading, 2, 4)
+    matched = set()
+    for one, other in itertools.permutations(range(len(places)), 2):
+        label = Label("f", "r", 0, "street", ego, (things[one], things[other]))
+        shared = any(
+            contains(lane.region, *places[one].coords[0]) and contains(lane.region, *places[other].coords[0])
+            for lane in lanes
+        )
+        assert isinstance(matcher.match(label), Match if shared else NoMatch), (one, other)
+        matched.add(shared)
+    assert matched == {True, False}

@@ -186,6 +186,31 @@ def test_what_a_label_lacks_and_what_is_among_its_attributes_proves_nothing(tmp_
     assert sure_frames(open_dataset(tmp_path / "d"), plan) == (["all"], 3)
 
 
+TRIPLE = (
+    "ego = new Car\na = new Car\nb = new Car\nc = new Car\n"
+    "require (distance from a to b) < 9\nrequire (distance from b to c) < 9"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "decided"),
+    [
+        (TRIPLE, True),
+        (f"{TRIPLE}\nrequire (distance from a to b) + (distance from b to c) < 20", False),
+        (f"{TRIPLE}\nd = new Car\nrequire (distance from c to d) < 9", False),
+        ("ego = new Car\na = new Car at ego offset by 3 @ (Range(-5, 5) / 2)", True),
+        ("ego = new Car\na = new Car at ego offset by 3 @ (Range(-5, 5) * -2)", True),
+        ("ego = new Car\na = new Car at ego offset by 3 @ (Range(-5, 5) - Range(0, 2))", True),
+        ("ego = new Car\na = new Car at ego offset by 3 @ -Range(-5, 5)", True),
+        ("ego = new Car\na = new Car at ego offset by 3 @ (Range(-5, 5) * Range(0, 2))", False),
+        ("ego = new Car\na = new Car at ego offset by 3 @ sin(Range(-5, 5))", False),
+        ("ego = new Car\nmutate ego", False),
+    ],
+)
+def test_sql_decides_only_what_it_can_say(text, decided):
+    assert bool(plan_of(text, OPTIONS["default"])[0].decision) == decided
+
+
 @pytest.mark.parametrize("name", ["ahead", "view", "crossing", "range"])
 def test_without_proofs_the_same_frames_match(dataset, name):
     text = HEADER + SINGLE[name]

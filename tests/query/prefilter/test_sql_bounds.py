@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
 from pathlib import Path
 
 import duckdb
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,9 +19,10 @@ from test_intervals import observing
 
 from scenicq.forest import build
 from scenicq.forest.evaluate import evaluate
+from scenicq.forest.interval_ends import FLOATS
 from scenicq.forest.nodes import Bearing, Compare, CompareOp, DiscreteRange, Feature, Logic, LogicOp, Norm, Undefined
 from scenicq.query.prefilter.sql_bounds import SqlBounds
-from scenicq.query.prefilter.sql_ends import number
+from scenicq.query.prefilter.sql_ends import SQL, number
 
 ROWS = 4
 
@@ -98,3 +101,58 @@ def test_conditions_that_are_gone_leave_no_bounds_behind():
 
 def _slower(limit: int) -> Compare:
     return Compare(CompareOp.LT, Feature(0, "speed", "scalar"), build.constant(float(limit)))
+
+
+NUMBERS = (-2.5, -1.0, 0.0, 0.75, 1.0, 4.0)
+ONE = ("negative", "magnitude", "root", "sine", "cosine", "turned")
+TWO = ("plus", "times", "divided", "hypot", "heading", "least", "most", "at_most")
+
+
+def written(value):
+    """A number, and SQL of it."""
+    return (value, f"({value!r}::DOUBLE)")
+
+
+def applied(ends, name, args):
+    return getattr(ends, name)([*args]) if name in ("least", "most") else getattr(ends, name)(*args)
+
+
+@pytest.mark.parametrize("name", [*ONE, *TWO])
+def test_each_step_in_sql_is_that_of_numbers(name):
+    made = []
+    for values in itertools.product(NUMBERS, repeat=1 if name in ONE else 2):
+        if (
+            (name == "root" and values[0] < 0)
+            or (name == "divided" and not values[1])
+            or (name, *values) == ("heading", 0, 0)
+        ):
+            continue
+        expected = applied(FLOATS, name, values)
+        for args in itertools.product(*map(written, values)):
+            found = applied(SQL, name, args)
+            # not a number: nothing is said
+            if not isinstance(found, float) or not math.isnan(found):
+                made.append((name, args, expected, found))
+    assert made
+    texts = [str(found) if isinstance(found, bool) else number(found) for *_, found in made]
+    with duckdb.connect() as connection:
+        (row,) = connection.execute(f"SELECT {', '.join(texts)}").fetchall()
+    for (_, args, expected, _), value in zip(made, row, strict=True):
+        # half a turn has two names
+        assert value == pytest.approx(expected, abs=1e-12) or abs(value) == abs(expected) == math.pi, args
+
+
+@pytest.mark.parametrize("condition", [True, False, "1 < 2", "2 < 1"])
+def test_truth_values_in_sql_are_those_of_python(condition):
+    with duckdb.connect() as connection:
+
+        def value(text):
+            return connection.execute(f"SELECT {text if isinstance(text, str | bool) else number(text)}").fetchone()[0]
+
+        holds = value(condition)
+        for one, other in itertools.product((1.0, 2.0, "3.0"), repeat=2):
+            assert float(value(SQL.where(condition, one, other))) == float(one if holds else other)
+        for also in (True, False, "1 < 2", "2 < 1"):
+            assert value(SQL.both(condition, also)) == (holds and value(also))
+            assert value(SQL.either(condition, also)) == (holds or value(also))
+        assert value(SQL.negation(condition)) == (not holds)
