@@ -16,6 +16,7 @@ from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.query.explain.interval_explanation import explain_recording
+from scenicq.store.frame_names import find_recording
 
 from .datasets import open_checked
 from .main import NOTHING
@@ -32,13 +33,14 @@ __all__ = ["explain"]
 def _recording(query: Query, named: str) -> tuple[str, int | float | None] | None:
     """The recording and the timestamp in microseconds, or seconds in it, that are named, if it is not a frame."""
     recordings = query.dataset.manifest.by_recording
-    name, at, time = named.rpartition("@")
-    if at and name in recordings:
+    begun, at, time = named.rpartition("@")
+    if at and named not in recordings and (name := find_recording(recordings, begun)) is not None:
         if time.isdecimal():
             return name, int(time)
         if re.fullmatch(r"\d+(\.\d+)? ?s", time, re.ASCII):
             return name, float(time.removesuffix("s"))
-    return (named, None) if named in recordings else None
+    name = find_recording(recordings, named)
+    return None if name is None else (name, None)
 
 
 @click.command(

@@ -192,9 +192,8 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
     pieces = None
-    if file is not None:
-        again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
-        INTERRUPTS.advice = f"  = hint: {again}"
+    again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
+    INTERRUPTS.advice = f"  = hint: {again if file is not None else f'with `-o FILE`, {again}'}"
     if resume and file is not None:
         real = Path(os.path.realpath(file))
         pieces = real.with_name(f".{real.name}.pieces")

@@ -89,6 +89,8 @@ CODES: dict[str, str] = {
     # what compiles but cannot be meant
     "angle-without-deg": "an angle of more than a full turn, which may be meant in degrees",
     "exact-number": "a measured number that is compared with `==`",
+    "facing-object": "an object that is taken for a heading",
+    "heading-implied": "a place that also gives a heading to what may face anywhere",
     "range-reversed": "a range whose first end is above its second",
     "requirement-always": "a requirement that holds in every scene",
     "requirement-never": "a requirement that holds in no scene",

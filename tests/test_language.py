@@ -26,7 +26,7 @@ from scenicq.errors import CODES, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.lint.program import lint
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import EXACT
+from scenicq.match.tolerance import Tolerance
 from scenicq.syntax import ast as scenic
 from scenicq.syntax.parser import parse
 from scenicq.syntax.walk import walk
@@ -130,7 +130,7 @@ WARNED = [block for block in BLOCKS if block.page == "warnings.md" and not block
 def test_warnings(block: Block) -> None:
     """What the page of warnings marks is warned of, and nothing else."""
     scenario = block.compiled()
-    options = MatchOptions(tolerance=EXACT, classes="coarse" if "coarse" in block.options else "fine")
+    options = MatchOptions(tolerance=Tolerance(), classes="coarse" if "coarse" in block.options else "fine")
     found = lint(scenario.source, [(scenario, street())], options)
     assert {(d.span.source.position(d.span.start)[0], d.code) for d in found if d.span} == block.marked(_WARNING)
 

@@ -115,6 +115,10 @@ def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
         )
     close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
     hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
+    if isinstance(value, Network) and name in ("bikeLanes", "bikeLane", "bicycleLanes"):
+        hints = ("`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows",)
+    if isinstance(value, Instance) and (said := _SAID.get(name.replace("_", "").lower())):
+        hints = (said,)
     shown = f"a {kind_of(cast(Node, value))}" if is_node(value) else describe(value)
     owner = _OWNER.search(span.source.text, 0, span.start)
     label = f"`{owner[1]}` is {shown}" if owner else "not found"
@@ -125,6 +129,19 @@ _BESIDE = re.compile(
     r"(?i)_?(left|right)_?(lane|neighbou?r)?|(lane|neighbou?r)_?(to_?)?(left|right)|laneTo(Left|Right)"
 )
 """What people call the lane beside another."""
+_STANDS, _TURNS = "`X.speed < 0.5` asks whether X stands", "`angularSpeed` is how fast it turns, in radians a second"
+_SAID = {
+    "yawrate": _TURNS, "angularvelocity": _TURNS, "turnrate": _TURNS, "accel": "`acceleration` is along the course",
+    "x": "`position.x` is along the map's axis", "y": "`position.y` is along the map's axis",
+    "isparked": _STANDS, "parked": _STANDS, "isstopped": _STANDS, "stopped": _STANDS, "isstationary": _STANDS,
+    "ismoving": "`X.speed > 1` asks whether X moves", "moving": "`X.speed > 1` asks whether X moves",
+    "category": "`new Bus` asks for a class", "type": "`new Bus` asks for a class",
+    "occluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
+    "isoccluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
+    "visible": "`ego can see X` asks whether X is in view", "isvisible": "`ego can see X` asks whether X is in view",
+    "distance": "`distance from ego to X` is the distance",
+}  # fmt: skip
+"""How Scenic says what people ask an object for, by the attribute in small letters."""
 _OWNER = re.compile(r"([A-Za-z_][\w.]{0,60})\.\Z")
 """The dotted name before an attribute."""
 

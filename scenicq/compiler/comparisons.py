@@ -95,6 +95,14 @@ def _compare_known(op: str, left: ModelValue, right: ModelValue, span: Span) -> 
         if is_random(left) != is_random(right) and not isinstance(left, bool | type(None)) and right is not None:
             raise fail("random-branch", f"`{op}` asks for one and the same value, which a random one is not", span,
                        "random here", ("compare with `==`",))  # fmt: skip
+        if isinstance(left, Instance) and isinstance(right, Instance) and (said := _at_a_side(span)):
+            raise fail(
+                "wrong-type",
+                f"`{op}` asks whether two names are of one object",
+                span,
+                f"this is {describe(right)}",
+                said,
+            )
         same = left is right or (
             isinstance(left, str | bool | type(None)) and type(left) is type(right) and left == right
         )
@@ -125,15 +133,19 @@ def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> Mod
             return negated(_any_equal(left, items, span))
         check_weight(span, left, right, compared=True)
         return (hashed(left, span) in right if isinstance(right, dict | set) else left in items) == (op == "in")
-    side = _SIDE.search(span.text)
-    hints: tuple[str, ...] = ()
-    if side:  # `in front of` is not an operator of Scenic's
-        hints = (
-            f"`{_PLACED[side[1]]}`, where an object is made, places it there",
-            "`X can see Y` asks for what is in view",
-        )
     raise fail("wrong-type", f"`{op}` needs a region or a list", span, f"this is {describe(right)}",
-               hints)  # fmt: skip
+               _at_a_side(span))  # fmt: skip
+
+
+def _at_a_side(span: Span) -> tuple[str, ...]:
+    """Hints for `in front of` or `is left of`, which are no operators of Scenic's."""
+    side = _SIDE.search(span.text)
+    if not side:
+        return ()
+    return (
+        f"`{_PLACED[side[1]]}`, where an object is made, places it there",
+        "`(distance past X) < 0` asks whether X is ahead of the ego, `X can see Y` what is in view",
+    )
 
 
 _SIDE = re.compile(r"\b(front|back|left|right)\s+of\b")

@@ -73,12 +73,32 @@ class Budget:
 
 
 _SYNONYMS = {
-    "crosswalk": "crossing", "zebra": "crossing", "walkway": "sidewalk", "footpath": "sidewalk", "pavement": "sidewalk",
-    "junction": "intersection", "crossroads": "intersection", "street": "road", "roadway": "road", "kerb": "curb",
-    "Person": "Pedestrian", "Walker": "Pedestrian", "Bike": "Bicycle", "Cyclist": "Bicycle",
+    "crosswalk": "crossing", "crosswalks": "crossing", "zebra": "crossing", "walkway": "sidewalk",
+    "footpath": "sidewalk", "pavement": "sidewalk", "junction": "intersection", "crossroads": "intersection",
+    "street": "road", "roadway": "road", "roads": "road", "kerb": "curb", "intersections": "intersection",
+    "sidewalks": "sidewalk", "crossings": "crossing", "car": "Car", "vehicle": "Vehicle", "truck": "Truck",
+    "Person": "Pedestrian", "Walker": "Pedestrian", "Human": "Pedestrian", "Bike": "Bicycle", "Cyclist": "Bicycle",
     "Bicyclist": "Bicycle", "Motorbike": "Motorcycle", "Motorcyclist": "Motorcycle", "Lorry": "Truck",
+    "Worker": "ConstructionWorker", "Policeman": "PoliceOfficer", "Scooter": "PersonalMobility", "Dog": "Animal",
+    "SchoolBus": "Bus", "SUV": "Car", "Taxi": "Car", "Pickup": "Car", "Bollard": "Barrier",
 }  # fmt: skip
 """What people call what the driving model has."""
+_SIGNS = "labels of signs are of class `Prop`"
+_SAID = {
+    "Sign": _SIGNS, "StopSign": _SIGNS, "TrafficSign": _SIGNS,
+    "distance": "`distance from a to b` has no brackets", "dist": "`distance from a to b` is the distance",
+    "angle": "`angle from a to b` has no brackets", "velocity": "`X.velocity` is that of an object X",
+    "speed": "`X.speed` is that of an object X", "heading": "`X.heading` is that of an object X",
+    "parked": "`X.speed < 0.5` asks whether X stands", "stopped": "`X.speed < 0.5` asks whether X stands",
+    "moving": "`X.speed > 1` asks whether X moves", "oncoming": "`facing Range(160, 200) deg relative to ego.heading`",
+    "turning": "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right",
+    "bikeLane": "`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows",
+    "lane": "`X.lane` is the lane of an object X", "leftLane": "`X.laneSection.laneToLeft` is the lane left of X's",
+    "rightLane": "`X.laneSection.laneToRight` is the lane right of X's",
+    "weather": "`param weather = 'rain'` compares what labels say of the weather",
+    "time": "`param time = 12` compares what labels say of the time",
+}  # fmt: skip
+"""How the driving model says what people say with another name."""
 
 
 class Environment:
@@ -158,9 +178,11 @@ class Environment:
             current = current.parent
         close = get_close_matches(name, sorted(known), 1, 0.75)
         hints = (f"`{close[0]}` has a similar name",) if close else ()
-        if not close and _SYNONYMS.get(name) in known:
+        if _SYNONYMS.get(name) in known:
             hints = (f"`{_SYNONYMS[name]}` is what Scenic calls it",)
-        if not close and "roadDirection" not in known:
+        elif name in _SAID:
+            hints = (_SAID[name],)
+        elif not close and "roadDirection" not in known:
             hints = ("names such as `road` and `Car` come with `model scenic.domains.driving.model`",)
         raise fail("unknown-name", f"`{name}` is not defined", span, "not found", hints)
 

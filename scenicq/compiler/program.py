@@ -28,6 +28,7 @@ from scenicq.compiler.models import (
     network_names,
     plain_module,
 )
+from scenicq.compiler.orientations import check_direction
 from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
 from scenicq.compiler.temporal import Behaviors, TimedStatements
@@ -254,6 +255,8 @@ def _scenario(
     ego.label = ego.label or "ego"
     names = _names(run.objects)
     objects = tuple(_object(instance, names[number]) for number, instance in enumerate(run.objects))
+    for each in objects:
+        check_direction(each)
     params = {
         name: Property(_at_the_end(partial(to_node, value, span), span), explicit=not library, span=span)
         for name, (value, span, library) in run.params.items()

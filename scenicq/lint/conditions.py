@@ -36,11 +36,15 @@ from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Nowhere, PolygonSet, PolylineSet
 from scenicq.match.options import MatchOptions
-from scenicq.store.classes import fold, is_class
+from scenicq.match.tolerance import EXACT
+from scenicq.store.classes import ancestors, fold, is_class
 from scenicq.syntax import ast
 
 __all__ = ["lint_scenario"]
 
+_FREE_TO_TURN = frozenset({"Pedestrian", "Animal", "Prop"})
+"""Classes whose objects may face anywhere unless a program says otherwise."""
+_CHANGING = frozenset({"speed", "acceleration", "angularSpeed"})
 _BEYOND_MAP_M = 200.0
 """How far beyond the edges of the map labels may lie."""
 _MOST_POLYGONS = 2000
@@ -70,6 +74,8 @@ def lint_scenario(
             if network is not None:
                 yield from _too_large(scenario, requirement)
     yield from _folded(scenario, options)
+    yield from _headings(scenario)
+    yield from _exact(scenario, options)
 
 
 def _dropped(scenario: Scenario, body: tuple[ast.Statement, ...]) -> Iterator[Diagnostic]:
@@ -241,3 +247,46 @@ def _folded(scenario: Scenario, options: MatchOptions) -> Iterator[Diagnostic]:
                 "class-folded", f"with coarse classes `{owner.category}` matches every `{folded}`", owner.span,
                 "this class is folded", "`--classes fine` tells them apart",
             )  # fmt: skip
+
+
+# --- headings
+
+
+def _headings(scenario: Scenario) -> Iterator[Diagnostic]:
+    """Objects that may face anywhere by their class, but not by the specifier that places them."""
+    for owner in scenario.objects:
+        position, heading = (owner.properties.get(name) for name in ("position", "heading"))
+        if position is None or heading is None or not position.explicit or position.span is None:
+            continue
+        given = not heading.explicit or heading.span == position.span
+        turns = any(isinstance(node, Range) for node in postorder((heading.value,)))
+        if given and not turns and is_class(owner.category) and _FREE_TO_TURN & set(ancestors(owner.category)):
+            placed = " ".join(position.span.text.split())
+            yield _warning(
+                "heading-implied", f"`{placed}` also says which way `{owner.name}` faces", position.span,
+                "gives its heading, too", "`facing Range(0, 360) deg` lets it face anywhere",
+            )  # fmt: skip
+
+
+# --- numbers that labels measure
+
+
+def _exact(scenario: Scenario, options: MatchOptions) -> Iterator[Diagnostic]:
+    """Numbers that change from label to label, given exactly and compared without tolerance."""
+    tolerance = options.tolerance.for_scenario(scenario)
+    if tolerance.position <= EXACT.position:
+        return  # labels are said to be generated
+    for owner in scenario.objects:
+        for name in _CHANGING & owner.properties.keys():
+            given = owner.properties[name]
+            if (
+                given.explicit
+                and isinstance(given.value, Constant)
+                and tolerance.of(owner.index, name).size <= EXACT.other
+            ):
+                number = f"{given.value.value:g}"
+                yield _warning(
+                    "exact-number", f"`{name}` is to be exactly {number}, which what is measured hardly ever is",
+                    given.span, "compared without tolerance",
+                    f"`--tolerance {name}=0.5` allows for it, as does `Range(a, b)` instead of {number}",
+                )  # fmt: skip

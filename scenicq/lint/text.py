@@ -22,6 +22,7 @@ _MEASURED = frozenset({"speed", "width", "length", "height", "x", "y", "accelera
 _ANGLES = (ast.RelativeHeading, ast.ApparentHeading, ast.Angle)
 _ORDERS = frozenset({"<", "<=", ">", ">=", "==", "!="})
 _RANGES = frozenset({"Range", "DiscreteRange", "TruncatedNormal"})
+_POINTS = frozenset({"Point", "OrientedPoint"})
 _READ_BY_MODELS = frozenset({"ego", "workspace", "simulation", "simulator", "_"})
 _OF_SCENIC = frozenset({
     "viewAngles", "orientationStdDev", "angularVelocity", "baseOffset", "onDirection", "visionSensorOffset",
@@ -47,6 +48,7 @@ def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[
         yield from _angles(node)
         yield from _range(node)
         yield from _exact(node)
+    yield from _facing_objects(nodes)
     yield from _unused(nodes)
     if properties:
         yield from _unknown_properties(nodes)
@@ -130,6 +132,27 @@ def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
                     "angle-without-deg", f"`{text}` is an angle of {abs(value) / math.tau:.1f} full turns", term.span,
                     "angles are in radians", f"write `{text} deg` for degrees",
                 )  # fmt: skip
+
+
+def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
+    """Objects where a heading stands: their own heading is taken, not the direction to them."""
+    objects = {"ego"}
+    for node in nodes:
+        match node:
+            case ast.Assign(value=ast.New(cls=ast.Name(id=cls))) if cls not in _POINTS:
+                objects |= {target.id for target in node.targets if isinstance(target, ast.Name)}
+            case _:
+                pass
+    for node in nodes:
+        match node:
+            case ast.FacingSpecifier(heading=ast.Name(id=name) as heading) if name in objects:
+                yield _warning(
+                    "facing-object", f"`facing {name}` is the direction in which `{name}` itself faces", heading.span,
+                    "taken for its heading", f"`facing toward {name}` turns to it",
+                    f"`facing {name}.heading` says that its heading is meant",
+                )  # fmt: skip
+            case _:
+                pass
 
 
 # --- numbers that labels measure

@@ -130,31 +130,36 @@ def draw_text(roles: tuple[Role, ...], plane: Plane, bounds: Bounds, size: int) 
         bounds: What is drawn, in metres.
         size: Height of the letters in centimetres.
     """
-    taken = [(*plane.at(role.member.x, role.member.y), 100 * box_of(role.member)[1] / 2) for role in roles]
-    # the wedge of what each may face lies ahead of it
-    taken += [
-        (*plane.at(*_point_ahead(role.member, role.member.heading, box_of(role.member)[1] / 2 + _AHEAD)), 100 * _AHEAD)
-        for role in roles
-        if role.member.heading is not None
-    ]
+    # what names should not hide: centre, half the width and height, and how bad it would be
+    taken: list[tuple[float, float, float, float, float]] = []
+    for role in roles:
+        half = 100 * box_of(role.member)[1] / 2
+        taken.append((*plane.at(role.member.x, role.member.y), half, half, 1.0))
+        if role.member.heading is not None:
+            # the wedge of what it may face lies ahead of it
+            ahead = _point_ahead(role.member, role.member.heading, box_of(role.member)[1] / 2 + _AHEAD)
+            taken.append((*plane.at(*ahead), 100 * _AHEAD, 100 * _AHEAD, 1.0))
     west, north = plane.at(bounds[0], bounds[3])
     east, south = plane.at(bounds[2], bounds[1])
-    placed: list[tuple[float, float, float]] = []
     parts: list[str] = []
     for role in roles:
         x, y = plane.at(role.member.x, role.member.y)
         wide, away = size * 0.34 * len(role.name), 55 * math.hypot(*box_of(role.member)[:2]) + size * 0.3
-        spots = ((x + away + wide, y), (x - away - wide, y), (x, y - away - size / 2), (x, y + away + size / 2))
+        high = away + size / 2
+        spots = [(x + away + wide, y), (x - away - wide, y), (x, y - high), (x, y + high)]
+        spots += [(x + side * (0.7 * away + wide), y + up * high) for side in (1, -1) for up in (-1, 1)]
+        spots += [(x, y - 2 * high), (x, y + 2 * high)]
 
         def crowded(spot: tuple[float, float], wide: float = wide) -> float:
             outside = not (west + wide < spot[0] < east - wide and north + size < spot[1] < south - size)
-            near = [*taken, *placed]
-            return 9.0 * outside + sum(
-                abs(spot[0] - a) < wide + far and abs(spot[1] - b) < size * 0.7 + far * 0.7 for a, b, far in near
+            return 99.0 * outside + sum(
+                bad
+                for a, b, broad, tall, bad in taken
+                if abs(spot[0] - a) < wide + broad and abs(spot[1] - b) < (size + tall) * 0.7
             )
 
         left, top = min(spots, key=crowded)
-        placed.append((left, top, wide))
+        taken.append((left, top, wide, 0.75 * size, 9.0))
         parts.append(
             element(
                 "text",

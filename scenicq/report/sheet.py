@@ -116,4 +116,5 @@ def _timeline(name: str, runs: Sequence[tuple[int, FrameRun]], *, over_time: boo
         said = f"{len(runs):,} {'interval' if len(runs) == 1 else 'intervals'}"
     track = element("rect", class_="track", width=of, height=10)
     strip = element("svg", track, *marks, viewBox=f"0 0 {of} 10", preserveAspectRatio="none", class_="strip")
-    return element("li", element("b", escape(name)), strip, element("span", f"{said} in {of:,} frames", class_="time"))
+    told = f"{said} in {of:,} frame{'' if of == 1 else 's'}"
+    return element("li", element("b", escape(name)), strip, element("span", told, class_="time"))

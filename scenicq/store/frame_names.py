@@ -6,13 +6,13 @@ A name may have parts with `/` between them, such as a recording and a time; eac
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import duckdb
 
 from scenicq.errors import DataError, Diagnostic
 
-__all__ = ["find_frame", "shortened"]
+__all__ = ["find_frame", "find_recording", "shortened"]
 
 _SHORTEST = 6
 _SHOWN = 5
@@ -43,6 +43,23 @@ def find_frame(connection: duckdb.DuckDBPyConnection, text: str) -> str:
     more = ", ..." if len(found) > _SHOWN else ""
     hint = f"these begin so: {', '.join(found[:_SHOWN])}{more}"
     raise DataError(Diagnostic("option-invalid", f"several frames begin with `{text}`", hints=(hint,)))
+
+
+def find_recording(recordings: Iterable[str], text: str) -> str | None:
+    """The recording of a name, or of the beginning of one; None if none begins so.
+
+    Args:
+        recordings: The names of all.
+        text: A name, or as much of it as no other recording has.
+
+    Raises:
+        DataError: option-invalid: several begin so.
+    """
+    found = sorted(each for each in recordings if each.startswith(text))
+    if text in found or len(found) < 2:
+        return text if text in found else next(iter(found), None)
+    hint = f"these begin so: {', '.join(found[:_SHOWN])}{', ...' if len(found) > _SHOWN else ''}"
+    raise DataError(Diagnostic("option-invalid", f"several recordings begin with `{text}`", hints=(hint,)))
 
 
 def shortened(connection: duckdb.DuckDBPyConnection) -> Callable[[str], str]:

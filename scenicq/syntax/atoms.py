@@ -8,6 +8,7 @@ from scenicq.errors import Note, ScenarioError
 from scenicq.syntax import ast
 from scenicq.syntax.bindings import BindingParser
 from scenicq.syntax.literals import number_value
+from scenicq.syntax.phrases import phrase_hint
 from scenicq.syntax.tokens import Token
 
 __all__ = ["AtomParser"]
@@ -53,9 +54,12 @@ class AtomParser(BindingParser):
                 raise self.fail("a lambda needs parentheses here")
             case text:
                 hint = _FOREIGN.get(f"{self.tokens[self.index - 1].text}{text}", "")
+                hint = hint or phrase_hint(self.tokens, self.index)
                 if text in _ORDER and self.index > 1 and self.tokens[self.index - 2].text == "with":
                     name = self.tokens[self.index - 1].text
                     hint = f"`with {name} Range(a, b)` gives an interval; `require X.{name} {text} ...` compares"
+                elif text in _ORDER and self.tokens[self.index - 1].text == "by":
+                    hint = "`by Range(a, b)` gives an interval"
                 message = f"`{text}` cannot start an expression"
                 raise self.fail(message, label="an expression is missing here", hint=hint)
 
@@ -112,7 +116,7 @@ class AtomParser(BindingParser):
 
     def separator(self, what: str, opening: Token) -> ScenarioError:
         """The error for two things side by side in brackets."""
-        hint = "`==` compares" if self.text == "=" else ""
+        hint = "`==` compares" if self.text == "=" else phrase_hint(self.tokens, self.index)
         message = f"a comma or the closing bracket is missing between {what}"
         opened = self.source.position(opening.start)[0] < self.source.position(self.token.start)[0]
         notes = (Note(self.token_span(opening), "this bracket is open"),) if opened else ()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
+from scenicq.syntax.phrases import unit_hint
 from scenicq.syntax.tokens import CLOSERS, KEYWORDS, Token, TokenKind
 
 __all__ = ["MAX_NESTING", "tokenize", "tokenize_part"]
@@ -170,7 +171,8 @@ class _Lexer:
             stop = end
             while stop < self.end and (self.text[stop].isalnum() or self.text[stop] == "_"):
                 stop += 1
-            hint = f"write `{word} {self.text[end:stop]}`" if following.isalpha() else ""
+            unit = self.text[end:stop]
+            hint = unit_hint(word, unit) or (f"write `{word} {unit}`" if following.isalpha() else "")
             raise self.fail("a number runs into what follows it", start, stop, hint=hint)
         if len(word) > 1 and word[0] == "0" and word.replace("_", "").isdigit() and word.strip("0_"):
             hint = f"write `{word.lstrip('0_')}`"

@@ -7,6 +7,7 @@ from typing import Literal, cast
 from scenicq.errors import ScenarioError
 from scenicq.syntax import ast
 from scenicq.syntax.operators import OperatorParser
+from scenicq.syntax.phrases import phrase_hint
 
 __all__ = ["SimpleParser"]
 
@@ -39,6 +40,8 @@ class SimpleParser(OperatorParser):
             hint = f"a comma separates specifiers: write `, {self.text} ...`"
             if before == ",":
                 hint = "no comma stands between the class and its first specifier"
+        else:
+            hint = phrase_hint(self.tokens, self.index)
         message = f"`{self.text}` does not continue the statement" if self.text else "the statement is not complete"
         return self.fail(message, label="an operator or the end of the line can stand here", hint=hint)
 

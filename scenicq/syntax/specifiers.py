@@ -29,7 +29,11 @@ _ENDS = frozenset((",", ")", "]", "}", ";", ":", "if", "else", "for", "and", "or
 
 _FAR = "a requirement says how far: `require (distance from a to b) < 10`"
 _OUT = "a requirement says where it is not: `in everywhere` and `require not (a.position in road)`"
-_SAID = {"near": _FAR, "within": _FAR, "close": _FAR, "off": _OUT, "outside": _OUT, "not": _OUT}
+_BESIDE = "`at X offset by Range(1, 6) @ Range(-5, 5)` is an area on the right of X"
+_SAID = {
+    "near": _FAR, "within": _FAR, "close": _FAR, "off": _OUT, "outside": _OUT, "not": _OUT,
+    "next": _BESIDE, "beside": _BESIDE, "alongside": _BESIDE,
+}  # fmt: skip
 """What people try to place objects with, and how Scenic says it."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
 from scenicq.syntax import ast
+from scenicq.syntax.phrases import condition_hint
 from scenicq.syntax.walk import walk
 
 __all__ = ["VERSIONS", "choose_version", "find_evidence"]
@@ -107,6 +108,12 @@ def _refuse(item: ast.Evidence, version: int) -> ScenarioError:
     return ScenarioError(Diagnostic("parse-error", message, item.span, hints=hints))
 
 
+def _as_condition(span: Span) -> str:
+    """How to say what looks like an object in a requirement, where only a condition can stand."""
+    before, after = span.source.text[: span.start].rpartition("\n")[2], span.source.text[span.end :].split(None, 1)
+    return condition_hint(after[0]) if before.lstrip().startswith("require") and after else ""
+
+
 def _mixed(item: ast.Evidence, other: ast.Evidence) -> ScenarioError:
     message = f"{item.construct} is {_names(item.versions)}, but {other.construct} is {_names(other.versions)}"
     note = Note(other.span, f"this is {_names(other.versions)}")
@@ -116,6 +123,8 @@ def _mixed(item: ast.Evidence, other: ast.Evidence) -> ScenarioError:
             name = place.span.text
             # classes begin with a capital letter; a region before a specifier lacks a comma
             comma = f"a comma separates specifiers: write `{name}, ...`"
-            hints = (f"Scenic 3 writes `new {name} ...`" if name[:1].isupper() else comma,)
+            hints = (
+                _as_condition(place.span) or (f"Scenic 3 writes `new {name} ...`" if name[:1].isupper() else comma),
+            )
     label = f"this is {_names(item.versions)}"
     return ScenarioError(Diagnostic("mixed-versions", message, item.span, label, (note,), hints))

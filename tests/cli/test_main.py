@@ -180,6 +180,23 @@ def test_an_interrupted_match_leaves_no_file(command, crossroads, scenarios, tmp
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_an_interrupted_match_without_a_file_says_what_can_be_resumed(command, crossroads, scenarios, tmp_path):
+    solver, begun = tmp_path / "solver.sh", tmp_path / "begun"
+    solver.write_text(f"touch {begun}\nsleep 60\n")
+    slow = ("--no-prefilter", "--method", "smt", "--solver", f"sh {solver}", "--timeout", "60", "--jobs", "1")
+    words = [command, "match", str(scenarios / "04_two_lane_traffic.scenic"), str(crossroads), *slow]
+    with subprocess.Popen(words, **PIPES) as process:
+        deadline = time.monotonic() + 60
+        while not begun.exists() and process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=60)
+    hint = "  = hint: with `-o FILE`, `--resume` keeps what is done until it stops"
+    assert (process.returncode, told.splitlines()) == (130, ["interrupted", hint])
+
+
 @pytest.mark.parametrize("solver", ["nope", "nope -in", "'"])
 def test_a_solver_that_is_not_there_is_told_at_once(run, crossroads, scenarios, solver):
     result = run("match", scenarios / "02_crossing_cars.scenic", crossroads, "--solver", solver)

@@ -4,10 +4,12 @@ import io
 import itertools
 import re
 
+import click
 import pytest
 
 from scenicq.errors import DataError
 from scenicq.store.dataset import open_dataset
+from scenicq_cli.main import cli
 from scenicq_cli.report import moment
 from scenicq_cli.table import Table, TextStream, fitted
 
@@ -130,6 +132,47 @@ def test_frames_are_found_by_beginnings_that_no_other_has(crossroads):
     for absent in ("04-b/.*", "nope", "%"):
         with pytest.raises(DataError, match="has no frame"):
             dataset.label(absent)
+
+
+_NAMED = {
+    ("explain", "frame"): (["03_against_traffic.scenic", "{dataset}", "{name}", "--exit-zero"], "frames"),
+    ("explain", "recording"): (["02_cut_in.scenic", "{dataset}", "{name}", "--exit-zero"], "recordings"),
+    ("explain", "moment"): (["02_cut_in.scenic", "{dataset}", "{name}@0.5s", "--exit-zero"], "recordings"),
+    ("show", "frame"): (["{dataset}", "{name}"], "frames"),
+    ("show with a program", "frame"): (["{dataset}", "{name}", "--scenario", "03_against_traffic.scenic"], "frames"),
+}
+"""Every command that takes the name of a frame or recording: its other arguments, and what is named."""
+
+
+@pytest.mark.parametrize("case", _NAMED, ids=" ".join)
+def test_every_command_takes_beginnings_that_no_other_has(run, crossroads, scenarios, case):
+    words, kind = _NAMED[case]
+    full, cut, several = {
+        "frames": ("04-against-traffic/03", "04-a/03", "04-a"),
+        "recordings": ("06-cut-in", "06", "0"),
+    }[kind]
+    places = {each.name: str(each) for each in (*scenarios.glob("*"), *(scenarios.parent / "over_time").glob("*"))}
+
+    def ask(name):
+        filled = (word.format(dataset=crossroads, name=name) for word in words)
+        return run(case[0].split()[0], *(places.get(word, word) for word in filled))
+
+    assert ask(full).exit_code == 0
+    assert ask(cut).stdout == ask(full).stdout != ""
+    told = ask(several)
+    assert (told.exit_code, f"several {kind} begin with `{several}`" in told.stderr) == (2, True)
+
+
+def test_all_commands_that_take_names_are_swept():
+    context = click.Context(cli)
+    commands = {name: cli.get_command(context, name) for name in cli.list_commands(context)}
+    taking = {
+        name
+        for name, command in commands.items()
+        for each in (command.params if command is not None else ())
+        if isinstance(each, click.Argument) and (each.name or "") in ("frame", "recording", "scene", "interval")
+    }
+    assert taking == {name.split()[0] for name, _ in _NAMED}
 
 
 def test_a_clock_without_a_date_shows_none():

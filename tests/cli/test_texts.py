@@ -120,6 +120,13 @@ FIRST_DRAFTS = {
     "velocity": "other = new Car\nrequire other.velocity > 5",
     "with above": "other = new Car with speed > 10",
     "no model": "",
+    "beside": "other = new Car\nrequire (other is left of ego)",
+    "function": "other = new Car\nrequire distance(ego, other) < 10",
+    "turning": "other = new Car\nrequire other.yawRate > 0.2",
+    "bicyclist": "new Bicyclist on road",
+    "bike lane": "new Bicycle on bikeLane",
+    "stop sign": "new StopSign",
+    "parked": "other = new Car\nrequire other is parked",
 }
 
 

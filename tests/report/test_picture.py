@@ -1,9 +1,11 @@
 """Pictures show what is so: boxes where the labels have them, allowed places that hold the witness."""
 
+import itertools
 import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from scenicq.report.distances import measured_distances
 from scenicq.report.outlines import allowed_headings, allowed_place, outline
 from scenicq.report.picture import Shot, caption, draw, view_of
 from scenicq.report.png import can_make_png, png
-from scenicq.report.scene import observed_by
+from scenicq.report.scene import draw_text, observed_by
 from scenicq.report.svg import Plane, element, escape
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label, LabelObject
@@ -281,6 +283,25 @@ def test_captions_fit(shoot):
     width = float(root.get("viewBox").split()[2])
     for each in Drawn(draw(replace(shot, label=label), backdrop)).with_class("caption"):
         assert len(each.text) * 0.69 * float(each.get("font-size")) < width
+
+
+@pytest.mark.parametrize("size", [150, 300, 450])
+@pytest.mark.parametrize("apart", [0.5, 2.0, 4.0])
+def test_names_of_roles_near_each_other_do_not_overlap(shoot, apart, size):
+    shot, _ = shoot("03-busy-intersection/10", "02_crossing_cars.scenic")
+    member = shot.roles[0].member
+    roles = tuple(
+        replace(role, member=replace(member, x=member.x + apart * number, y=member.y - 0.7 * apart * number))
+        for number, role in enumerate(shot.roles)
+    )
+    plane = Plane((math.floor(member.x), math.floor(member.y)))
+    bounds = (member.x - 40, member.y - 40, member.x + 40, member.y + 40)
+    texts = list(ET.fromstring(f"<g>{draw_text(roles, plane, bounds, size)}</g>"))
+    assert [each.text for each in texts] == [role.name for role in roles]
+    for one, other in itertools.combinations(texts, 2):
+        across = 0.34 * size * (len(one.text) + len(other.text))
+        aside = abs(int(one.get("x")) - int(other.get("x"))), abs(int(one.get("y")) - int(other.get("y")))
+        assert aside[0] >= across or aside[1] >= size
 
 
 def test_small_roles_have_a_ring(shoot):

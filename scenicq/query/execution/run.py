@@ -192,25 +192,25 @@ class Query:
 
     def _warn(self, worlds: Mapping[str, CompiledMap | Diagnostic]) -> None:
         """Note in the funnel what the author should know, and count the frames on maps that cannot match."""
-        lacking: dict[str, list[tuple[str, str]]] = {}
+        lacking: dict[str, list[tuple[str, Diagnostic]]] = {}
         for name, told in worlds.items():
             if isinstance(told, Diagnostic):
                 # maps that lack the same are spoken of together
-                lacking.setdefault(told.message.replace(f"`{name}`", ""), []).append((name, told.message))
+                lacking.setdefault(told.message.replace(f"`{name}`", ""), []).append((name, told))
                 if here := self.frames(name):
                     self.funnel.frames += here
                     self.funnel.excluded[f"{MAP_LACKS}{name}"] += here
         for alike in lacking.values():
             count = sum(self.dataset.manifest.by_map.get(name, Counts()).frames for name, _ in alike)
             shown = ", ".join(f"`{name}`" for name, _ in alike[:_NAMED_MAPS])
-            first, message = alike[0]
+            first, told = alike[0]
             message = (
-                f"{count} frames on map {shown} cannot match: {message}"
+                f"{count} frames on map {shown} cannot match: {told.message}"
                 if len(alike) == 1
                 else f"{count} frames on {len(alike)} maps ({shown}{', ...' if len(alike) > _NAMED_MAPS else ''}) "
-                f"cannot match; of `{first}`: {message}"
+                f"cannot match; of `{first}`: {told.message}"
             )
-            self.funnel.warnings.append(Diagnostic("map-lacks", message, severity="warning"))
+            self.funnel.warnings.append(Diagnostic("map-lacks", message, hints=told.hints, severity="warning"))
         compiled = [world for world in worlds.values() if isinstance(world, CompiledMap)]
         if compiled:
             compared = self.coverage()

@@ -12,7 +12,7 @@ import itertools
 import math
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -194,38 +194,47 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
     changes = sorted(
         _changes(scenario, query.options.match), key=lambda each: (rank.get(each.about, len(excluded)), each.widened)
     )
-    most, decided = (_FEW_CHANGES, _FEW_DECIDED) if brief else (_MOST_CHANGES, _MOST_DECIDED)
+    few, decided = (_FEW_CHANGES, _FEW_DECIDED) if brief else (_MOST_CHANGES, _MOST_DECIDED)
     found: list[Outlook] = []
-    complete = len(changes) <= most
+    complete = True
     with ExitStack() as stack:
         runs, maps = (_FEW_RUNS, _FEW_MAPS) if brief else (_MOST_RUNS, _MOST_MAPS)
         sample = _sample(query, worlds, stack, runs, maps)
         solver = stack.enter_context(LazySolver(query.options.solver))
-        for number, change in enumerate(changes[:most]):
-            if number and clock.is_over:
+        for number, change in enumerate(changes):
+            if number and (clock.is_over or number >= (few if found else _MOST_CHANGES)):
                 complete = False
                 break
             outlook = _outlook(query.options.match, sample, change, clock, solver, decided)
             if outlook.most > query.funnel.matches:
                 found.append(outlook)
         if not found and query.funnel.matches == 0:
-            paired = _pairs(changes[:most], _FEW_PAIRED if brief else _MOST_PAIRED)
+            paired = _pairs(changes, _FEW_PAIRED if brief else _MOST_PAIRED)
             for change in itertools.takewhile(lambda _: not clock.is_over, paired):
                 outlook = _outlook(query.options.match, sample, change, clock, solver, decided)
                 if outlook.most > 0:
                     found.append(outlook)
     found.sort(key=lambda each: (-each.least, -each.most))
-    return Advice(tuple(excluded[:3]), tuple(found), complete, tuple(_lines_meant(scenario, excluded)), without_map)
+    changed = {each.about for outlook in found for each in (outlook.change.both or (outlook.change,))}
+    doubtful = rank.keys() | changed if found else {f"{owner.name}.position" for owner in scenario.objects}
+    hints = (*_lines_meant(scenario, doubtful), *_without_maps(query))
+    return Advice(tuple(excluded[:3]), tuple(found), complete, hints, without_map)
 
 
-def _lines_meant(scenario: Scenario, excluded: Sequence[tuple[str, int]]) -> Iterator[str]:
-    """Hints for objects at a side of another, which leaves them a line, where their position excludes most."""
+def _without_maps(query: Query) -> Iterator[str]:
+    """What to write so that frames of maps that lack something can match, too."""
+    told = [each for each in query.funnel.warnings if each.code == "map-lacks"]
+    yield from dict.fromkeys(each.hints[-1] for each in told if each.hints)
+
+
+def _lines_meant(scenario: Scenario, about: Set[str]) -> Iterator[str]:
+    """Hints for objects at a side of another, which leaves them a line, where their position is in doubt."""
     for owner in scenario.objects:
         given = owner.properties.get("position")
-        if given is None or not given.explicit or given.span is None or not excluded:
+        if given is None or not given.explicit or given.span is None:
             continue
         placed = _AT_A_SIDE.match(" ".join(given.span.text.split()))
-        if placed and excluded[0][0] == f"{owner.name}.position":
+        if placed and f"{owner.name}.position" in about:
             side, other = placed.groups()
             yield (f"`{side} {other} by` a number leaves a line; "
                    f"`at {other} offset by {_AREAS[side]}` is an area")  # fmt: skip

@@ -142,6 +142,18 @@ def test_match_says_in_a_line_what_cannot_be_meant(dataset, run, tmp_path):
     assert run("match", file, dataset.folder, "--strict").exit_code == 2
 
 
+def test_a_heading_along_lanes_that_the_map_has_not_is_told(dataset, run, tmp_path):
+    file = tmp_path / "p.scenic"
+    file.write_text(f"model scenic.domains.driving.model\nego = new Car {PLACED}\nnew Car at ego offset by 0 @ 5\n")
+    done = run("match", file, dataset.folder)
+    assert done.exit_code == 2
+    assert "error[map-lacks]: the map `town` has no lane that `roadDirection` could be the direction of" in done.stderr
+    assert "the default heading of `Car` needs lanes" in done.stderr
+    assert "`facing Range(0, 360) deg` asks nothing of the map" in done.stderr
+    file.write_text(file.read_text().replace("0 @ 5", "0 @ 5, facing Range(0, 360) deg"))
+    assert run("match", file, dataset.folder, "--exit-zero").exit_code == 0
+
+
 def over_time(tmp_path, text, **more):
     source = tmp_path / "source"
     (source / "maps").mkdir(parents=True)

@@ -97,6 +97,27 @@ def test_brief_advice_is_bounded_by_work_and_says_no_more_than_all_of_it(dataset
         assert each.least <= known[each.change.told].least <= each.most
 
 
+def test_brief_advice_goes_on_until_something_helps(dataset, monkeypatch):
+    monkeypatch.setattr(advice_module, "_FEW_CHANGES", 1)
+    text = "model scenic.domains.driving.model\nego = new Car\nother = new Truck\nrequire (distance to other) < 1\n"
+    query = taken(dataset, text)
+    assert query.funnel.excluded.most_common(1)[0][0] == "other.class"
+    (first, *_) = advice(query, brief=True).outlooks
+    assert first.change.told == "without `require (distance to other) < 1`"
+
+
+def test_an_object_at_a_side_is_told_to_be_on_a_line(dataset):
+    text = (
+        "model scenic.domains.driving.model\nego = new Car with speed 99\nother = new Bus left of ego by Range(1, 3)\n"
+    )
+    (told,) = advice(taken(dataset, text)).hints
+    assert told == (
+        "`left of ego by` a number leaves a line; `at ego offset by Range(-6, -1) @ Range(-5, 5)` is an area"
+    )
+    text = "model scenic.domains.driving.model\nego = new Car\nother = new Bus at ego offset by Range(-6, -1) @ 3\n"
+    assert advice(taken(dataset, text)).hints == ()
+
+
 def test_without_time_one_change_is_tried(dataset):
     query = taken(dataset, TEXT)
     found = advice(query, budget_s=0.0)
