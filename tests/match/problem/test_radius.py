@@ -38,7 +38,8 @@ def test_random_points_of_the_map_lie_within_it(away, expected):
 def test_distances_and_directions_are_those_of_the_whole_map(far):
     """The crossing is farther than the radius, and the same for all that."""
     text = (
-        "ego = new Car\nother = new Car ahead of ego by Range(1, 9), facing Range(-1, 1) deg relative to roadDirection\n"
+        "ego = new Car\n"
+        "other = new Car ahead of ego by Range(1, 9), facing Range(-1, 1) deg relative to roadDirection\n"
         f"require (distance from ego to intersection) {far} 30"
     )
     everywhere = found(text, 60.0, None)

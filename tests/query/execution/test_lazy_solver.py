@@ -8,7 +8,6 @@ from scenicq.errors import SolverError
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.smt.answer import Sat
 from scenicq.smt.formula import TRUE, Problem
-from scenicq.smt.solver import open_solver
 
 
 def test_nothing_is_opened_before_the_first_question():
