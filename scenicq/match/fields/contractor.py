@@ -41,7 +41,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import conjuncts, is_leaf
 from scenicq.match.fields.constraint_network import ConstraintNetwork
-from scenicq.match.fields.interval_affine import IntervalAffine, interval_affine_of, solved
+from scenicq.match.fields.interval_affine import IntervalAffine, cut_ranges, interval_affine_of
 from scenicq.match.fields.interval_domain import (
     Enclosure,
     angle_of,
@@ -180,7 +180,7 @@ class BoxSet:
             for item in self.network.items:
                 root = item[1]
                 if isinstance(item[0], Comparison) and id(root) in self._bounds:
-                    solved(self._forms[id(root)], self._bounds[id(root)], self.ranges)
+                    cut_ranges(self._forms[id(root)], self._bounds[id(root)], self.ranges)
             for node in reversed(self.network.nodes):
                 self._backward(node)
 

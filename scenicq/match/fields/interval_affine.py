@@ -28,7 +28,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.match.fields.interval_domain import Enclosure, common, divide, negative, projected, rotate, subtract, times
 
-__all__ = ["IntervalAffine", "interval_affine_of", "solved"]
+__all__ = ["IntervalAffine", "cut_ranges", "interval_affine_of"]
 
 IntervalAffine: TypeAlias = tuple[Enclosure | None, dict[Identity, Enclosure]]
 """What is not random (None if that is anything), and the factors of what is. Of one shape: intervals or boxes."""
@@ -125,7 +125,7 @@ def _times(form: IntervalAffine, factor: Enclosure | None) -> IntervalAffine:
     return times(constant, factor), {key: times(by, factor) for key, by in terms.items()}
 
 
-def solved(form: IntervalAffine, value: Enclosure, ranges: dict[Identity, Enclosure]) -> None:
+def cut_ranges(form: IntervalAffine, value: Enclosure, ranges: dict[Identity, Enclosure]) -> None:
     """Cut the ranges of random numbers to where a form can have a value.
 
     A box is looked at along its axes and, for each number, across the direction in which that number moves it: there
