@@ -11,7 +11,7 @@ from scenes import compiled, drawn, label_of
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import find_candidates
-from scenicq.match.search.arc_consistency import thinned
+from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.tolerance import EXACT, Tolerance
 
@@ -26,7 +26,7 @@ def test_thinning_never_removes_a_right_candidate(name):
         cast = find_candidates(scenario, label, 0, matcher.options, {})
         ((signature, candidates),) = cast.signatures(relevant_properties(scenario, matcher.options))
         wanted = {index: numbers for index, numbers in candidates.items() if index != scenario.ego}
-        left, failed = thinned(matcher.plans.plan(signature), wanted, cast, scenario.ego, Tolerance())
+        left, failed = arc_consistent(matcher.plans.plan(signature), wanted, cast, scenario.ego, Tolerance())
         assert failed is None
         for index, numbers in left.items():
             assert f"object-{index}" in [label.objects[number - 1].id for number in numbers]
