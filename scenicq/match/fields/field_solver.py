@@ -22,7 +22,7 @@ from scenicq.forest.walk import leaves, postorder
 from scenicq.match.fields.cell_assignment import HeadingAssignment, solved, way_of
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
-from scenicq.match.fields.heading_propagation import LimitError, directed, halved, settled
+from scenicq.match.fields.heading_propagation import LimitError, bisected, directed, propagated
 from scenicq.match.fields.probing import probed
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.problem.conditioned import Item, conditioned
@@ -161,7 +161,7 @@ def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAss
     """What is left of a way in cells that cover too much over either half of its widest range."""
     case = way.case
     try:
-        halves = [settled(half) for half in halved(case, tuple(case.network.leaves.values()))]
+        halves = [propagated(half) for half in bisected(case, tuple(case.network.leaves.values()))]
     except LimitError:
         return None
     return _ways([half for half in halves if half.size], shared)
