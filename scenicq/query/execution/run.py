@@ -33,7 +33,7 @@ from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
 from scenicq.temporal.interval_options import IntervalOptions
 
-__all__ = ["MAP_LACKS", "Query", "QueryOptions", "Stretch", "read_program"]
+__all__ = ["MAP_LACKS", "Query", "QueryOptions", "RecordingRange", "read_program"]
 
 MAP_LACKS = "map "
 """How the name of what excludes frames begins where it is their map; the map's follows."""
@@ -110,7 +110,7 @@ def beside(path: Path) -> Callable[[str], Source | None]:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class RecordingRange:
     """Recordings of a map that follow each other in the order of their names.
 
     Attributes:
@@ -149,7 +149,7 @@ class Query:
     dataset: Dataset
     source: Source
     options: QueryOptions = QueryOptions()
-    recordings: Mapping[str, Stretch] | None = None
+    recordings: Mapping[str, RecordingRange] | None = None
     funnel: Funnel = field(default_factory=Funnel)
     file: Path | None = None
     _known: _Known = field(default_factory=_Known, repr=False)
@@ -293,8 +293,8 @@ class Query:
         frames = self.dataset.manifest.by_recording[recording].frames
         known = replace(self._known, worlds={**self._known.worlds, map_name: world})
         options = replace(self.options, match=match, jobs=1, limit=None, every=False)
-        stretch = {map_name: Stretch(recording, recording, frames)}
-        return Query(self.dataset, self.source, options, stretch, file=self.file, _known=known)
+        chosen = {map_name: RecordingRange(recording, recording, frames)}
+        return Query(self.dataset, self.source, options, chosen, file=self.file, _known=known)
 
     def frames(self, map_name: str) -> int:
         """How many frames of a map are looked at."""
