@@ -30,7 +30,7 @@ from scenicq.match.problem.evaluation import holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["MARGIN", "SAME", "HeadingAssignment", "extent", "solved", "way_of"]
+__all__ = ["MARGIN", "SAME", "HeadingAssignment", "assignment_of", "extent", "solved"]
 
 MARGIN = 2e-6
 """Metres by which boxes are grown, so that rounding loses nothing."""
@@ -126,7 +126,7 @@ def _kept(rows: list[Row], *, strict: bool) -> list[Row]:
     return [replace(row, strict=row.low < row.high) for row in rows] if strict else rows
 
 
-def way_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssignment | None:
+def assignment_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssignment | None:
     """A case in which all choices are made, as constraints; None if a field does not point so where its point is.
 
     Args:
