@@ -1,4 +1,4 @@
-"""One way through a group with fields: each points as chosen, so that the rest is linear.
+"""A group with the heading of each field chosen, which makes it linear: decided by linear programs.
 
 For each hidden point there is one map cell to choose, out of the few that are left where the point can be.
 """

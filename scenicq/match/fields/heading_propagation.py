@@ -58,7 +58,7 @@ _BEND = 0.5
 
 
 class LimitError(Exception):
-    """More cases than anyone would go through, or points that may be anywhere."""
+    """There are more cases than `_MOST_CASES`, or nothing is left that bisecting would narrow."""
 
 
 def directed(start: BoxSet) -> Iterator[BoxSet]:

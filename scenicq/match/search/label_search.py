@@ -35,7 +35,12 @@ __all__ = ["Failure", "LabelSearch", "Solution"]
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """A correspondence that satisfies all groups, and how each was satisfied."""
+    """A correspondence that satisfies all groups.
+
+    Attributes:
+        assignment: The number of the label object of each object of the scenario, by its index.
+        outcomes: How each group was satisfied.
+    """
 
     assignment: Mapping[int, int]
     outcomes: tuple[tuple[GroupPlan, Satisfied], ...]
