@@ -277,6 +277,43 @@ def test_each_question_of_a_stranger_is_answered_in_three_files_at_most():
     assert asked >= QUESTIONS
 
 
+def imports(file: Path) -> set[str]:
+    """The modules of the library that a file imports."""
+    return {
+        node.module
+        for node in ast.walk(tree(file))
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("scenicq.")
+    }
+
+
+def test_backtracking_knows_no_geometry():
+    known = imports(LIBRARY / "match/search/backtracking.py")
+    assert known == {"scenicq.budget", "scenicq.match.options", "scenicq.match.problem.bipartite_matching"}
+    assert imports(LIBRARY / "match/problem/bipartite_matching.py") == set()
+
+
+def test_the_portable_solver_knows_formulas_and_no_nodes():
+    todo, seen = ["portable"], set[str]()
+    while todo:
+        name = todo.pop()
+        seen.add(name)
+        for module in imports(LIBRARY / f"smt/{name}.py"):
+            assert module.startswith(("scenicq.smt.", "scenicq.budget")), (name, module)
+            todo += {module.removeprefix("scenicq.smt.")} - seen if module.startswith("scenicq.smt.") else ()
+    assert {"interval", "affine", "hc4"} <= seen
+
+
+def test_every_step_of_matching_is_one_that_is_measured():
+    source = tree(ROOT / "tests/bench/steps.py")
+    (measured,) = (
+        [key.value for key in node.value.keys if isinstance(key, ast.Constant)]
+        for node in source.body
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "STEPS" and isinstance(node.value, ast.Dict)
+    )
+    # without the cascade nothing is decided, and no solver is asked there
+    assert {name for name, *_ in rows("Steps of matching")} == {*measured, "cascade", "solver"}
+
+
 def test_every_step_of_matching_names_its_file():
     assert [file for _, file, *_ in rows("Steps of matching") if not (LIBRARY / file.strip("`")).exists()] == []
 

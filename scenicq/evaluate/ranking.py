@@ -142,7 +142,7 @@ def densities(query: Query, results: Sequence[Result]) -> list[LogDensity | None
             by_map.setdefault(labels[result.frame].map, []).append(number)
     found: list[LogDensity | None] = [None] * len(results)
     for name, numbers in by_map.items():
-        scenario = query.world(name).scenario
+        scenario = query.compiled_map(name).scenario
         bound = [(labels[results[n].frame], _correspondence(results[n])) for n in numbers]
         for number, density in zip(numbers, log_densities(scenario, bound, query.options.match), strict=True):
             found[number] = density

@@ -1,4 +1,4 @@
-"""What explanations and reports may know of how a label was decided: the one door to the rooms below the matcher."""
+"""How a label was decided, for explanations and reports: they import nothing else of what lies below the matcher."""
 
 from __future__ import annotations
 

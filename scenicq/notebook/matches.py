@@ -182,7 +182,7 @@ class Matches(Sequence[FrameResult]):
 
     def _shot(self, frame: str) -> tuple[Shot, Backdrop]:
         label = self.query.dataset.label(frame)
-        world = self.query.world(label.map)
+        world = self.query.compiled_map(label.map)
         with LazySolver(self.query.options.solver) as solver:
             matcher = Matcher(world.scenario, self.query.options.match, solver)
             verdict = matcher.match(label)
@@ -202,7 +202,7 @@ class Matches(Sequence[FrameResult]):
         """
         label = self.query.dataset.label(frame)
         with LazySolver(self.query.options.solver) as solver:
-            matcher = Matcher(self.query.world(label.map).scenario, self.query.options.match, solver)
+            matcher = Matcher(self.query.compiled_map(label.map).scenario, self.query.options.match, solver)
             return DisplayedText(show_explanation(explain(matcher, label)))
 
     def show(self, frame: str, *, half: float | None = None, width: int = 600) -> Picture:

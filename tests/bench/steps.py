@@ -98,8 +98,8 @@ def _undecided(parts: Sequence[Sequence[Any]], *_: object) -> Undecided:
 STEPS: dict[str, Off] = {
     "first fit": _set(FirstFit, "fill", lambda *_: iter(())),
     "closed forms": _set(group_plan, "closed_form_of", lambda *_: None),
-    "arc consistency": _set(label_search, "thinned", lambda plan, candidates, *_: (candidates, None)),
-    "subgroups": _set(group_plan, "parts_of", lambda *_: ()),
+    "arc consistency": _set(label_search, "arc_consistent", lambda plan, candidates, *_: (candidates, None)),
+    "subgroups": _set(group_plan, "subgroups_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
     "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
     "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),

@@ -21,8 +21,21 @@ from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.interval_ends import ARRAYS, FLOATS
 from scenicq.forest.interval_values import Interval, IntervalVector, Truth
 from scenicq.forest.intervals import IntervalDomain
-from scenicq.forest.nodes import Compare, CompareOp, Coordinate, Feature, Logic, LogicOp, PointIn, Range, Undefined
+from scenicq.forest.nodes import (
+    Compare,
+    CompareOp,
+    Coordinate,
+    Distance,
+    Feature,
+    Intersects,
+    Logic,
+    LogicOp,
+    PointIn,
+    Range,
+    Undefined,
+)
 from scenicq.forest.walk import transform
+from scenicq.geometry.regions import Disc
 
 ROWS = 5
 
@@ -164,3 +177,15 @@ def test_a_known_vector_has_a_known_heading_but_near_the_seam(columns):
         low, high, _ = domain.bearing(IntervalVector(*(Interval(end, end, True) for end in ends)))
         assert np.all(low <= -math.pi)
         assert np.all(high >= math.pi)
+
+
+def test_without_boxes_nothing_is_said_of_what_is_asked_of_regions():
+    """With them a distance from a region is bounded, and regions that lie apart do not meet."""
+    near, far = (build.constant(Disc((x, 0.0), 1.0)) for x in (0.0, 50.0))
+    distance, meeting = Distance(far, build.constant((0.0, 0.0))), Intersects(near, far)
+    for boxed in (True, False):
+        domain = IntervalDomain(FLOATS, boxed=boxed)
+        bounds = interpret(steps_of(distance), domain)[id(distance)]
+        truth = interpret(steps_of(meeting), domain)[id(meeting)]
+        assert bounds[0] == (49.0 if boxed else 0.0)
+        assert truth.can_hold is (not boxed)

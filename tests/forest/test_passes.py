@@ -46,7 +46,6 @@ from scenicq.forest.show import show
 from scenicq.forest.simplify import simplify
 from scenicq.forest.walk import features, leaves, postorder, transform
 from scenicq.geometry.regions import PolygonSet
-from scenicq.match.linear.affine_forms import affine_vector
 
 STREET = street()
 
@@ -107,20 +106,6 @@ def test_conditioning_on_some_variables_keeps_the_others(case, number):
     expected, found = evaluate(root, values), evaluate(folded, values)
     if not isinstance(expected, Undefined) and not isinstance(found, Undefined):
         assert all(near(a, b) for a, b in zip(found, expected, strict=True))
-
-
-@given(expressions(affine=True))
-@settings(max_examples=300, deadline=None)
-def test_an_affine_form_has_the_value_of_its_expression(case):
-    root, values = case
-    form = affine_vector(root)
-    assert form is not None
-    for part, expected in zip(form, evaluate(root, values), strict=True):
-        total = part.constant
-        for (identity, axis), coefficient in part.terms.items():
-            value = values[identity]
-            total += coefficient * (value[axis] if isinstance(value, tuple) else value)
-        assert math.isclose(total, expected, rel_tol=1e-6, abs_tol=1e-6 * max(1.0, abs(part.constant)))
 
 
 def test_one_range_used_twice_is_one_variable_and_two_alike_are_two():

@@ -15,11 +15,8 @@ from scenicq.forest.scenario import BuiltIn
 from scenicq.match.linear import linear_program
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import find_candidates
 from scenicq.match.problem.outcome import Undecided
 from scenicq.match.search import group_cache, group_plan
-from scenicq.match.search.arc_consistency import thinned
-from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.answer import NoAnswer, Sat, Unsat
@@ -317,42 +314,3 @@ def test_a_worker_that_is_killed_is_replaced(monkeypatch):
         assert found.reason == "crash"
     with WorkerSolver() as solver:
         assert isinstance(Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(frame(THERE)), Match)
-
-
-# --- necessary conditions
-
-
-def test_thinning_looks_along_the_ego():
-    """On a slant: what lies off the line is inside of the box of all that lies on it."""
-    ego = replace(EGO, heading=-0.785398)
-    scenario = compiled(HEADER + "ego = new Car\nother = new Car ahead of ego by Range(0, 20)\nthird = new Car\n"
-                        "require (distance from other to third) < 40")  # fmt: skip
-    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
-    # the middle of a car ahead is half a length of both away
-    things = [car("on", 1.75 + 10.0, 60.0, -0.785398), car("off", 1.75 + 13.0, 53.0, -0.785398)]
-    label = frame(*things, car("third", 20.0, 60.0), ego=ego)
-    cast = find_candidates(scenario, label, 0, matcher.options, {})
-    ((signature, candidates),) = cast.signatures(relevant_properties(scenario, matcher.options))
-    wanted = {index: numbers for index, numbers in candidates.items() if index != scenario.ego}
-    left, _ = thinned(matcher.plans.plan(signature), wanted, cast, scenario.ego, Tolerance())
-    (role,) = [thing.index for thing in scenario.objects if thing.name == "other"]
-    assert left[role] == (1,)
-
-
-@pytest.mark.parametrize("name", PROGRAMS)
-def test_thinning_never_removes_a_right_candidate(name):
-    scenario = compiled(HEADER + PROGRAMS[name])
-    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
-    removed = 0
-    for seed in range(8):
-        label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=4)
-        cast = find_candidates(scenario, label, 0, matcher.options, {})
-        ((signature, candidates),) = cast.signatures(relevant_properties(scenario, matcher.options))
-        wanted = {index: numbers for index, numbers in candidates.items() if index != scenario.ego}
-        left, failed = thinned(matcher.plans.plan(signature), wanted, cast, scenario.ego, Tolerance())
-        assert failed is None
-        for index, numbers in left.items():
-            assert f"object-{index}" in [label.objects[number - 1].id for number in numbers]
-            removed += len(wanted[index]) - len(numbers)
-    if name in ("ahead", "left of", "row", "offset", "shared"):
-        assert removed

@@ -196,7 +196,7 @@ class SideBySide:
 
 def _world(query: Query, map_name: str) -> CompiledMap | str:
     try:
-        return query.world(map_name)
+        return query.compiled_map(map_name)
     except ScenicqError as error:
         return str(error)
 

@@ -82,6 +82,14 @@ def test_thumbnails_are_small_and_made_once(root, report, monkeypatch):
     assert files.find({"CAM": "a.jpg"}) == [first]
 
 
+def test_without_pillow_files_are_linked_and_no_more(root, report, monkeypatch):
+    _camera(root / "a.jpg")
+    monkeypatch.setattr(sensors, "find_spec", lambda _: None)
+    (found,) = SensorFiles((root,), report, report, sensors.can_make_thumbnails()).find({"CAM": "a.jpg"})
+    assert found.link is not None
+    assert found.thumbnail is None
+
+
 def test_a_thumbnail_of_a_camera_takes_less_than_30_ms(root, report):
     _camera(root / "a.jpg")
     times = []

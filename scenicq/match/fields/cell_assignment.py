@@ -1,4 +1,4 @@
-"""One way through a group with fields: each points as chosen, so that the rest is linear.
+"""A group with the heading of each field chosen, which makes it linear: decided by linear programs.
 
 For each hidden point there is one map cell to choose, out of the few that are left where the point can be.
 """
@@ -31,7 +31,7 @@ from scenicq.match.problem.evaluation import holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["MARGIN", "SAME", "HeadingAssignment", "extent", "solved", "way_of"]
+__all__ = ["MARGIN", "SAME", "HeadingAssignment", "assignment_of", "extent", "solved"]
 
 MARGIN = 2e-6
 """Metres by which boxes are grown, so that rounding loses nothing."""
@@ -127,7 +127,7 @@ def _kept(rows: list[Row], *, strict: bool) -> list[Row]:
     return [replace(row, strict=row.low < row.high) for row in rows] if strict else rows
 
 
-def way_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssignment | None:
+def assignment_of(cases: BoxSet, number: int, shared: Identity | None) -> HeadingAssignment | None:
     """A case in which all choices are made, as constraints; None if a field does not point so where its point is.
 
     Args:

@@ -41,7 +41,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import conjuncts, is_leaf
 from scenicq.match.fields.constraint_network import ConstraintNetwork
-from scenicq.match.fields.interval_affine import Multiples, interval_affine_of, solved
+from scenicq.match.fields.interval_affine import IntervalAffine, cut_ranges, interval_affine_of
 from scenicq.match.fields.interval_domain import (
     Enclosure,
     angle_of,
@@ -88,7 +88,7 @@ class BoxSet:
     asked: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
     _bounds: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
     _turns: dict[int, tuple[Enclosure, Enclosure]] = field(default_factory=dict[int, "tuple[Enclosure, Enclosure]"])
-    _forms: dict[int, Multiples] = field(default_factory=dict[int, Multiples])
+    _forms: dict[int, IntervalAffine] = field(default_factory=dict[int, IntervalAffine])
 
     @classmethod
     def start(cls, network: ConstraintNetwork, ranges: Mapping[Identity, Sequence[FloatInterval]]) -> BoxSet:
@@ -181,7 +181,7 @@ class BoxSet:
             for item in self.network.items:
                 root = item[1]
                 if isinstance(item[0], Comparison) and id(root) in self._bounds:
-                    solved(self._forms[id(root)], self._bounds[id(root)], self.ranges)
+                    cut_ranges(self._forms[id(root)], self._bounds[id(root)], self.ranges)
             for node in reversed(self.network.nodes):
                 self._backward(node)
 

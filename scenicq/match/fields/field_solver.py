@@ -19,10 +19,10 @@ from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import leaves, postorder
-from scenicq.match.fields.cell_assignment import HeadingAssignment, solved, way_of
+from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_of, solved
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
-from scenicq.match.fields.heading_propagation import LimitError, directed, halved, settled
+from scenicq.match.fields.heading_propagation import LimitError, bisected, directed, propagated
 from scenicq.match.fields.probing import probed
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.problem.conditioned import Item, conditioned
@@ -123,7 +123,7 @@ def _deciding(roots: Sequence[Node]) -> list[Index]:
 def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment]:
     """The ways of cases, as the cases are found."""
     for cases in found:
-        ways = (way_of(cases, number, None) for number in range(cases.size))
+        ways = (assignment_of(cases, number, None) for number in range(cases.size))
         yield from (way for way in ways if way is not None)
 
 
@@ -161,7 +161,7 @@ def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAss
     """What is left of a way in cells that cover too much over either half of its widest range."""
     case = way.case
     try:
-        halves = [settled(half) for half in halved(case, tuple(case.network.leaves.values()))]
+        halves = [propagated(half) for half in bisected(case, tuple(case.network.leaves.values()))]
     except LimitError:
         return None
     return _ways([half for half in halves if half.size], shared)
@@ -212,5 +212,5 @@ def _within(found: Sequence[BoxSet], shared: Identity, limits: Sequence[FloatInt
 
 def _ways(found: Sequence[BoxSet], shared: Identity | None) -> list[HeadingAssignment]:
     """The cases as constraints, those first in which a linear program tells all."""
-    ways = [way_of(cases, number, shared) for cases in found for number in range(cases.size)]
+    ways = [assignment_of(cases, number, shared) for cases in found for number in range(cases.size)]
     return sorted((way for way in ways if way is not None), key=lambda way: not way.sharp)

@@ -23,7 +23,7 @@ from scenicq.geometry.regions import SLACK, PointSet, PolygonSet, PolylineSet
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
 
-__all__ = ["LimitError", "directed", "halved", "settled"]
+__all__ = ["LimitError", "bisected", "directed", "propagated"]
 
 _AT_ONCE = 256
 """Cases that are narrowed together: what one of them finds may make the others needless."""
@@ -58,7 +58,7 @@ _BEND = 0.5
 
 
 class LimitError(Exception):
-    """More cases than anyone would go through, or points that may be anywhere."""
+    """There are more cases than `_MOST_CASES`, or nothing is left that bisecting would narrow."""
 
 
 def directed(start: BoxSet) -> Iterator[BoxSet]:
@@ -73,7 +73,7 @@ def directed(start: BoxSet) -> Iterator[BoxSet]:
         seen += cases.size
         if seen > _MOST_CASES:
             raise LimitError
-        cases = settled(cases)
+        cases = propagated(cases)
         if not cases.size:
             continue
         parts = _parted(cases)
@@ -83,7 +83,7 @@ def directed(start: BoxSet) -> Iterator[BoxSet]:
             todo += parts
 
 
-def settled(cases: BoxSet) -> BoxSet:
+def propagated(cases: BoxSet) -> BoxSet:
     """The cases of which something is left, narrowed until places and headings do not narrow each other any more."""
     for _ in range(_PASSES):
         cases = _placed(cases.narrowed())
@@ -97,7 +97,7 @@ def settled(cases: BoxSet) -> BoxSet:
     return cases
 
 
-def halved(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
+def bisected(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
     """The cases with the widest range of a number, or of a coordinate of a point, halved.
 
     Args:
@@ -213,7 +213,7 @@ def _parted(cases: BoxSet) -> list[BoxSet] | None:
         return None
     sizes = {id(node): float(_extent(cases, node).max()) for node in vague}
     if min(sizes.values()) > _FAR:
-        return halved(cases, leaves(min(vague, key=lambda node: sizes[id(node)])))
+        return bisected(cases, leaves(min(vague, key=lambda node: sizes[id(node)])))
     # first which road is meant, where least of the map comes into question, then where on the bend
     near = [node for node in vague if sizes[id(node)] <= _FAR]
     turns = {id(node): float(np.ptp(cases.chosen[id(node)], axis=0).max()) for node in near}

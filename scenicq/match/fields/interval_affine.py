@@ -28,18 +28,18 @@ from scenicq.forest.nodes import (
 )
 from scenicq.match.fields.interval_domain import Enclosure, common, divide, negative, projected, rotate, subtract, times
 
-__all__ = ["Multiples", "interval_affine_of", "solved"]
+__all__ = ["IntervalAffine", "cut_ranges", "interval_affine_of"]
 
-Multiples: TypeAlias = tuple[Enclosure | None, dict[Identity, Enclosure]]
+IntervalAffine: TypeAlias = tuple[Enclosure | None, dict[Identity, Enclosure]]
 """What is not random (None if that is anything), and the factors of what is. Of one shape: intervals or boxes."""
 
 
 def interval_affine_of(
     node: Node,
-    forms: Mapping[int, Multiples],
+    forms: Mapping[int, IntervalAffine],
     bounds: Mapping[int, Enclosure],
     turns: Mapping[int, tuple[Enclosure, Enclosure]],
-) -> Multiples:
+) -> IntervalAffine:
     """The form of a node.
 
     Args:
@@ -74,7 +74,7 @@ def interval_affine_of(
     return own, {}
 
 
-def _arithmetic(node: Arithmetic, args: list[Multiples], limits: list[Enclosure | None]) -> Multiples | None:
+def _arithmetic(node: Arithmetic, args: list[IntervalAffine], limits: list[Enclosure | None]) -> IntervalAffine | None:
     match node.op:
         case ArithmeticOp.ADD:
             total = args[0]
@@ -95,7 +95,7 @@ def _arithmetic(node: Arithmetic, args: list[Multiples], limits: list[Enclosure 
             return None
 
 
-def _side_by_side(one: Multiples, other: Multiples) -> Multiples:
+def _side_by_side(one: IntervalAffine, other: IntervalAffine) -> IntervalAffine:
     (x, across), (y, along) = one, other
     if x is None or y is None:
         return None, {}
@@ -104,7 +104,7 @@ def _side_by_side(one: Multiples, other: Multiples) -> Multiples:
     return np.stack([x, y]), {key: np.stack([across.get(key, nothing), along.get(key, nothing)]) for key in keys}
 
 
-def _plus(one: Multiples, other: Multiples) -> Multiples:
+def _plus(one: IntervalAffine, other: IntervalAffine) -> IntervalAffine:
     if one[0] is None or other[0] is None:
         return None, {}
     terms = dict(one[1])
@@ -113,19 +113,19 @@ def _plus(one: Multiples, other: Multiples) -> Multiples:
     return one[0] + other[0], terms
 
 
-def _negative(form: Multiples) -> Multiples:
+def _negative(form: IntervalAffine) -> IntervalAffine:
     constant, terms = form
     return None if constant is None else negative(constant), {key: negative(by) for key, by in terms.items()}
 
 
-def _times(form: Multiples, factor: Enclosure | None) -> Multiples:
+def _times(form: IntervalAffine, factor: Enclosure | None) -> IntervalAffine:
     constant, terms = form
     if constant is None or factor is None:
         return None, {}
     return times(constant, factor), {key: times(by, factor) for key, by in terms.items()}
 
 
-def solved(form: Multiples, value: Enclosure, ranges: dict[Identity, Enclosure]) -> None:
+def cut_ranges(form: IntervalAffine, value: Enclosure, ranges: dict[Identity, Enclosure]) -> None:
     """Cut the ranges of random numbers to where a form can have a value.
 
     A box is looked at along its axes and, for each number, across the direction in which that number moves it: there

@@ -1,4 +1,4 @@
-"""Intervals and boxes by the thousand: outer bounds of the same expression in many cases at once.
+"""Intervals and boxes as arrays: outer bounds of the same expression in many cases at once.
 
 An interval is an array (2, n) of lower and upper ends, a box an array (2, 2, n): coordinate, end, case. The functions
 take either where that makes sense, and never return too little.

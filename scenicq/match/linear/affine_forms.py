@@ -34,7 +34,13 @@ VariableAxis: TypeAlias = tuple[Identity, int]
 
 @dataclass(frozen=True, slots=True)
 class Affine:
-    """A constant plus coefficients times variables; zero coefficients are left out."""
+    """A constant plus coefficients times variables.
+
+    Attributes:
+        constant: In the unit of the expression: metres, radians or a property's own.
+        terms: The coefficient of each scalar variable, and of each coordinate of a random point (axis 0 or 1); zeros
+            are left out.
+    """
 
     constant: float
     terms: dict[VariableAxis, float]

@@ -23,7 +23,13 @@ class NotSolved(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """`low <= form <= high`; a strict row must hold with a margin."""
+    """`low <= form <= high`; a strict row must hold with a margin.
+
+    Attributes:
+        form: The affine form.
+        low, high: Its bounds, in its unit; infinite where there is none.
+        strict: Whether the bounds themselves are excluded.
+    """
 
     form: Affine
     low: float

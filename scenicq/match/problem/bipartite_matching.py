@@ -68,7 +68,12 @@ class BipartiteMatching:
         return not any(self._augment(name) for name in self.options if name not in self.mate)
 
     def pin(self, slot: int, candidate: int) -> set[int]:
-        """Fix a slot on a free candidate and keep the rest matched; empty on success, else whose pins forbid it."""
+        """Fix a slot on a candidate that nothing is fixed on, and keep the rest matched.
+
+        Returns:
+            Empty on success. Else nothing has changed, and these are the slots whose pins forbid it, with the one that
+            would be left without a candidate.
+        """
         old, displaced = self.mate[slot], self.holder.get(candidate)
         self.pinned[candidate] = slot
         if old == candidate:

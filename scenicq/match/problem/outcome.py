@@ -13,14 +13,23 @@ __all__ = ["Outcome", "Refuted", "Satisfied", "Undecided"]
 
 @dataclass(frozen=True, slots=True)
 class Satisfied:
-    """The group can be satisfied, by these values of its random variables."""
+    """The group can be satisfied.
+
+    Attributes:
+        values: A witness: of each random variable that matters its number, or its point in metres.
+    """
 
     values: Mapping[Identity, Value]
 
 
 @dataclass(frozen=True, slots=True)
 class Refuted:
-    """The group cannot be satisfied; `constraint` is the one to blame, or the first of several."""
+    """The group cannot be satisfied.
+
+    Attributes:
+        constraint: The one to blame, or the first of several.
+        detail: What it comes out as and what was allowed, for a person.
+    """
 
     constraint: Constraint
     detail: str = ""
@@ -28,7 +37,12 @@ class Refuted:
 
 @dataclass(frozen=True, slots=True)
 class Undecided:
-    """Not decided, and why."""
+    """It was not decided whether the group can be satisfied.
+
+    Attributes:
+        constraint: The one to blame, or the first of several.
+        reason: As of `Unknown`.
+    """
 
     constraint: Constraint
     reason: str

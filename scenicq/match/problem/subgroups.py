@@ -11,13 +11,13 @@ import itertools
 from scenicq.forest.groups import PARAMS, Comparison, Constraint, Group, group_constraints
 from scenicq.forest.walk import features
 
-__all__ = ["parts_of"]
+__all__ = ["subgroups_of"]
 
 _MOST_ROLES = 2
 _MOST_PARTS = 300
 
 
-def parts_of(group: Group, ego: int) -> tuple[Group, ...]:
+def subgroups_of(group: Group, ego: int) -> tuple[Group, ...]:
     """The parts of a group, those about fewer objects first; none of a group about two objects or fewer.
 
     Args:

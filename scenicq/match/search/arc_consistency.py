@@ -1,4 +1,4 @@
-"""Candidates thinned out by necessary conditions, before any group is decided."""
+"""Candidates removed by necessary conditions of pairs, before any group is decided (arc consistency)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.match.search.interval_relaxation import possible
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["thinned"]
+__all__ = ["arc_consistent"]
 
 _MOST_ROLES = 2
 
 
-def thinned(
+def arc_consistent(
     plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]], problem: LabelProblem, ego: int, tolerance: Tolerance
 ) -> tuple[dict[int, tuple[int, ...]], tuple[int, GroupPlan] | None]:
     """Candidates that no group about one or two objects excludes by intervals alone (arc consistency).

@@ -13,7 +13,7 @@ from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.closed_forms import closed_form_of
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import Signature, build_groups
-from scenicq.match.problem.subgroups import parts_of
+from scenicq.match.problem.subgroups import subgroups_of
 from scenicq.match.problem.symmetry import GroupShape, interchangeable, shape_of
 
 __all__ = ["GroupPlan", "MatchPlan", "make_plan", "relevant_properties"]
@@ -102,7 +102,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         shape = shape_of(group, scenario.ego, options.tolerance)
         shapes.append(shape)
         parts: list[GroupPlan] = []
-        for part in parts_of(group, scenario.ego):
+        for part in subgroups_of(group, scenario.ego):
             small = shape_of(part, scenario.ego, options.tolerance)
             number = kinds.setdefault(small.key, len(kinds))
             parts.append(GroupPlan(part, number, small.roles, closed_form_of(part, scenario.ego)))

@@ -21,7 +21,7 @@ from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
-from scenicq.match.search.arc_consistency import thinned
+from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
 from scenicq.match.search.group_cache import Asker, GroupCache, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
@@ -35,7 +35,12 @@ __all__ = ["Failure", "LabelSearch", "Solution"]
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """A correspondence that satisfies all groups, and how each was satisfied."""
+    """A correspondence that satisfies all groups.
+
+    Attributes:
+        assignment: The number of the label object of each object of the scenario, by its index.
+        outcomes: How each group was satisfied.
+    """
 
     assignment: Mapping[int, int]
     outcomes: tuple[tuple[GroupPlan, Satisfied], ...]
@@ -176,7 +181,7 @@ class LabelSearch:
         """Candidates that pass the groups about them and the ego alone, and those for which some are undecided."""
         left = wanted
         if self.options.method == "auto" and not _easy(plan, wanted):
-            left, failed = thinned(plan, wanted, self.problem, self.scenario.ego, self.options.tolerance)
+            left, failed = arc_consistent(plan, wanted, self.problem, self.scenario.ego, self.options.tolerance)
             if failed is not None:
                 self._explain_thinning(*failed, wanted, ego)
                 return None

@@ -100,7 +100,7 @@ class Decider:
         dataset: The dataset.
         options: Of the matcher.
         solver: By name.
-        world: Compiles the program for a map; called once a map.
+        compile_map: Compiles the program for a map; called once a map.
         threads: Of the database.
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
@@ -111,13 +111,15 @@ class Decider:
     dataset: Dataset
     options: MatchOptions
     solver: str
-    world: Callable[[str], CompiledMap]
+    compile_map: Callable[[str], CompiledMap]
     threads: int | None
     all_matches: bool
     every: bool
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
-    _worlds: dict[str, tuple[CompiledMap, Matcher]] = field(default_factory=dict["str", "tuple[CompiledMap, Matcher]"])
+    _compiled: dict[str, tuple[CompiledMap, Matcher]] = field(
+        default_factory=dict["str", "tuple[CompiledMap, Matcher]"]
+    )
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
     _solver: LazySolver | None = None
@@ -142,47 +144,49 @@ class Decider:
             self._connection = self.dataset.connect(threads=self.threads, views=False)
             self._open.callback(self._connection.close)
             self._solver = self._open.enter_context(LazySolver(self.solver))
-        if block.map not in self._worlds:
-            world = self.world(block.map)
-            self._worlds[block.map] = world, Matcher(world.scenario, self.options, self._solver)
-        world, matcher = self._worlds[block.map]
+        if block.map not in self._compiled:
+            compiled = self.compile_map(block.map)
+            self._compiled[block.map] = compiled, Matcher(compiled.scenario, self.options, self._solver)
+        compiled, matcher = self._compiled[block.map]
         if block.runs:
-            return self._recordings(world, matcher, block)
-        if not world.plan.stages:
-            labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=world.motion)]
+            return self._recordings(compiled, matcher, block)
+        if not compiled.plan.stages:
+            labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=compiled.motion)]
             return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
-        missed = run_prefilter(self.dataset, self._connection, world.plan, block)
+        missed = run_prefilter(self.dataset, self._connection, compiled.plan, block)
         named = names(self.dataset, self._connection, block) if self.every else []
         if not (missed < 0).any():
             return Decided(missed, [], named)
-        if world.plan.decision and not self.all_matches:
-            return Decided(missed, self._partly_decided(world, matcher), named)
+        if compiled.plan.decision and not self.all_matches:
+            return Decided(missed, self._partly_decided(compiled, matcher), named)
         return Decided(
-            missed, self._matched(matcher, candidates(self._connection, world.plan, motion=world.motion)), named
+            missed, self._matched(matcher, candidates(self._connection, compiled.plan, motion=compiled.motion)), named
         )
 
-    def _partly_decided(self, world: CompiledMap, matcher: Matcher) -> Iterator[list[Result]]:
+    def _partly_decided(self, compiled: CompiledMap, matcher: Matcher) -> Iterator[list[Result]]:
         """The results of the frames that the prefilter has left, where SQL says that some surely match."""
         assert self._connection is not None
-        rows = decided_frames(self._connection, world.plan.decision, LABELS, world.plan.left)
+        rows = decided_frames(self._connection, compiled.plan.decision, LABELS, compiled.plan.left)
         open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
-        left = candidates(self._connection, world.plan, motion=world.motion, among=open_) if len(open_) else iter(())
+        left = (
+            candidates(self._connection, compiled.plan, motion=compiled.motion, among=open_) if len(open_) else iter(())
+        )
         asked = self._matched(matcher, left)
         proved = Match({}, {})
         for _, sure, frame, recording, time in rows:
             check_deadline(self.until)
             yield [Result(frame, recording, time, proved)] if sure else next(asked)
 
-    def _recordings(self, world: CompiledMap, matcher: Matcher, block: Block) -> Decided:
+    def _recordings(self, compiled: CompiledMap, matcher: Matcher, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
         # takes long to load
         from scenicq.query.execution.recording_matcher import RecordingMatcher, Survivors  # noqa: PLC0415
         from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
         assert self._connection is not None
-        intervals = IntervalMatcher(world.scenario, self.options, self.time, self._solver)
+        intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver)
         recordings = RecordingMatcher(self.dataset, matcher, intervals)
-        connection, plan = self._connection, world.plan
+        connection, plan = self._connection, compiled.plan
         rows: CandidateRows | None = None
         if not plan.stages:
             # recordings are of one map
@@ -190,7 +194,7 @@ class Decider:
             missed = np.full(len(every), -1, np.int16)
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
-                labels = self.dataset.labels_in(block.part, wanted, motion=world.motion)
+                labels = self.dataset.labels_in(block.part, wanted, motion=compiled.motion)
                 return (Candidate(label, None) for label in labels)
         else:
             missed = run_prefilter(self.dataset, connection, plan, block)
@@ -199,7 +203,7 @@ class Decider:
                 rows = candidate_rows(connection, plan)
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
-                return candidates(connection, plan, motion=world.motion, among=wanted)
+                return candidates(connection, plan, motion=compiled.motion, among=wanted)
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))

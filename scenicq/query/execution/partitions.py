@@ -19,7 +19,7 @@ from typing import Any, cast
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.results import Funnel
-from scenicq.query.execution.run import QueryOptions, Stretch
+from scenicq.query.execution.run import QueryOptions, RecordingRange
 from scenicq.store.atomic_files import whole_file
 from scenicq.store.dataset import Dataset
 
@@ -38,7 +38,7 @@ class Partition:
 
     number: int
     count: int
-    recordings: Mapping[str, Stretch]
+    recordings: Mapping[str, RecordingRange]
 
     @property
     def frames(self) -> int:
@@ -62,14 +62,14 @@ def partitions(dataset: Dataset, count: int) -> tuple[Partition, ...]:
         if seen * count >= total * len(cuts) or number == len(runs):
             cuts.append(number)
     pieces = [runs[low:high] for low, high in pairwise(cuts) if high > low]
-    return tuple(Partition(number, len(pieces), _stretches(piece)) for number, piece in enumerate(pieces))
+    return tuple(Partition(number, len(pieces), _ranges(piece)) for number, piece in enumerate(pieces))
 
 
-def _stretches(runs: Sequence[tuple[str, str, int]]) -> dict[str, Stretch]:
-    found: dict[str, Stretch] = {}
+def _ranges(runs: Sequence[tuple[str, str, int]]) -> dict[str, RecordingRange]:
+    found: dict[str, RecordingRange] = {}
     for name, group in groupby(runs, key=itemgetter(0)):
         inside = list(group)
-        found[name] = Stretch(inside[0][1], inside[-1][1], sum(frames for *_, frames in inside))
+        found[name] = RecordingRange(inside[0][1], inside[-1][1], sum(frames for *_, frames in inside))
     return found
 
 

@@ -34,7 +34,7 @@ from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
 from scenicq.temporal.interval_options import IntervalOptions
 
-__all__ = ["MAP_LACKS", "Query", "QueryOptions", "Stretch"]
+__all__ = ["MAP_LACKS", "Query", "QueryOptions", "RecordingRange"]
 
 MAP_LACKS = "map "
 """How the name of what excludes frames begins where it is their map; the map's follows."""
@@ -82,7 +82,7 @@ class QueryOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class RecordingRange:
     """Recordings of a map that follow each other in the order of their names.
 
     Attributes:
@@ -99,7 +99,7 @@ class Stretch:
 class _Known:
     """What a query has found out once, for it and its copies with other recordings."""
 
-    worlds: dict[str, CompiledMap] = field(default_factory=dict["str", "CompiledMap"])
+    compiled: dict[str, CompiledMap] = field(default_factory=dict["str", "CompiledMap"])
     lacking: dict[str, ScenarioError] = field(default_factory=dict["str", "ScenarioError"])
     extents: dict[str, list[Extent]] | None = None
     coverage: Coverage | None = None
@@ -121,7 +121,7 @@ class Query:
     dataset: Dataset
     source: Source
     options: QueryOptions = QueryOptions()
-    recordings: Mapping[str, Stretch] | None = None
+    recordings: Mapping[str, RecordingRange] | None = None
     funnel: Funnel = field(default_factory=Funnel)
     file: Path | None = None
     _known: _Known = field(default_factory=_Known, repr=False)
@@ -159,20 +159,20 @@ class Query:
                 )
             )
 
-    def world(self, map_name: str) -> CompiledMap:
+    def compiled_map(self, map_name: str) -> CompiledMap:
         """The scenario over one of the dataset's maps, with its prefilter; compiled once.
 
         Raises:
             ScenarioError: The program is wrong, or does not fit the map.
         """
-        worlds = self._known.worlds
-        if map_name not in worlds:
+        compiled = self._known.compiled
+        if map_name not in compiled:
             options = self.options
             how = {"prefilter": options.prefilter, "proofs": options.proofs}
-            worlds[map_name] = CompiledMap.of(*self.compile(map_name), options.match, **how)
-        return worlds[map_name]
+            compiled[map_name] = CompiledMap.of(*self.compile(map_name), options.match, **how)
+        return compiled[map_name]
 
-    def _worlds(self) -> dict[str, CompiledMap | Diagnostic]:
+    def _compiled_maps(self) -> dict[str, CompiledMap | Diagnostic]:
         """The scenario over each map, or what the map lacks; an error if it fits none."""
         self._check_ego()
         lacking = self._known.lacking
@@ -180,7 +180,7 @@ class Query:
             if name in lacking:
                 continue
             try:
-                self.world(name)
+                self.compiled_map(name)
             except ScenarioError as error:
                 if error.diagnostics[0].code != "map-lacks":
                     raise
@@ -188,12 +188,12 @@ class Query:
         if lacking and len(lacking) == len(self.dataset.maps):
             raise next(iter(lacking.values()))
         told = {name: error.diagnostics[0] for name, error in lacking.items()}
-        return {name: told.get(name) or self.world(name) for name in self.dataset.maps}
+        return {name: told.get(name) or self.compiled_map(name) for name in self.dataset.maps}
 
-    def _warn(self, worlds: Mapping[str, CompiledMap | Diagnostic]) -> None:
+    def _warn(self, compiled: Mapping[str, CompiledMap | Diagnostic]) -> None:
         """Note in the funnel what the author should know, and count the frames on maps that cannot match."""
         lacking: dict[str, list[tuple[str, Diagnostic]]] = {}
-        for name, told in worlds.items():
+        for name, told in compiled.items():
             if isinstance(told, Diagnostic):
                 # maps that lack the same are spoken of together
                 lacking.setdefault(told.message.replace(f"`{name}`", ""), []).append((name, told))
@@ -211,10 +211,10 @@ class Query:
                 f"cannot match; of `{first}`: {told.message}"
             )
             self.funnel.warnings.append(Diagnostic("map-lacks", message, hints=told.hints, severity="warning"))
-        compiled = [world for world in worlds.values() if isinstance(world, CompiledMap)]
-        if compiled:
+        fitting = [each for each in compiled.values() if isinstance(each, CompiledMap)]
+        if fitting:
             compared = self.coverage()
-            self.funnel.warnings += [*compared.warnings, *program_remarks(compiled[0].scenario)]
+            self.funnel.warnings += [*compared.warnings, *program_remarks(fitting[0].scenario)]
             self.funnel.missing.update(compared.missing)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
@@ -230,7 +230,7 @@ class Query:
         """
         for name in self.dataset.maps if maps is None else maps:
             try:
-                yield self.world(name)
+                yield self.compiled_map(name)
             except ScenarioError as error:
                 if error.diagnostics[0].code != "map-lacks":
                     raise
@@ -253,20 +253,20 @@ class Query:
             raise ScenarioError([replace(each, severity="error") for each in found.warnings])
         return found
 
-    def alone(self, recording: str, map_name: str, world: CompiledMap, match: MatchOptions) -> Query:
+    def alone(self, recording: str, map_name: str, compiled: CompiledMap, match: MatchOptions) -> Query:
         """This query of one recording, in this process, with another scenario or other options of the matcher.
 
         Args:
             recording: Its name.
             map_name: The map that it is on.
-            world: The scenario over that map, with its prefilter.
+            compiled: The scenario over that map, with its prefilter.
             match: The options.
         """
         frames = self.dataset.manifest.by_recording[recording].frames
-        known = replace(self._known, worlds={**self._known.worlds, map_name: world})
+        known = replace(self._known, compiled={**self._known.compiled, map_name: compiled})
         options = replace(self.options, match=match, jobs=1, limit=None, every=False)
-        stretch = {map_name: Stretch(recording, recording, frames)}
-        return Query(self.dataset, self.source, options, stretch, file=self.file, _known=known)
+        chosen = {map_name: RecordingRange(recording, recording, frames)}
+        return Query(self.dataset, self.source, options, chosen, file=self.file, _known=known)
 
     def frames(self, map_name: str) -> int:
         """How many frames of a map are looked at."""
@@ -280,13 +280,13 @@ class Query:
 
     def roles(self) -> tuple[str, ...]:
         """Names of the scenario's objects, of all maps that it fits."""
-        worlds = [each.scenario for each in self._worlds().values() if isinstance(each, CompiledMap)]
-        return tuple(dict.fromkeys(owner.name for scenario in worlds for owner in scenario.objects))
+        compiled = [each.scenario for each in self._compiled_maps().values() if isinstance(each, CompiledMap)]
+        return tuple(dict.fromkeys(owner.name for scenario in compiled for owner in scenario.objects))
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
-        worlds = self._worlds().items()
-        return [world.plan for name, world in worlds if isinstance(world, CompiledMap) and self.frames(name)]
+        compiled = self._compiled_maps().items()
+        return [each.plan for name, each in compiled if isinstance(each, CompiledMap) and self.frames(name)]
 
     def blocks(self, map_name: str, least: int = 1) -> list[Block]:
         """The frames of a map that are looked at, cut into blocks in the order of the store.
@@ -311,7 +311,7 @@ class Query:
             self.dataset,
             options.match,
             options.solver,
-            self.world,
+            self.compiled_map,
             threads=threads,
             all_matches=options.all_matches,
             every=options.every,
@@ -319,9 +319,9 @@ class Query:
             until=options.until,
         )
 
-    def over_time(self, world: CompiledMap) -> bool:
+    def over_time(self, compiled: CompiledMap) -> bool:
         """Whether intervals are looked for, and not frames."""
-        return world.scenario.dynamics is not None or self.options.time.min_duration_s is not None
+        return compiled.scenario.dynamics is not None or self.options.time.min_duration_s is not None
 
     def is_over_time(self) -> bool:
         """Whether the results are intervals, and not frames; the program is compiled for the first map that it fits.
@@ -329,8 +329,8 @@ class Query:
         Raises:
             ScenarioError: The program is wrong.
         """
-        world = next(self.fitting(), None)
-        return world is not None and self.over_time(world)
+        compiled = next(self.fitting(), None)
+        return compiled is not None and self.over_time(compiled)
 
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.
@@ -341,27 +341,27 @@ class Query:
         Raises:
             ScenarioError: The program is wrong or not supported.
         """
-        worlds = self._worlds()
-        self._warn(worlds)
+        compiled = self._compiled_maps()
+        self._warn(compiled)
         left, ahead = self.options.limit, FramesAhead(progress)
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
             setup = (self.dataset.address, self.source, self.options, self.file)
             executor = BlockExecutor(self.dataset, self.options.jobs, self.decider(), _start_worker, setup)
             hands = stack.enter_context(executor)
-            for name, world in worlds.items():
+            for name, there in compiled.items():
                 if not self.frames(name):
                     continue
-                if isinstance(world, Diagnostic):
-                    yield from self._lacking(name, world, ahead.taken)
+                if isinstance(there, Diagnostic):
+                    yield from self._lacking(name, there, ahead.taken)
                     continue
                 cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1)
                 merge = partial(merge_frames, every=self.options.every)
-                if self.over_time(world):
+                if self.over_time(there):
                     with closing(self.dataset.connect()) as connection:
                         cut = whole_recordings(self.dataset, connection, cut)
                     merge = partial(merge_intervals, every=self.options.every)
-                with closing(merge(world.plan, hands.decide(cut, ahead.told), self.funnel, ahead.taken)) as merged:
+                with closing(merge(there.plan, hands.decide(cut, ahead.told), self.funnel, ahead.taken)) as merged:
                     for result in merged:
                         yield result
                         if isinstance(result.verdict, Match) and left is not None:

@@ -280,7 +280,7 @@ def placed(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, Int
         raise ValueError("the result is of a frame")
     part, first, end = locate(query.dataset, result.recording)
     label = next(query.dataset.labels_at(part, first, first + 1))
-    scenario = query.world(label.map).scenario
+    scenario = query.compiled_map(label.map).scenario
     with TrackReader(query.dataset, part) as reader:
         tracks = reader.read(first, end)
     verdict = result.verdict

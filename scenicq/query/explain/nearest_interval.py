@@ -140,7 +140,7 @@ def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
     """
     recording, match = results[0].recording, query.options.match
     map_name = _map_of(query, recording)
-    world = query.world(map_name)
+    world = query.compiled_map(map_name)
     dynamics = world.scenario.dynamics
     if dynamics is None:
         return None
@@ -174,7 +174,7 @@ def _by_duration(query: Query, result: Result) -> _Near | None:
         return None
     map_name = _map_of(query, result.recording)
     shorter = replace(query, options=replace(query.options, time=replace(query.options.time, min_duration_s=enough)))
-    found = _longest(shorter, result.recording, map_name, query.world(map_name), query.options.match)
+    found = _longest(shorter, result.recording, map_name, query.compiled_map(map_name), query.options.match)
     cause = Cause("--min-duration", f"would match with --min-duration {enough:g}")
     return None if found is None else _let_through(found, wanted - enough, cause)
 
@@ -189,7 +189,7 @@ def _by_tolerance(query: Query, recording: str, enough_m: float, most_m: float) 
         most_m: Metres beyond which it does not matter.
     """
     map_name, base = _map_of(query, recording), query.options.match
-    world = query.world(map_name)
+    world = query.compiled_map(map_name)
 
     def at(tolerance: Tolerance) -> Result | None:
         match = replace(base, tolerance=tolerance)

@@ -83,10 +83,10 @@ def decision(
 def decided_frames(
     connection: duckdb.DuckDBPyConnection, statements: Sequence[str], labels: str, left: str
 ) -> list[tuple[int, bool, str, str, int]]:
-    """The frames that are left of the block that was sifted last, in order, with whether they surely match.
+    """The frames left of the block on which the prefilter was run last, in order, with whether they surely match.
 
     Args:
-        connection: The one that sifted.
+        connection: The one that `run_prefilter` was given last.
         statements: Those of `decision`.
         labels: The view of frames.
         left: SQL of the numbers of the frames that are left.

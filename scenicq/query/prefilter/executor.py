@@ -318,10 +318,10 @@ class CandidateRows:
 
 
 def candidate_rows(connection: duckdb.DuckDBPyConnection, plan: Plan) -> CandidateRows:
-    """Who may play the roles of a plan in the block that was sifted last.
+    """Who may play the roles of a plan in the block on which the prefilter was run last.
 
     Args:
-        connection: The one that sifted.
+        connection: The one that `run_prefilter` was given last.
         plan: The plan; with roles.
     """
     assert plan.roles
@@ -339,10 +339,10 @@ def candidates(
     motion: bool = False,
     among: NDArray[np.int64] | None = None,
 ) -> Iterator[Candidate]:
-    """The labels that are left of the block that was sifted last, in order.
+    """The labels that are left of the block on which the prefilter was run last, in order.
 
     Args:
-        connection: The one that sifted.
+        connection: The one that `run_prefilter` was given last.
         plan: The plan.
         motion: Whether what is computed of motion is read, too.
         among: Rows of `labels`: only these; None for all.

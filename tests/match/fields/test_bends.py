@@ -31,10 +31,10 @@ def cases(monkeypatch):
 
     def counted(some):
         counts.append(some.size)
-        return settled(some)
+        return propagated(some)
 
-    settled = heading_propagation.settled
-    monkeypatch.setattr(heading_propagation, "settled", counted)
+    propagated = heading_propagation.propagated
+    monkeypatch.setattr(heading_propagation, "propagated", counted)
     return counts
 
 

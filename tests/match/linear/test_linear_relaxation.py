@@ -1,4 +1,4 @@
-"""What linear facts say of points: rows of polygons, and boxes of what is observed."""
+"""Linear programs: rows of polygons, boxes of what is observed, and affine constraints."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from scenicq.forest.nodes import Constant, Identity, PointIn, Range, Scale, Vect
 from scenicq.geometry.regions import Rectangle
 from scenicq.match.linear.affine_forms import Affine
 from scenicq.match.linear.linear_program import Row
-from scenicq.match.linear.linear_relaxation import inside, position_boxes, solve_affine
+from scenicq.match.linear.linear_relaxation import position_boxes, solve_affine
+from scenicq.match.linear.region_rows import polygon_rows
 from scenicq.match.tolerance import Tolerance
 
 X, Y = (Identity(), 0), (Identity(), 1)
@@ -29,7 +30,7 @@ def test_the_rows_of_a_polygon_hold_inside_of_it_alone(seed):
     corners = shapely.get_coordinates(shapely.geometry.polygon.orient(hull))[:-1]
     # a corner twice makes no side
     corners = np.concatenate([corners, corners[-1:]])
-    rows = inside((Affine(1.0, {X: 2.0}), Affine(0.0, {Y: -1.0})), corners)
+    rows = polygon_rows((Affine(1.0, {X: 2.0}), Affine(0.0, {Y: -1.0})), corners)
     assert len(rows) == len(corners) - 1
     for u, v in rng.uniform(-7, 7, (60, 2)):
         place = shapely.Point(1.0 + 2.0 * u, -v)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenicq.match.options import Exhausted
-from scenicq.match.problem.bipartite_matching import Slot, matchable
+from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.search.backtracking import Consistency, find_assignments
 
 
@@ -99,18 +99,6 @@ def test_interchangeable_slots_are_tried_in_one_order_only(count, domain, clashe
     everything = {frozenset(dict(each).values()) for each in brute_force(slots, forbidden, {})}
     assert len(found) == len(set(found))
     assert set(found) == everything
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.lists(st.lists(st.integers(0, 5), max_size=4, unique=True), max_size=6))
-def test_matchable_agrees_with_enumeration(domains):
-    slots = [Slot(name, tuple(domain)) for name, domain in enumerate(domains)]
-    found = matchable(slots)
-    possible = any(len(set(values)) == len(values) for values in itertools.product(*domains))
-    assert (found is not None) == possible
-    if found is not None:
-        assert all(found[slot.name] in slot.candidates for slot in slots)
-        assert len(set(found.values())) == len(slots)
 
 
 @pytest.mark.parametrize("spare", [-1, 0, 1])

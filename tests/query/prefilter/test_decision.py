@@ -13,11 +13,12 @@ import pytest
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.scenario import BuiltIn
+from scenicq.geometry.membership import contains
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import EXACT, Tolerance
-from scenicq.match.verdict import Match
+from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.prefilter.decision import decided_frames
 from scenicq.query.prefilter.executor import blocks, extents, run_prefilter
@@ -209,6 +210,37 @@ TRIPLE = (
 )
 def test_sql_decides_only_what_it_can_say(text, decided):
     assert bool(plan_of(text, OPTIONS["default"])[0].decision) == decided
+
+
+def test_a_size_that_a_label_lacks_is_not_what_it_happens_to_be_in_sql(tmp_path):
+    """The greatest of null and 1 is 1 in SQL; the matcher takes the size that the class gives."""
+    text = f"{CAR}\nrequire max(other.width, 1) < 1.5"
+    ego = LabelObject("ego", "Car", "car", 1.75, 50.0, 0.0, 2.0, 4.5)
+    narrow = LabelObject("a", "Car", "car", 1.75, 60.0, 0.0, 1.2, 4.5)
+    labels = tuple(
+        Label(name, "r", at, "street", ego, (replace(narrow, width=width),))
+        for at, (name, width) in enumerate([("narrow", 1.2), ("unknown", None)])
+    )
+    write_dataset(tmp_path / "d", [Recording("r", "street", labels)], {"street": STREET.features}, name="d")
+    plan, matcher = plan_of(text, OPTIONS["default"])
+    assert [type(matcher.match(label)) for label in labels] == [Match, NoMatch]
+    assert sure_frames(open_dataset(tmp_path / "d"), plan)[0] == ["narrow"]
+
+
+@pytest.mark.parametrize(("further", "expected"), [(1.0, Match), (-0.05, NoMatch)])
+def test_in_an_intersection_of_regions_lies_the_place_itself(tmp_path, further, expected):
+    """Beside the road and just in view, where within tolerance the road is not in view any more."""
+    edge = next(x for x in range(4, 40) if not contains(STREET.drivableRegion, x + 0.01, 50.0))
+    ego = LabelObject("ego", "Car", "car", edge + 20.0, 50.0, math.pi / 2, 2.0, 4.5)
+    other = LabelObject("a", "Car", "car", edge + 0.1, 50.0, 0.0, 2.0, 4.5)
+    label = Label("frame", "r", 0, "street", ego, (other,))
+    text = f"ego = new Car at {ego.x} @ 50, facing 90 deg, with visibleDistance {20 + further}\n"
+    text += "other = new Car on visible road, facing 0"
+    write_dataset(tmp_path / "d", [Recording("r", "street", (label,))], {"street": STREET.features}, name="d")
+    plan, matcher = plan_of(text, OPTIONS["default"])
+    assert plan.decision
+    assert isinstance(matcher.match(label), expected)
+    assert sure_frames(open_dataset(tmp_path / "d"), plan)[0] == []
 
 
 @pytest.mark.parametrize("name", ["ahead", "view", "crossing", "range"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
 import random
 import sys
 from contextlib import closing
@@ -22,11 +21,9 @@ from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, Unknown
-from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.explain.prefilter_counts import prefilter_counts
-from scenicq.query.prefilter.executor import Extent, blocks, candidates, extents, hold, run_plan, run_prefilter
-from scenicq.query.prefilter.plan import Plan, make_plan
+from scenicq.query.prefilter.executor import blocks, extents, run_prefilter
+from scenicq.query.prefilter.plan import make_plan
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Recording
 from scenicq.store.writer import write_dataset
@@ -49,9 +46,9 @@ OPTIONS = {
 
 
 @pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Dataset:
+def dataset(program_scenes) -> Dataset:
     """Scenes of every program."""
-    return dataset_of(PROGRAMS, tmp_path_factory.mktemp("plan"))
+    return program_scenes
 
 
 @pytest.fixture(scope="module")
@@ -147,12 +144,6 @@ def test_every_step_is_named_after_the_program(dataset):
     assert all(step.span is not None for step in plan.steps)
 
 
-def sifted(dataset: Dataset, plan: Plan) -> list[int]:
-    with closing(dataset.connect()) as connection:
-        cut = blocks(extents(dataset, connection), plan.map)
-        return [number for block in cut for number in run_prefilter(dataset, connection, plan, block).tolist()]
-
-
 def test_a_hostile_map_name_stays_a_string(dataset):
     scenario = compile_scenario(Source("test.scenic", HEADER + "ego = new Car"), STREET)
     plan = make_plan(scenario, STREET, MatchOptions(tolerance=EXACT))
@@ -166,99 +157,6 @@ def test_a_hostile_map_name_stays_a_string(dataset):
         for block in whole:
             assert len(run_prefilter(dataset, connection, hostile, replace(block, map=hostile.map))) == 0
         assert connection.execute("SELECT count(*) FROM labels").fetchall() == [(dataset.manifest.total.frames,)]
-
-
-def test_the_steps_add_up_to_what_is_left(dataset):
-    text = "ego = new Car\nother = new Car ahead of ego by Range(4, 10)\nrequire (distance to other) < 9"
-    query = Query(dataset, Source("test.scenic", HEADER + text))
-    (surveyed,) = prefilter_counts(query)
-    left = surveyed.left
-    assert left[0] == surveyed.estimated[0] == dataset.manifest.total.frames
-    assert list(left) == sorted(left, reverse=True)
-    missed = sifted(dataset, surveyed.plan)
-    assert left[-1] == missed.count(-1)
-    for number in range(len(surveyed.plan.steps)):
-        assert left[number] - left[number + 1] == missed.count(number)
-
-
-def test_blocks_that_are_held_together_are_sifted_as_each_alone(dataset):
-    text = "ego = new Car on road\nother = new Car ahead of ego by Range(4, 10)\nrequire (distance to other) < 9"
-    query = Query(dataset, Source("test.scenic", HEADER + text))
-    (plan,) = query.plans()
-    (whole,) = query.blocks(plan.map)
-    cut = [replace(whole, first=first, end=min(first + 7, whole.end)) for first in range(0, whole.end, 14)]
-    with closing(dataset.connect()) as connection:
-        missed = [number for block in cut for number in run_prefilter(dataset, connection, plan, block).tolist()]
-        frames = [
-            each.label.frame
-            for block in cut
-            if (run_prefilter(dataset, connection, plan, block) < 0).any()
-            for each in candidates(connection, plan)
-        ]
-    with closing(dataset.connect(threads=1, views=False)) as connection:
-        assert hold(dataset, connection, cut) == len(missed)
-        for _ in range(2):  # as often as one likes
-            assert run_plan(connection, plan).tolist() == missed
-            assert [each.label.frame for each in candidates(connection, plan)] == frames
-    assert frames
-
-
-@pytest.mark.parametrize(("options", "read"), [(MatchOptions(), False), (MatchOptions(ego="any"), True)])
-def test_objects_that_can_play_no_role_are_not_read(dataset, options, read):
-    query = Query(dataset, Source("test.scenic", HEADER + "ego = new Car on road"), QueryOptions(options))
-    (plan,) = query.plans()
-    (block,) = query.blocks(plan.map)
-    with closing(dataset.connect()) as connection:
-        run_prefilter(dataset, connection, plan, block)
-        labels = [each.label for each in candidates(connection, plan)]
-    assert labels
-    assert any(label.objects for label in labels) is read
-    matching = {each.frame for each in query.results()}
-    assert matching
-    without = Query(dataset, query.source, QueryOptions(options, prefilter=False))
-    assert matching == {each.frame for each in without.results()}
-
-
-def test_blocks_cover_every_frame_once(dataset):
-    frames = dataset.manifest.total.frames
-    where = {"street": [Extent(0, 0, frames, ("recording", "recording")), Extent(1, 10, 9_000, ("s", "t"))]}
-    for least in (1, 2, 7):
-        cut = blocks(where, "street", least=least)
-        rows = [(block.part, row) for block in cut for row in range(block.first, block.end)]
-        assert rows == [(0, row) for row in range(frames)] + [(1, row) for row in range(10, 9_000)]
-    assert len(blocks(where, "street", least=100)) <= 6
-    assert {block.part for block in blocks(where, "street", ("a", "recording"))} == {0}
-    assert blocks(where, "elsewhere") == []
-
-
-@pytest.mark.parametrize("jobs", [1, 2, None])
-def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
-    monkeypatch.setattr("scenicq.query.execution.block_executor.as_many_as_pay", lambda: 2)
-    monkeypatch.setattr("scenicq.query.execution.block_executor._PAYS_S", 0.0)
-    monkeypatch.setattr("scenicq.query.prefilter.executor._FEWEST_FRAMES", 20)
-    monkeypatch.setattr("scenicq.query.prefilter.executor._MOST_FRAMES", 40)
-    source = Source("test.scenic", HEADER + TIED["ahead of another"])
-    whole = Query(dataset, source, QueryOptions(every=True, solver="portable"))
-    expected = [record(result) for result in whole.results()]
-    assert [row["frame"] for row in expected] == [label.frame for label in dataset.labels()]
-    assert len(whole.blocks("street")) > 3
-    query = Query(dataset, source, QueryOptions(every=True, solver="portable", jobs=jobs))
-    assert [record(result) for result in query.results()] == expected
-    assert query.funnel == whole.funnel
-
-
-@pytest.mark.parametrize("pays", [True, False])
-def test_processes_are_started_once_it_is_clear_that_it_takes_long(dataset, pays, monkeypatch):
-    monkeypatch.setattr("scenicq.query.prefilter.executor._FEWEST_FRAMES", 20)
-    monkeypatch.setattr("scenicq.query.execution.block_executor.as_many_as_pay", lambda: 2)
-    monkeypatch.setattr("scenicq.query.execution.block_executor._PAYS_S", 0.0 if pays else 3600.0)
-    query = Query(dataset, Source("test.scenic", HEADER + TIED["near another"]), QueryOptions(every=True, jobs=None))
-    processes = []
-    for _ in query.results():
-        processes.append(len(multiprocessing.active_children()))
-    assert processes[0] == 0
-    assert max(processes) == (2 if pays else 0)
-    assert len(processes) == dataset.manifest.total.frames
 
 
 def test_a_field_that_is_not_the_direction_of_roads_is_not_taken_for_it(tmp_path):

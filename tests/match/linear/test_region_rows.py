@@ -12,7 +12,8 @@ from shapely import LineString
 from scenicq.forest.nodes import PointIn
 from scenicq.geometry.membership import contains
 from scenicq.geometry.regions import IntersectionOf, PolylineSet, Sector
-from scenicq.match.linear.linear_relaxation import NotLinear, solve_affine
+from scenicq.match.linear.linear_program import NotLinear
+from scenicq.match.linear.linear_relaxation import solve_affine
 from scenicq.match.tolerance import parse_tolerance
 
 NEAR = parse_tolerance("position=0.01")

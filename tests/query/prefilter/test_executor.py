@@ -1,0 +1,71 @@
+"""Blocks: every frame is in one, and what is run on several together is what is run on each."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import replace
+
+import pytest
+from programs import HEADER
+
+from scenicq.errors import Source
+from scenicq.match.options import MatchOptions
+from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.query.prefilter.executor import Extent, blocks, candidates, hold, run_plan, run_prefilter
+from scenicq.store.dataset import Dataset
+
+
+@pytest.fixture(scope="module")
+def dataset(program_scenes) -> Dataset:
+    """Scenes of every program."""
+    return program_scenes
+
+
+def test_blocks_that_are_held_together_are_sifted_as_each_alone(dataset):
+    text = "ego = new Car on road\nother = new Car ahead of ego by Range(4, 10)\nrequire (distance to other) < 9"
+    query = Query(dataset, Source("test.scenic", HEADER + text))
+    (plan,) = query.plans()
+    (whole,) = query.blocks(plan.map)
+    cut = [replace(whole, first=first, end=min(first + 7, whole.end)) for first in range(0, whole.end, 14)]
+    with closing(dataset.connect()) as connection:
+        missed = [number for block in cut for number in run_prefilter(dataset, connection, plan, block).tolist()]
+        frames = [
+            each.label.frame
+            for block in cut
+            if (run_prefilter(dataset, connection, plan, block) < 0).any()
+            for each in candidates(connection, plan)
+        ]
+    with closing(dataset.connect(threads=1, views=False)) as connection:
+        assert hold(dataset, connection, cut) == len(missed)
+        for _ in range(2):  # as often as one likes
+            assert run_plan(connection, plan).tolist() == missed
+            assert [each.label.frame for each in candidates(connection, plan)] == frames
+    assert frames
+
+
+@pytest.mark.parametrize(("options", "read"), [(MatchOptions(), False), (MatchOptions(ego="any"), True)])
+def test_objects_that_can_play_no_role_are_not_read(dataset, options, read):
+    query = Query(dataset, Source("test.scenic", HEADER + "ego = new Car on road"), QueryOptions(options))
+    (plan,) = query.plans()
+    (block,) = query.blocks(plan.map)
+    with closing(dataset.connect()) as connection:
+        run_prefilter(dataset, connection, plan, block)
+        labels = [each.label for each in candidates(connection, plan)]
+    assert labels
+    assert any(label.objects for label in labels) is read
+    matching = {each.frame for each in query.results()}
+    assert matching
+    without = Query(dataset, query.source, QueryOptions(options, prefilter=False))
+    assert matching == {each.frame for each in without.results()}
+
+
+def test_blocks_cover_every_frame_once(dataset):
+    frames = dataset.manifest.total.frames
+    where = {"street": [Extent(0, 0, frames, ("recording", "recording")), Extent(1, 10, 9_000, ("s", "t"))]}
+    for least in (1, 2, 7):
+        cut = blocks(where, "street", least=least)
+        rows = [(block.part, row) for block in cut for row in range(block.first, block.end)]
+        assert rows == [(0, row) for row in range(frames)] + [(1, row) for row in range(10, 9_000)]
+    assert len(blocks(where, "street", least=100)) <= 6
+    assert {block.part for block in blocks(where, "street", ("a", "recording"))} == {0}
+    assert blocks(where, "elsewhere") == []
