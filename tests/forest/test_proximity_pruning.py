@@ -54,7 +54,7 @@ def around(place, radius):
     return shapely.Point(place).buffer(radius, quad_segs=32)
 
 
-@pytest.mark.parametrize("radius", [3.0, 8.0, 25.0])
+@pytest.mark.parametrize("radius", [0.8, 3.0, 8.0, 25.0])
 @pytest.mark.parametrize("region", [LINES, AREAS], ids=["lines", "areas"])
 def test_no_window_holds_more_than_the_limit_which_is_no_idle_one(region, radius):
     window = Window(Constant((0.0, 0.0)), region, radius)

@@ -314,3 +314,14 @@ def test_a_worker_that_is_killed_is_replaced(monkeypatch):
         assert found.reason == "crash"
     with WorkerSolver() as solver:
         assert isinstance(Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(frame(THERE)), Match)
+
+
+def test_what_the_baseline_cannot_say_is_blamed_on_the_first_constraint(monkeypatch):
+    def refused(*_):
+        raise CannotEvaluate("no words for it")
+
+    monkeypatch.setattr(Matcher, "ask", refused)
+    program = "ego = new Car\nother = new Car offset by (Range(-1, 1), 8), facing Range(-5, 5) deg\n"
+    found = verdict(program, frame(car("a", 1.75, 58.0)), method="monolithic")
+    assert isinstance(found, Unknown)
+    assert found.cause.what == "ego.position"

@@ -14,7 +14,7 @@ from scenicq.forest.walk import leaves
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
-from scenicq.match.tolerance import EXACT
+from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.solver import open_solver
 
@@ -140,3 +140,28 @@ def test_a_scene_pushed_out_of_the_support_does_not_match(name, solver):
         label = label_of(scenario, replace(scene, values=values), random.Random(seed))
         verdict = Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(label)
         assert isinstance(verdict, NoMatch), (seed, verdict)
+
+
+@pytest.mark.parametrize("cars", [3, 4])
+def test_a_row_is_found_among_cars_that_are_a_little_beside_it(cars):
+    """Each decoy fits by itself: only what the cars share tells, and a part of the row before all of it."""
+    program = "ego = new Car\nshift = Range(-2, 2)\nlast = ego\n"
+    program += f"for i in range({cars}):\n    last = new Car at last offset by shift @ 8\n"
+    scenario = compiled(HEADER + program)
+    matcher = Matcher(scenario, MatchOptions(tolerance=Tolerance(position=0.1)))
+    for seed in range(6):
+        rng = random.Random(seed)
+        label = label_of(scenario, drawn(scenario, seed), rng)
+        near = [
+            replace(each, id=f"{each.id}-{number}", x=each.x + rng.uniform(0.3, 1.7) * rng.choice([-1, 1]))
+            for each in label.objects
+            for number in range(2)
+        ]
+        among = rng.sample([*near, *label.objects], len(near) + len(label.objects))
+        found = matcher.match(replace(label, objects=tuple(among)))
+        assert isinstance(found, Match)
+        assert len({*found.correspondence.values()}) == cars + 1
+        # without one of the right ones the others do not do
+        left = [each for each in among if each.id != f"object-{1 + seed % cars}"]
+        assert isinstance(matcher.match(replace(label, objects=tuple(left))), NoMatch)
+    assert any(group.parts for plan in matcher.plans.plans.values() for group in plan.joint)

@@ -130,8 +130,7 @@ class _Prover:
     def group(self, group: Group) -> SufficientCondition:
         """What proves a group."""
         objects = tuple(index for index in group.objects if index != self.scenario.ego)
-        if len(objects) > 2:
-            raise _OpenError
+        # of a third object there are no columns
         bounds, texts, places, chosen = self.reader.of(objects), list[str](), list[tuple[int, str]](), 0
         for constraint in group.constraints:
             texts += self._observed(constraint, bounds)
