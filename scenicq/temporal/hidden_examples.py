@@ -27,7 +27,7 @@ from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.runs import Run
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Example", "Examples", "Outcome", "Remembered", "examine_start"]
+__all__ = ["Example", "ExampleOutcome", "Examples", "Remembered", "examine_start"]
 
 Remembered = tuple[Label, Mapping[str, str]]
 """The label of a start, and its correspondence."""
@@ -76,7 +76,7 @@ class Example:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class ExampleOutcome:
     """What some values make of a run, with an example of them."""
 
     run: Run
@@ -110,12 +110,12 @@ class Examples:
     found: list[Example] = field(default_factory=list[Example])
     _asked: int = 0
 
-    def outcomes(self) -> list[Outcome] | None:
+    def outcomes(self) -> list[ExampleOutcome] | None:
         """All that becomes of the run, of which some may be unknown; None without an example."""
         certain = self._certain()
         if certain is None:
             return None
-        found: list[Outcome] = []
+        found: list[ExampleOutcome] = []
         cases: list[_Case] = [(certain, (), self.found[:])]
         while cases:
             look()
@@ -123,7 +123,7 @@ class Examples:
             run = self.decide(known)
             place = None if run.truth != UNKNOWN else self._open_place(known, examples[0])
             if place is None:
-                found.append(Outcome(run, examples[0]))
+                found.append(ExampleOutcome(run, examples[0]))
                 continue
             for truth in (FALSE, TRUE):
                 further = (*assumed, self._that(*place, holds=bool(truth == TRUE)))
@@ -137,7 +137,7 @@ class Examples:
                     more[number][sample] = truth
                     cases.append((more, further, fit))
                 elif answer is not False:
-                    found.append(Outcome(run, examples[0]))
+                    found.append(ExampleOutcome(run, examples[0]))
         return found
 
     def _open_place(self, known: Mapping[int, Truth], example: Example) -> _Place | None:

@@ -20,7 +20,7 @@ from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
 from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
-from scenicq.temporal.hidden_examples import Examples, Outcome, Remembered, examine_start
+from scenicq.temporal.hidden_examples import ExampleOutcome, Examples, Remembered, examine_start
 from scenicq.temporal.run_columns import RunColumns, Runs
 from scenicq.temporal.runs import Run
 from scenicq.temporal.stretches import Stretches
@@ -176,7 +176,7 @@ class HiddenRuns:
             return self._run(one, columns, expanded, known)
 
         asked = Examples(self.scenario, self.match, self.solver, start, columns, hanging, first, decide)
-        outcomes: list[Outcome] | None = None
+        outcomes: list[ExampleOutcome] | None = None
         try:
             with limited(self.match.timeout_s):
                 outcomes = asked.outcomes()
@@ -185,7 +185,7 @@ class HiddenRuns:
         if outcomes and all(each.run.truth == FALSE for each in outcomes):
             return [(max((each.run for each in outcomes), key=lambda run: (run.cut_off, run.end)), ("", {}))]
         # an example is a proof, whatever else there may be
-        outcomes = [*(outcomes or ()), *(Outcome(decide(each.truth), each) for each in asked.found)]
+        outcomes = [*(outcomes or ()), *(ExampleOutcome(decide(each.truth), each) for each in asked.found)]
         proven = [(each.run, ("", each.example.witness)) for each in outcomes if each.run.truth == TRUE]
         proven.sort(key=lambda each: -each[0].end)
         none = Run(first, len(one.labels) - 1, int(UNKNOWN)), (unclear, dict[str, WitnessValue]())

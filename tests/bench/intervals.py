@@ -127,13 +127,18 @@ def main() -> None:
                     "frames": frames, "question": name, "matches": matches, "unknowns": query.funnel.unknowns,
                     "candidates": query.funnel.candidates, "bindings": query.funnel.over_time["bindings"],
                     "wall_s": round(time.monotonic() - began, 2), "cpu_s": round(_cpu() - cpu, 2),
-                    "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+                    "peak_mb": _peak_mb(resource.RUSAGE_SELF), "worker_peak_mb": _peak_mb(resource.RUSAGE_CHILDREN),
                 }  # fmt: skip
                 found.append(row)
                 print("  " + "  ".join(f"{key} {value}" for key, value in row.items() if key != "frames"))
     results = Path("bench-results")
     results.mkdir(exist_ok=True)
     (results / "intervals.json").write_text(json.dumps({"processors": os.cpu_count(), "rows": found}, indent=1) + "\n")
+
+
+def _peak_mb(who: int) -> int:
+    """The most memory that this process, or any of those that have ended, has had."""
+    return round(resource.getrusage(who).ru_maxrss / 1024)
 
 
 def _cpu() -> float:

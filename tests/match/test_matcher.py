@@ -177,6 +177,24 @@ def test_objects_that_must_not_touch_are_still_interchangeable():
     assert isinstance(crowd.match(frame(*things, replace(things[0], id="x", y=100.0))), Match)
 
 
+@pytest.mark.parametrize(
+    ("said", "count"),
+    [
+        ("(distance from a to b) < 40", 1),
+        ("abs(relative heading of a from b) < 10 deg", 1),
+        ("(distance to a) < 90 and (distance to b) < 90", 1),
+        ("a.position.x + b.position.x > -99 or False", 1),
+        ("(distance to a) < 90", 2),
+        ("b.position.y - a.position.y < 90", 2),
+        ("(distance to a) < 90 and (distance to b) < 80", 2),
+    ],
+)
+def test_objects_are_interchangeable_where_exchanging_them_says_the_same(said, count):
+    scenario = compiled(HEADER + f"ego = new Car\na = new Car\nb = new Car\nrequire {said}")
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
+    assert len(list(matcher.matches(frame(car("a", 1.75, 62.0), car("b", 1.75, 70.0))))) == count
+
+
 # --- requirements over what is not observed
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -261,10 +262,32 @@ def random_trace(draw: random.Random, *, gaps: bool) -> Trace:
     return trace
 
 
+def said(program: Program, exchanged: dict[str, str]) -> list[object]:
+    """What a program says with some roles put for others, in an order that does not hang on how it is written."""
+
+    def atom(condition: Condition) -> str:
+        words = [exchanged.get(word, word) for word in re.split(r"\b", condition.text)]
+        text = "".join(words)
+        return re.sub(r"from (\w+) to (\w+)", lambda m: "between {} and {}".format(*sorted(m.groups())), text)
+
+    def form(formula: Formula) -> str:
+        kind, *parts = formula
+        if kind == "atom":
+            return atom(parts[0])
+        if kind == "implies":
+            return form(("or", ("not", parts[0]), parts[1]))
+        told = [form(part) for part in parts]
+        return f"({kind} {' '.join(sorted(told) if kind in ('and', 'or') else told)})"
+
+    monitors = [f"{kind} {[atom(each) for each in atoms]}" for kind, atoms in program.monitors]
+    requirements, ends = [form(each) for each in program.requirements], [atom(each) for each in program.ends]
+    return [*map(sorted, (requirements, ends, monitors)), None if program.start is None else atom(program.start)]
+
+
 def bindings(program: Program, trace: Trace) -> list[dict[str, str]]:
     """Every way to give roles distinct tracks; of roles that nothing tells apart in one order only."""
     tracks = sorted({track for sample in trace for track in sample.seen} - {"ego"})
-    told_apart = program.atoms or program.start is not None
+    told_apart = said(program, {}) != said(program, {"a": "b", "b": "a"})
     ways = itertools.permutations if told_apart else itertools.combinations
     return [
         {"ego": "ego", **dict(zip(program.roles, chosen, strict=True))} for chosen in ways(tracks, len(program.roles))

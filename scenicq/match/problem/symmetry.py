@@ -6,13 +6,32 @@ same label objects, holds for all; and objects that can be swapped need be tried
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import cast
 
 from scenicq.forest.groups import PARAMS, Comparison, Group
-from scenicq.forest.nodes import Arithmetic, Compare, Constant, Coordinate, Feature, Identity, Index, Logic, Node
-from scenicq.forest.scenario import BuiltIn, Scenario
-from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Compare,
+    CompareOp,
+    Constant,
+    Coordinate,
+    Feature,
+    Identity,
+    Index,
+    Intersects,
+    Logic,
+    Node,
+    Norm,
+    Scale,
+    VectorSum,
+)
+from scenicq.forest.scenario import Scenario
+from scenicq.forest.temporal import And, Atom, Dynamics, Formula, Goto, MonitorStep, Or, Test, Wait, operands
+from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["GroupShape", "interchangeable", "shape_of"]
@@ -25,12 +44,10 @@ class GroupShape:
     Attributes:
         key: Equal for groups that ask the same question of their roles.
         roles: The objects of this group in the order in which the question speaks of them, the ego left out.
-        symmetric: Whether the roles may be permuted.
     """
 
     key: Hashable
     roles: tuple[int, ...]
-    symmetric: bool = False
 
 
 def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
@@ -74,50 +91,157 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
             else None
         )
         heads.append((about, numbers[id(item.expression)]))
-    symmetric = all(
-        not isinstance(item, Comparison) and item.requirement.built_in is BuiltIn.COLLISION
-        for item in group.constraints
-    )
-    return GroupShape((tuple(rows), tuple(heads)), tuple(roles), symmetric)
+    return GroupShape((tuple(rows), tuple(heads)), tuple(roles))
 
 
-def _signed(shape: GroupShape, swap: Mapping[int, int]) -> tuple[Hashable, tuple[int, ...]]:
-    roles = tuple(swap.get(index, index) for index in shape.roles)
-    return shape.key, tuple(sorted(roles)) if shape.symmetric else roles
-
-
-def interchangeable(scenario: Scenario, shapes: Sequence[GroupShape]) -> Mapping[int, int]:
+def interchangeable(
+    scenario: Scenario, groups: Sequence[Group], shapes: Sequence[GroupShape], tolerance: Tolerance
+) -> Mapping[int, int]:
     """Interchangeable objects: for each, the one before it that swapping with changes nothing.
 
-    Two objects are interchangeable if they are of one class and swapping them maps the shapes of all groups onto
-    themselves.
+    Two objects are interchangeable if they are of one class and swapping them leaves some groups, and what the
+    scenario says about time, as they are, and maps the shapes of all other groups onto themselves.
     """
-    involved: dict[int, list[GroupShape]] = {}
-    for shape in shapes:
+    involved: dict[int, list[int]] = {}
+    for number, shape in enumerate(shapes):
         for index in shape.roles:
-            involved.setdefault(index, []).append(shape)
+            involved.setdefault(index, []).append(number)
+    swaps = _Swaps(scenario.dynamics, groups, shapes, tolerance)
     last: dict[Hashable, int] = {}
     found: dict[int, int] = {}
     for owner in scenario.objects:
         if owner.index == scenario.ego:
             continue
         own = involved.get(owner.index, [])
-        key = (owner.category, frozenset(shape.key for shape in own), len(own))
+        key = (owner.category, frozenset(shapes[number].key for number in own), len(own))
         earlier = last.get(key)
-        if earlier is not None and _swappable(owner.index, earlier, [*own, *involved.get(earlier, [])]):
+        if earlier is not None and swaps.possible(owner.index, earlier, {*own, *involved.get(earlier, [])}):
             found[owner.index] = earlier
         last[key] = owner.index
     return found
 
 
-def _swappable(one: int, other: int, shapes: Sequence[GroupShape]) -> bool:
-    plain = sorted(map(hash, (_signed(shape, {}) for shape in shapes)))
-    swapped = [_signed(shape, {one: other, other: one}) for shape in shapes]
-    if plain != sorted(map(hash, swapped)):
-        return False
-    rest = [_signed(shape, {}) for shape in shapes]
-    for each in swapped:
-        if each not in rest:
+@dataclass(frozen=True, slots=True)
+class _Swaps:
+    """Tells which objects may be swapped."""
+
+    dynamics: Dynamics | None
+    groups: Sequence[Group]
+    shapes: Sequence[GroupShape]
+    tolerance: Tolerance
+
+    def possible(self, one: int, other: int, about: Collection[int]) -> bool:
+        """Whether two objects may be swapped, which some groups are about."""
+        forms, swap = _Forms(), {one: other, other: one}
+        left = [number for number in about if not self._is_unchanged(self.groups[number], forms, swap)]
+        plain = Counter((self.shapes[number].key, self.shapes[number].roles) for number in left)
+        swapped = Counter(
+            (self.shapes[number].key, tuple(swap.get(index, index) for index in self.shapes[number].roles))
+            for number in left
+        )
+        if plain != swapped:
             return False
-        rest.remove(each)
-    return True
+        if self.dynamics is None:
+            return True
+        # with the groups that are left, their random variables are swapped, too
+        moved = {leaf.identity for number in left for leaf in self.groups[number].variables}
+        if any(leaf.identity in moved for leaf in leaves(*self.dynamics.conditions)):
+            return False
+        return forms.over_time(self.dynamics, {}) == forms.over_time(self.dynamics, swap)
+
+    def _is_unchanged(self, group: Group, forms: _Forms, swap: Mapping[int, int]) -> bool:
+        return self._form(group, forms, {}) == self._form(group, forms, swap)
+
+    def _form(self, group: Group, forms: _Forms, swap: Mapping[int, int]) -> Hashable:
+        items: Counter[Hashable] = Counter()
+        for item in group.constraints:
+            about: Hashable = None
+            if isinstance(item, Comparison):
+                scope = self.tolerance.scope(item.object, item.property)
+                about = (swap.get(item.object, item.object), item.property, scope)
+            items[about, forms.expression(item.expression, swap)] += 1
+        return frozenset(items.items())
+
+
+@dataclass(frozen=True, slots=True)
+class _Forms:
+    """Gives expressions numbers: equal ones mean the same, whatever the order of what has none."""
+
+    _numbers: dict[Hashable, int] = field(default_factory=dict["Hashable", int])
+
+    def _number(self, form: Hashable) -> int:
+        return self._numbers.setdefault(form, len(self._numbers))
+
+    def expression(self, root: Node, swap: Mapping[int, int]) -> int:
+        """The number of an expression with some objects put for others; random variables stay themselves."""
+        numbers: dict[int, int] = {}
+        for node in postorder([root]):
+            below = [numbers[id(child)] for child in children(node)]
+            own: Hashable = None
+            match node:
+                case Constant():
+                    own = (type(node.value).__name__, node.value)
+                case Feature():
+                    own = (swap.get(node.object, node.object), node.property, node.current)
+                case Norm(vector=VectorSum(left, Scale(right, Constant(-1)))):
+                    below = sorted((numbers[id(left)], numbers[id(right)]))
+                case Arithmetic(ArithmeticOp.ABS, (Arithmetic(ArithmeticOp.WRAP, (inner,)),)) if _is_difference(inner):
+                    below = sorted(numbers[id(child)] for child in children(inner))
+                case Arithmetic(op=ArithmeticOp.ADD | ArithmeticOp.MUL | ArithmeticOp.MIN | ArithmeticOp.MAX):
+                    own, below = node.op, sorted(below)
+                case Logic() | Compare(op=CompareOp.EQ | CompareOp.NE):
+                    own, below = node.op, sorted(below)
+                case Arithmetic() | Compare():
+                    own = node.op
+                case VectorSum() | Intersects():
+                    below = sorted(below)
+                case Coordinate():
+                    own = node.axis
+                case _ if is_leaf(node):
+                    own = node.identity  # type: ignore[union-attr]
+                case _:
+                    pass
+            numbers[id(node)] = self._number((type(node).__name__, cast("Hashable", own), tuple(below)))
+        return numbers[id(root)]
+
+    def over_time(self, dynamics: Dynamics, swap: Mapping[int, int]) -> Hashable:
+        """All that is said about time, with some objects put for others."""
+        atoms = [self.expression(condition, swap) for condition in dynamics.conditions]
+        said: Counter[Hashable] = Counter()
+        for requirement in dynamics.requirements:
+            said["require", self._formula(requirement.formula, atoms)] += 1
+        for each in dynamics.terminations:
+            said["terminate", None if each.condition is None else atoms[each.condition.number], each.after_s] += 1
+        for monitor in dynamics.monitors:
+            steps = tuple(_step(step, atoms) for step in monitor.steps)
+            said["monitor", steps] += 1
+        return frozenset(said.items())
+
+    def _formula(self, root: Formula, atoms: Sequence[int]) -> int:
+        order: list[Formula] = []
+        stack = [root]
+        while stack:
+            order.append(stack.pop())
+            stack.extend(operands(order[-1]))
+        numbers: dict[int, int] = {}
+        for node in reversed(order):
+            below = [numbers[id(part)] for part in operands(node)]
+            if isinstance(node, And | Or):
+                below.sort()
+            own = atoms[node.number] if isinstance(node, Atom) else None
+            numbers[id(node)] = self._number((type(node).__name__, own, tuple(below)))
+        return numbers[id(root)]
+
+
+def _is_difference(node: Node) -> bool:
+    return isinstance(node, Arithmetic) and node.op is ArithmeticOp.SUB
+
+
+def _step(step: MonitorStep, atoms: Sequence[int]) -> Hashable:
+    match step:
+        case Test():
+            return "test", atoms[step.condition.number], step.then, step.otherwise
+        case Goto() | Wait():
+            return type(step).__name__, step.then
+        case _:
+            return type(step).__name__

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
-from scenicq.forest.groups import Condition, Group
+from scenicq.forest.groups import Group
 from scenicq.forest.interpret import Steps, steps_of
-from scenicq.forest.scenario import BuiltIn, Requirement, Scenario
+from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.forest.walk import features
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.closed_forms import closed_form_of
@@ -78,14 +78,6 @@ def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[froz
     return tuple(frozenset(used[owner.index]) for owner in scenario.objects)
 
 
-def _over_time(scenario: Scenario, options: MatchOptions) -> list[GroupShape]:
-    """The shape of all that is said about time together, so that objects it tells apart are not interchangeable."""
-    if scenario.dynamics is None or not scenario.dynamics.conditions:
-        return []
-    conditions = [Condition(Requirement(node, node.span), node) for node in scenario.dynamics.conditions]
-    return [shape_of(Group(tuple(conditions), (), ()), scenario.ego, options.tolerance)]
-
-
 def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, kinds: dict[Hashable, int]) -> MatchPlan:
     """Analyse a scenario for what is observed.
 
@@ -98,7 +90,8 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
     shapes: list[GroupShape] = []
     groups: list[GroupPlan] = []
     links: dict[int, set[int]] = {}
-    for group in build_groups(scenario, signature, options):
+    built = build_groups(scenario, signature, options)
+    for group in built:
         shape = shape_of(group, scenario.ego, options.tolerance)
         shapes.append(shape)
         parts: list[GroupPlan] = []
@@ -116,7 +109,6 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         for roles in paired if chained else [shape.roles]:
             for index in roles:
                 links.setdefault(index, set()).update(roles)
-    shapes += _over_time(scenario, options)
     unary: dict[int, list[GroupPlan]] = {}
     for each in groups:
         if len(each.roles) == 1:
@@ -126,7 +118,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         tuple(each for each in groups if not each.roles),
         {index: tuple(found) for index, found in unary.items()},
         tuple(each for each in groups if len(each.roles) > 1),
-        interchangeable(scenario, shapes),
+        interchangeable(scenario, built, shapes, options.tolerance),
         {index: frozenset(others - {index}) for index, others in links.items()},
         signature,
     )
