@@ -35,6 +35,7 @@ _OVERLAP = 1e-6
 """Square metres that two elements may share without counting as overlapping."""
 _KEPT = 4096
 _KEPT_CELLS = 16
+_KEPT_TOGETHER = 256
 
 OptionArea: TypeAlias = tuple[Shape, int, int]
 """An area, the number of the option that is found in it, and whose area it is: an owner is found once at a point."""
@@ -102,6 +103,16 @@ class Occupancy:
             if len(self._known) >= _KEPT:
                 self._known.clear()
             known = self._known[x, y] = self._find(x, y)
+        return known
+
+    def at_many(self, xy: NDArray[np.float64]) -> list[tuple[int, ...]]:
+        """`at` for points of shape (n, 2): the same points are asked for once for each rank, and for each condition."""
+        key = xy.tobytes()
+        known = self._known_together.get(key)
+        if known is None:
+            if len(self._known_together) >= _KEPT_TOGETHER:
+                self._known_together.clear()
+            known = self._known_together[key] = [self.at(x, y) for x, y in xy.tolist()]
         return known
 
     def _find(self, x: float, y: float) -> tuple[int, ...]:
@@ -265,6 +276,10 @@ class Occupancy:
     def _known(self) -> dict[tuple[float, float], tuple[int, ...]]:
         return {}
 
+    @cached_property
+    def _known_together(self) -> dict[bytes, list[tuple[int, ...]]]:
+        return {}
+
     @staticmethod
     def _overlap(one: Shape, other: Shape) -> bool:
         return shapes.intersection(one, other).area > _OVERLAP
@@ -286,6 +301,11 @@ class Ranked:
         """The angle that stands for the option at a point."""
         found = self.options.at(x, y)
         return (found[self.rank % len(found)] / self.options.scale,)
+
+    def values_many(self, xy: NDArray[np.float64]) -> list[tuple[float, ...]]:
+        """`values` for points of shape (n, 2)."""
+        rank, scale = self.rank, self.options.scale
+        return [(found[rank % len(found)] / scale,) for found in self.options.at_many(xy)]
 
     def headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Pairs (box, angle) that hold the angle of every option somewhere in each box, and few more; boxes (n, 4)."""

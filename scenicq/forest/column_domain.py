@@ -63,9 +63,9 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.geometry.angles import heading_of_array, normalize_array
+from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import SLACK, Region
-from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.terms import UndecidedError
 
 __all__ = ["ColumnDomain"]
@@ -295,8 +295,11 @@ class ColumnDomain:
         counts = np.zeros(places.count, dtype=np.intp)
         counts[places.defined] = list(map(len, allowed))
         headings = np.full((places.count, max(most, 1)), np.nan)
-        for place, each in zip(places.defined.tolist(), allowed, strict=True):
-            headings[place, : len(each)] = each
+        if allowed and min(map(len, allowed)) == most:
+            headings[places.defined, :most] = allowed
+        else:
+            for place, each in zip(places.defined.tolist(), allowed, strict=True):
+                headings[place, : len(each)] = each
         status = np.where((places.status == DEFINED) & (counts == 0), UNDEFINED, places.status).reshape(places.shape)
         if most <= 1:
             return Column(headings[:, 0].reshape(places.shape), status)
@@ -356,8 +359,8 @@ def _allowed(places: ColumnPlaces, field: Data, point: Data) -> Sequence[tuple[f
         return ()
     xy, fields = places.points(point), cast(Coded, field)
     only = fields.options[0] if len(fields.options) == 1 else None
-    if isinstance(only, RoadDirection):
-        return only.values_many(xy)
+    if only is not None and not isinstance(only, Undefined):
+        return cast(VectorField, only).values_many(xy)
     which: list[int] = places.spread(fields.which)[places.defined].tolist()
     found = [directions(fields.options[one], (x, y)) for one, (x, y) in zip(which, xy.tolist(), strict=True)]
     return [() if isinstance(each, Undefined) else each for each in found]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -62,6 +63,10 @@ class VectorField(Protocol):
 
     def values(self, x: float, y: float) -> tuple[float, ...]:
         """The headings allowed at a point, in (-pi, pi]; none where the field is undefined."""
+        ...
+
+    def values_many(self, xy: NDArray[np.float64]) -> Sequence[tuple[float, ...]]:
+        """`values` for points of shape (n, 2)."""
         ...
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
