@@ -115,7 +115,7 @@ def network_names(network: Network, library: str) -> dict[str, ModelValue]:
         "sidewalk": network.sidewalkRegion,
         "shoulder": network.shoulderRegion,
         "crossing": network.crossingRegion,
-        "roadOrShoulder": union(drivable, network.shoulderRegion) if network.shoulders else drivable,
+        "roadOrShoulder": drivable if (shoulder := network.region("shoulder")) is None else union(drivable, shoulder),
         "intersection": network.intersectionRegion,
         "roadDirection": network.roadDirection,
     }

@@ -34,9 +34,9 @@ from scenicq.geometry.elements import (
 from scenicq.geometry.features import MapFeature, dangling, read_geojson
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.followed_direction import FollowedDirection
-from scenicq.geometry.network_builder import link
+from scenicq.geometry.network_builder import Elements, link
 from scenicq.geometry.regions import SLACK, DeferredPolylines, PolygonSet, PolylineSet, Region
-from scenicq.geometry.road_direction import along_lines
+from scenicq.geometry.road_direction import RoadDirection, along_lines
 from scenicq.geometry.shapes import Shape
 
 __all__ = ["TOLERANCE", "MapFeature", "Network", "read_geojson"]
@@ -52,39 +52,95 @@ class Network:
 
     Attributes:
         name: The map's name.
-        features: What it was built from.
-        problems: Repeated ids (left out) and dangling references (passed over), as facts for the user.
-        roadDirection: The direction of traffic.
-        elements: All elements that have an area, by id.
-        lanes, laneSections, laneGroups, intersections, crossings, sidewalks, shoulders, curbs: The elements by kind.
-        allRoads: All roads; `roads` are those outside of intersections, `connectingRoads` those inside.
+        features: What it is built from.
     """
 
     def __init__(self, name: str, features: Iterable[MapFeature]) -> None:
-        """Build the network; features with an id that is already taken are left out."""
+        """Take the features, but for those with an id that is already taken; all else is made when it is asked for."""
         kept: dict[str, MapFeature] = {}
-        problems: list[str] = []
+        self._repeated: list[str] = []
         for feature in features:
             if feature.id in kept:
-                problems.append(f"{feature.kind} `{feature.id}`: the id is used before")
+                self._repeated.append(f"{feature.kind} `{feature.id}`: the id is used before")
             else:
                 kept[feature.id] = feature
         self.name = name
         self.features = tuple(kept.values())
-        self.problems = (*problems, *(message for _, message in dangling(self.features)))
-        self.roadDirection = road_direction(self.features)
-        found = link(self.features, self.roadDirection)
-        self.lanes: tuple[Lane, ...] = tuple(found.lanes.values())
-        self.laneSections: tuple[LaneSection, ...] = tuple(found.sections.values())
-        self.laneGroups: tuple[LaneGroup, ...] = tuple(found.groups.values())
-        self.allRoads: tuple[Road, ...] = tuple(found.roads.values())
-        self.roads: tuple[Road, ...] = tuple(road for road in self.allRoads if road.intersection is None)
-        self.connectingRoads: tuple[Road, ...] = tuple(road for road in self.allRoads if road.intersection is not None)
-        self.intersections: tuple[Intersection, ...] = tuple(found.intersections.values())
-        self.crossings: tuple[PedestrianCrossing, ...] = tuple(found.crossings.values())
-        self.sidewalks: tuple[Sidewalk, ...] = tuple(found.sidewalks.values())
-        self.shoulders: tuple[Shoulder, ...] = tuple(found.shoulders.values())
-        self.curbs: tuple[Curb, ...] = tuple(found.curbs.values())
+
+    @cached_property
+    def problems(self) -> tuple[str, ...]:
+        """Repeated ids (left out) and dangling references (passed over), as facts for the user."""
+        return (*self._repeated, *(message for _, message in dangling(self.features)))
+
+    @cached_property
+    def roadDirection(self) -> RoadDirection:
+        """The direction of traffic."""
+        return road_direction(self.features)
+
+    # --- elements
+
+    @cached_property
+    def _linked(self) -> Elements:
+        return link(self.features, self.roadDirection)
+
+    @cached_property
+    def lanes(self) -> tuple[Lane, ...]:
+        """All lanes."""
+        return tuple(self._linked.lanes.values())
+
+    @cached_property
+    def laneSections(self) -> tuple[LaneSection, ...]:
+        """All sections of lanes."""
+        return tuple(self._linked.sections.values())
+
+    @cached_property
+    def laneGroups(self) -> tuple[LaneGroup, ...]:
+        """All groups of lanes."""
+        return tuple(self._linked.groups.values())
+
+    @cached_property
+    def allRoads(self) -> tuple[Road, ...]:
+        """All roads."""
+        return tuple(self._linked.roads.values())
+
+    @cached_property
+    def roads(self) -> tuple[Road, ...]:
+        """The roads outside of intersections."""
+        return tuple(road for road in self.allRoads if road.intersection is None)
+
+    @cached_property
+    def connectingRoads(self) -> tuple[Road, ...]:
+        """The roads inside intersections."""
+        return tuple(road for road in self.allRoads if road.intersection is not None)
+
+    @cached_property
+    def intersections(self) -> tuple[Intersection, ...]:
+        """All intersections."""
+        return tuple(self._linked.intersections.values())
+
+    @cached_property
+    def crossings(self) -> tuple[PedestrianCrossing, ...]:
+        """All pedestrian crossings."""
+        return tuple(self._linked.crossings.values())
+
+    @cached_property
+    def sidewalks(self) -> tuple[Sidewalk, ...]:
+        """All sidewalks."""
+        return tuple(self._linked.sidewalks.values())
+
+    @cached_property
+    def shoulders(self) -> tuple[Shoulder, ...]:
+        """All shoulders."""
+        return tuple(self._linked.shoulders.values())
+
+    @cached_property
+    def curbs(self) -> tuple[Curb, ...]:
+        """All curbs."""
+        return tuple(self._linked.curbs.values())
+
+    @cached_property
+    def elements(self) -> dict[str, NetworkElement]:
+        """All elements that have an area, by id."""
         areas: tuple[tuple[NetworkElement, ...], ...] = (
             self.laneSections,
             self.lanes,
@@ -95,7 +151,7 @@ class Network:
             self.sidewalks,
             self.shoulders,
         )
-        self.elements: dict[str, NetworkElement] = {element.id: element for kind in areas for element in kind}
+        return {element.id: element for kind in areas for element in kind}
 
     def __reduce__(self) -> tuple[type[Network], tuple[str, tuple[MapFeature, ...]]]:
         """Rebuild from the features: the elements refer to each other too deeply to be pickled."""
@@ -195,7 +251,7 @@ class Network:
     @cached_property
     def walkableRegion(self) -> PolygonSet:
         """Sidewalks and crossings."""
-        along = None if self.crossings else self.sidewalkRegion.orientation
+        along = None if self.region("crossing") else self.sidewalkRegion.orientation
         return self._region("walkable", ("sidewalk", "crossing"), along)
 
     def region(self, kind: str) -> Region | None:

@@ -364,7 +364,7 @@ def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> I
     if any(owner.mutated for owner in scenario.objects):
         return  # noise of any size hides where things are
     reader = ConditionReader(
-        scenario, options.tolerance.for_scenario(scenario), RegionNames.of(network), network.roadDirection
+        scenario, options.tolerance.for_scenario(scenario), RegionNames(network), network.roadDirection
     )
     for owner in scenario.objects:
         named: Mapping[str, Node] = {name: given.value for name, given in owner.properties.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, Region, UnionOf
@@ -16,22 +16,17 @@ _FEW_IDS, _MOST_IDS = 4, 2000
 """Regions named one by one in a condition: as a list, and at most."""
 
 
-@dataclass(frozen=True, slots=True)
 class RegionNames:
     """What the regions of a network are called in `memberships`.
 
     Attributes:
         kinds: The kinds of map element whose union a region is, by the region's identity.
-        elements: The name of the map element that each element's area is.
     """
 
-    kinds: dict[int, tuple[str, ...]]
-    elements: dict[str, str]
-
-    @classmethod
-    def of(cls, network: Network) -> RegionNames:
+    def __init__(self, network: Network) -> None:
         """The names for one map."""
-        kinds = {
+        self._network = network
+        self.kinds: dict[int, tuple[str, ...]] = {
             id(network.laneRegion): ("lane",),
             id(network.intersectionRegion): ("intersection",),
             id(network.crossingRegion): ("crossing",),
@@ -39,11 +34,15 @@ class RegionNames:
             id(network.shoulderRegion): ("shoulder",),
             id(network.drivableRegion): ("lane", "road", "intersection", "drivable"),
         }
-        elements = {feature.id: feature.id for feature in network.features}
-        for section in network.laneSections:
+
+    @cached_property
+    def elements(self) -> dict[str, str]:
+        """The name of the map element that each element's area is."""
+        elements = {feature.id: feature.id for feature in self._network.features}
+        for section in self._network.laneSections:
             # A lane that the map does not cut is its own only section, which the map has no name for.
             elements.setdefault(section.id, section.lane.id)
-        return cls(kinds, elements)
+        return elements
 
 
 def near_region(region: Region, names: RegionNames, reach: float) -> str | None:

@@ -107,7 +107,7 @@ class _Prover:
     def __init__(self, scenario: Scenario, network: Network, options: MatchOptions) -> None:
         tolerance = options.tolerance.for_scenario(scenario)
         self.scenario, self.options, self.tolerance = scenario, options, tolerance
-        self.names = RegionNames.of(network)
+        self.names = RegionNames(network)
         self.reader = ConditionReader(scenario, tolerance, self.names, network.roadDirection)
 
     def all(self) -> list[SufficientCondition]:
