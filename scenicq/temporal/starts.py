@@ -19,7 +19,7 @@ from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import features, leaves
 from scenicq.match.decide.closed_form import ClosedForm
-from scenicq.match.decide.compiled_expressions import Columns, FloatColumn, Get, UnclearError
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint
 from scenicq.match.problem.map_lookups import MapLookups

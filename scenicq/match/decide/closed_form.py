@@ -20,7 +20,7 @@ from scenicq.forest.groups import Comparison, Condition
 from scenicq.forest.nodes import Identity, Value
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.match.decide.compiled_expressions import Columns, FloatColumn, Get, UnclearError
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import XY, MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied

@@ -8,7 +8,8 @@ from scenicq.forest.nodes import PointIn
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.closed_numbers import heading, number, text
 from scenicq.match.decide.closed_positions import known_vector, offset, point_in
-from scenicq.match.decide.compiled_expressions import VECTORS, Get, truth
+from scenicq.match.decide.compiled_expressions import VECTORS, truth
+from scenicq.match.decide.range_forms import Get
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import MapLookups
 

@@ -14,16 +14,8 @@ from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index
 from scenicq.forest.walk import postorder
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
-from scenicq.match.decide.compiled_expressions import (
-    Columns,
-    CompiledExpressions,
-    FloatColumn,
-    Form,
-    Get,
-    UnclearError,
-    clipped,
-    spread,
-)
+from scenicq.match.decide.compiled_expressions import CompiledExpressions
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, UnclearError, clipped, spread
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
 from scenicq.match.problem.map_lookups import MapLookups

@@ -12,17 +12,8 @@ from numpy.typing import NDArray
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import PointIn, Rotate, Value, VectorOf, VectorSum
 from scenicq.match.decide.closed_form import FAILS, ClosedForm, Evaluated, each_position
-from scenicq.match.decide.compiled_expressions import (
-    Columns,
-    CompiledExpressions,
-    CompiledVector,
-    FloatColumn,
-    Get,
-    Scalar,
-    clipped,
-    spread,
-    turned,
-)
+from scenicq.match.decide.compiled_expressions import CompiledExpressions
+from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Get, Scalar, clipped, spread, turned
 from scenicq.match.decide.region_tests import region_test
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike

@@ -28,7 +28,8 @@ from scenicq.geometry.membership import distance
 from scenicq.geometry.regions import Disc, Rectangle, Region, Sector
 from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 from scenicq.match.decide.closed_form import each_position
-from scenicq.match.decide.compiled_expressions import Columns, CompiledExpressions, Exact, Get
+from scenicq.match.decide.compiled_expressions import CompiledExpressions
+from scenicq.match.decide.range_forms import Columns, Exact, Get
 from scenicq.match.problem.map_lookups import XY, MapLookups
 
 __all__ = ["RegionTest", "region_test"]

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.match.decide.compiled_expressions import Columns, FloatColumn, Get, UnclearError
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature

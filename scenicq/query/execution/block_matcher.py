@@ -132,6 +132,15 @@ class Decider:
         """Let go of the database and the solver."""
         self._open.close()
 
+    @property
+    def connection(self) -> duckdb.DuckDBPyConnection:
+        """To the dataset, without views."""
+        if self._connection is None:
+            self._connection = self.dataset.connect(threads=self.threads, views=False)
+            self._open.callback(self._connection.close)
+            self._solver = self._open.enter_context(LazySolver(self.solver))
+        return self._connection
+
     def decide(self, block: Block) -> Decided:
         """Decide a block; its results come while they are taken, before the next block.
 
@@ -140,10 +149,7 @@ class Decider:
             DeadlineError: The time is over; while results are taken, too.
         """
         check_deadline(self.until)
-        if self._connection is None:
-            self._connection = self.dataset.connect(threads=self.threads, views=False)
-            self._open.callback(self._connection.close)
-            self._solver = self._open.enter_context(LazySolver(self.solver))
+        connection = self.connection
         if block.map not in self._compiled:
             compiled = self.compile_map(block.map)
             self._compiled[block.map] = compiled, Matcher(compiled.scenario, self.options, self._solver)
@@ -153,23 +159,21 @@ class Decider:
         if not compiled.plan.stages:
             labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=compiled.motion)]
             return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
-        missed = run_prefilter(self.dataset, self._connection, compiled.plan, block)
-        named = names(self.dataset, self._connection, block) if self.every else []
+        missed = run_prefilter(self.dataset, connection, compiled.plan, block)
+        named = names(self.dataset, connection, block) if self.every else []
         if not (missed < 0).any():
             return Decided(missed, [], named)
         if compiled.plan.decision and not self.all_matches:
             return Decided(missed, self._partly_decided(compiled, matcher), named)
-        return Decided(
-            missed, self._matched(matcher, candidates(self._connection, compiled.plan, motion=compiled.motion)), named
-        )
+        left = candidates(connection, compiled.plan, motion=compiled.motion)
+        return Decided(missed, self._matched(matcher, left), named)
 
     def _partly_decided(self, compiled: CompiledMap, matcher: Matcher) -> Iterator[list[Result]]:
         """The results of the frames that the prefilter has left, where SQL says that some surely match."""
-        assert self._connection is not None
-        rows = decided_frames(self._connection, compiled.plan.decision, LABELS, compiled.plan.left)
+        rows = decided_frames(self.connection, compiled.plan.decision, LABELS, compiled.plan.left)
         open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
         left = (
-            candidates(self._connection, compiled.plan, motion=compiled.motion, among=open_) if len(open_) else iter(())
+            candidates(self.connection, compiled.plan, motion=compiled.motion, among=open_) if len(open_) else iter(())
         )
         asked = self._matched(matcher, left)
         proved = Match({}, {})
@@ -183,10 +187,9 @@ class Decider:
         from scenicq.query.execution.recording_matcher import RecordingMatcher, Survivors  # noqa: PLC0415
         from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
-        assert self._connection is not None
         intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver)
         recordings = RecordingMatcher(self.dataset, matcher, intervals)
-        connection, plan = self._connection, compiled.plan
+        connection, plan = self.connection, compiled.plan
         rows: CandidateRows | None = None
         if not plan.stages:
             # recordings are of one map

@@ -6,11 +6,13 @@ The dataset is worked through block by block, in this process or in workers; res
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, cast
+
+import duckdb
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.temporal import Behaviors
@@ -288,16 +290,18 @@ class Query:
         compiled = self._compiled_maps().items()
         return [each.plan for name, each in compiled if isinstance(each, CompiledMap) and self.frames(name)]
 
-    def blocks(self, map_name: str, least: int = 1) -> list[Block]:
+    def blocks(self, map_name: str, least: int = 1, connection: duckdb.DuckDBPyConnection | None = None) -> list[Block]:
         """The frames of a map that are looked at, cut into blocks in the order of the store.
 
         Args:
             map_name: The map.
             least: Blocks that there should be, unless they would become very small.
+            connection: To the dataset, where there is one: each takes 15 ms.
         """
         if self._known.extents is None:
-            with closing(self.dataset.connect(views=False)) as connection:
-                self._known.extents = extents(self.dataset, connection)
+            there = nullcontext(connection) if connection else closing(self.dataset.connect(views=False))
+            with there as opened:
+                self._known.extents = extents(self.dataset, opened)
         return blocks(self._known.extents, map_name, self._between(map_name), least=least, whole=self.options.prefilter)
 
     def decider(self, threads: int | None = None) -> Decider:
@@ -347,7 +351,8 @@ class Query:
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
             setup = (self.dataset.address, self.source, self.options, self.file)
-            executor = BlockExecutor(self.dataset, self.options.jobs, self.decider(), _start_worker, setup)
+            decider = self.decider()
+            executor = BlockExecutor(self.dataset, self.options.jobs, decider, _start_worker, setup)
             hands = stack.enter_context(executor)
             for name, there in compiled.items():
                 if not self.frames(name):
@@ -355,11 +360,10 @@ class Query:
                 if isinstance(there, Diagnostic):
                     yield from self._lacking(name, there, ahead.taken)
                     continue
-                cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1)
+                cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1, decider.connection)
                 merge = partial(merge_frames, every=self.options.every)
                 if self.over_time(there):
-                    with closing(self.dataset.connect()) as connection:
-                        cut = whole_recordings(self.dataset, connection, cut)
+                    cut = whole_recordings(self.dataset, decider.connection, cut)
                     merge = partial(merge_intervals, every=self.options.every)
                 with closing(merge(there.plan, hands.decide(cut, ahead.told), self.funnel, ahead.taken)) as merged:
                     for result in merged:

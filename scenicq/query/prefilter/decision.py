@@ -61,7 +61,9 @@ def decision(
         return [each.sql for each in mine if each.sql] + [f"{alias}.{flags[near]}" for alias, near in placed]
 
     frames = " AND ".join([f"{EGO}.number IN {left}", *proved(())])
-    ego_flags = f" LEFT JOIN flags e ON e.f = {EGO}.number AND e.object = 'ego'" if flags else ""
+    # a table that nothing is asked of would be joined all the same
+    asked = {index in roles for each in found for index, _ in each.places}
+    ego_flags = f" LEFT JOIN flags e ON e.f = {EGO}.number AND e.object = 'ego'" if False in asked else ""
     if not roles:
         return (new_table(_DECIDED, f"SELECT {EGO}.number AS f FROM {labels} {EGO}{ego_flags} WHERE {frames}"),)
     near = [] if options.radius is None else [f"a.ego_distance <= {number(options.radius - SLACK)}"]
@@ -72,7 +74,7 @@ def decision(
     tied = [each.sql for each in ties]
     columns += [f"a.{name}" for name in sorted({*columns_of("a", tied), *columns_of("b", tied)})]
     columns += [f"{EGO}.{name}" for name in columns_of(EGO, tied)]
-    object_flags = " LEFT JOIN flags g ON g.f = r.f AND g.object = a.id" if flags else ""
+    object_flags = " LEFT JOIN flags g ON g.f = r.f AND g.object = a.id" if True in asked else ""
     sure = (
         f"SELECT r.f, r.row, {', '.join(columns)} FROM roles r JOIN {objects} a ON a.number = r.row "
         f"JOIN {labels} {EGO} ON {EGO}.number = r.f{ego_flags}{object_flags} WHERE {frames}"

@@ -223,9 +223,8 @@ def _rows_of(
             where = " WHERE file_row_number BETWEEN {} AND {} - 1".format(*limits[view])
         elif view == MEMBERSHIPS and block.end - block.first <= _MOST_NAMED:
             selected = f"SELECT frame FROM read_parquet({files[LABELS]}, file_row_number = true) WHERE {block.where}"
-            where = " WHERE frame IN ({})".format(
-                ", ".join(sql_text(name) for (name,) in connection.execute(selected).fetchall()) or "NULL"
-            )
+            named = [sql_text(name) for (name,) in connection.execute(selected).fetchall()]
+            where = f" WHERE frame IN ({', '.join(named) or 'NULL'})"
         yield view, numbered.format(offset, path) + where
 
 

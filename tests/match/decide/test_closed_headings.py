@@ -11,7 +11,7 @@ from scenicq.forest import build
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Feature, Index, Range, Select
 from scenicq.match.decide.closed_numbers import heading
-from scenicq.match.decide.compiled_expressions import Columns
+from scenicq.match.decide.range_forms import Columns
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Refuted, Satisfied

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scenicq.forest.nodes import Identity
-from scenicq.match.decide.compiled_expressions import Form, clipped, spread, turned
+from scenicq.match.decide.range_forms import Form, clipped, spread, turned
 
 
 def random_form(rng, count, *, unbounded=False):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from programs import HEADER, PROGRAMS
 from scenes import STREET, compiled, drawn, label_of
 
-from scenicq.match.decide.compiled_expressions import clipped, turned
+from scenicq.match.decide.range_forms import clipped, turned
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import candidates_of
