@@ -51,7 +51,7 @@ _HOMES = {
     "ingest": "scenicq.importers.ingest",
     "open": "scenicq.notebook.datasets",
     "open_dataset": "scenicq.store.dataset",
-    "read_program": "scenicq.query.execution.run",
+    "read_program": "scenicq.query.execution.program_files",
 }
 
 
