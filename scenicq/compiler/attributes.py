@@ -34,6 +34,7 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, orientation_of
 from scenicq.geometry.road_direction import along_lines
 from scenicq.geometry.shapes import simple_parts
+from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS
 
 __all__ = ["attribute", "corner", "part_of"]
 
@@ -116,7 +117,7 @@ def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
     close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
     hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
     if isinstance(value, Network) and name in ("bikeLanes", "bikeLane", "bicycleLanes"):
-        hints = ("`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows",)
+        hints = (BIKE_LANES,)
     if isinstance(value, Instance) and (said := _SAID.get(name.replace("_", "").lower())):
         hints = (said,)
     shown = f"a {kind_of(cast(Node, value))}" if is_node(value) else describe(value)
@@ -129,12 +130,12 @@ _BESIDE = re.compile(
     r"(?i)_?(left|right)_?(lane|neighbou?r)?|(lane|neighbou?r)_?(to_?)?(left|right)|laneTo(Left|Right)"
 )
 """What people call the lane beside another."""
-_STANDS, _TURNS = "`X.speed < 0.5` asks whether X stands", "`angularSpeed` is how fast it turns, in radians a second"
+_TURNS = "`angularSpeed` is how fast it turns, in radians a second"
 _SAID = {
     "yawrate": _TURNS, "angularvelocity": _TURNS, "turnrate": _TURNS, "accel": "`acceleration` is along the course",
     "x": "`position.x` is along the map's axis", "y": "`position.y` is along the map's axis",
-    "isparked": _STANDS, "parked": _STANDS, "isstopped": _STANDS, "stopped": _STANDS, "isstationary": _STANDS,
-    "ismoving": "`X.speed > 1` asks whether X moves", "moving": "`X.speed > 1` asks whether X moves",
+    "isparked": STANDS, "parked": STANDS, "isstopped": STANDS, "stopped": STANDS, "isstationary": STANDS,
+    "ismoving": MOVES, "moving": MOVES,
     "category": "`new Bus` asks for a class", "type": "`new Bus` asks for a class",
     "occluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
     "isoccluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",

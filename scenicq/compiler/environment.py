@@ -14,6 +14,7 @@ from scenicq.compiler.values import Function, Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
+from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS, TURNS
 
 __all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Environment", "Runner"]
 
@@ -89,10 +90,8 @@ _SAID = {
     "distance": "`distance from a to b` has no brackets", "dist": "`distance from a to b` is the distance",
     "angle": "`angle from a to b` has no brackets", "velocity": "`X.velocity` is that of an object X",
     "speed": "`X.speed` is that of an object X", "heading": "`X.heading` is that of an object X",
-    "parked": "`X.speed < 0.5` asks whether X stands", "stopped": "`X.speed < 0.5` asks whether X stands",
-    "moving": "`X.speed > 1` asks whether X moves", "oncoming": "`facing Range(160, 200) deg relative to ego.heading`",
-    "turning": "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right",
-    "bikeLane": "`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows",
+    "parked": STANDS, "stopped": STANDS, "moving": MOVES, "turning": TURNS, "bikeLane": BIKE_LANES,
+    "oncoming": "`facing Range(160, 200) deg relative to ego.heading`",
     "lane": "`X.lane` is the lane of an object X", "leftLane": "`X.laneSection.laneToLeft` is the lane left of X's",
     "rightLane": "`X.laneSection.laneToRight` is the lane right of X's",
     "weather": "`param weather = 'rain'` compares what labels say of the weather",

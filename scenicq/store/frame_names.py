@@ -6,7 +6,7 @@ A name may have parts with `/` between them, such as a recording and a time; eac
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import duckdb
 
@@ -40,9 +40,7 @@ def find_frame(connection: duckdb.DuckDBPyConnection, text: str) -> str:
     if not found:
         hint = "`scenicq match SCENARIO DATASET --all` lists the frames"
         raise DataError(Diagnostic("option-invalid", f"the dataset has no frame `{text}`", hints=(hint,)))
-    more = ", ..." if len(found) > _SHOWN else ""
-    hint = f"these begin so: {', '.join(found[:_SHOWN])}{more}"
-    raise DataError(Diagnostic("option-invalid", f"several frames begin with `{text}`", hints=(hint,)))
+    raise _ambiguous("frames", text, found)
 
 
 def find_recording(recordings: Iterable[str], text: str) -> str | None:
@@ -58,8 +56,12 @@ def find_recording(recordings: Iterable[str], text: str) -> str | None:
     found = sorted(each for each in recordings if each.startswith(text))
     if text in found or len(found) < 2:
         return text if text in found else next(iter(found), None)
+    raise _ambiguous("recordings", text, found)
+
+
+def _ambiguous(what: str, text: str, found: Sequence[str]) -> DataError:
     hint = f"these begin so: {', '.join(found[:_SHOWN])}{', ...' if len(found) > _SHOWN else ''}"
-    raise DataError(Diagnostic("option-invalid", f"several recordings begin with `{text}`", hints=(hint,)))
+    return DataError(Diagnostic("option-invalid", f"several {what} begin with `{text}`", hints=(hint,)))
 
 
 def shortened(connection: duckdb.DuckDBPyConnection) -> Callable[[str], str]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from scenicq.syntax.tokens import Token
 
-__all__ = ["condition_hint", "phrase_hint", "unit_hint"]
+__all__ = ["BIKE_LANES", "MOVES", "STANDS", "TURNS", "condition_hint", "phrase_hint", "unit_hint"]
 
 _LENGTH, _SPEED, _TIME = "lengths are in metres", "speeds are in metres a second", "times are in seconds"
 _DEGREES, _RADIANS = "`deg` stands for degrees", "angles are in radians"
@@ -20,8 +20,9 @@ _UNITS = {
 _UNIT = {word: told for words, told in _UNITS.items() for word in words.split()}
 
 _DISTANCE = "`(distance from a to b) < 10` compares a distance"
-_STANDS = "`X.speed < 0.5` asks whether X stands"
-_TURNS = "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right"
+STANDS, MOVES = "`X.speed < 0.5` asks whether X stands", "`X.speed > 1` asks whether X moves"
+TURNS = "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right"
+BIKE_LANES = "`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows"
 _SIDE = "`(distance past X) < 0` asks whether X is ahead of the ego; `ahead of Y by Range(0, 20)` places a new object"
 _INSIDE = "`X in R` asks whether the box of X lies in a region, `X.position in R` its centre alone"
 _TOWARD = "`abs((angle from X to Y) - X.heading) < 20 deg` asks whether X faces Y; `facing toward Y` turns a new object"
@@ -30,8 +31,8 @@ _OVER_TIME = "`require (A) until (B)` and `eventually (A and next (eventually B)
 _BEYOND = "`beyond X by Range(2, 30)` places a new object where X hides it from the ego"
 _SAID = {
     "between": "`5 < a < 10` asks whether a number is between two", "near": _DISTANCE, "within": _DISTANCE,
-    "close": _DISTANCE, "far": _DISTANCE, "turning": _TURNS, "turns": _TURNS, "stopped": _STANDS, "parked": _STANDS,
-    "stationary": _STANDS, "standing": _STANDS, "ahead": _SIDE, "front": _SIDE, "behind": _SIDE, "left": _SIDE,
+    "close": _DISTANCE, "far": _DISTANCE, "turning": TURNS, "turns": TURNS, "stopped": STANDS, "parked": STANDS,
+    "stationary": STANDS, "standing": STANDS, "ahead": _SIDE, "front": _SIDE, "behind": _SIDE, "left": _SIDE,
     "right": _SIDE, "on": _INSIDE, "inside": _INSIDE, "onto": _INSIDE, "faces": _TOWARD, "facing": _TOWARD,
     "sees": _SEES, "visible": _SEES, "then": _OVER_TIME, "after": _OVER_TIME, "before": _OVER_TIME,
     "overtakes": _OVER_TIME, "passes": _OVER_TIME, "initial": _OVER_TIME, "initially": _OVER_TIME,

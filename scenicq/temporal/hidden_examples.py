@@ -55,9 +55,8 @@ def examine_start(
     """
     label, correspondence = start
     requirements = scenario.requirements if wanted is None else (*scenario.requirements, Requirement(wanted, None))
-    ego = scenario.objects[scenario.ego].name
-    given = {name: id_ for name, id_ in correspondence.items() if name != ego}
-    return Matcher(replace(scenario, requirements=requirements, dynamics=None), match, solver).examine(label, given)
+    initial = replace(scenario, requirements=requirements, dynamics=None)
+    return Matcher(initial, match, solver).examine(label, correspondence)
 
 
 @dataclass(frozen=True, slots=True)

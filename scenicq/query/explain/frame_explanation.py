@@ -118,8 +118,7 @@ def explain_match(matcher: Matcher, label: Label, correspondence: Mapping[str, s
         label: The label.
         correspondence: The label object of each role, by their names.
     """
-    ego = matcher.scenario.objects[matcher.scenario.ego].name
-    finding = matcher.examine(label, {name: id_ for name, id_ in correspondence.items() if name != ego})
+    finding = matcher.examine(label, correspondence)
     if not isinstance(finding.verdict, Match) or dict(finding.verdict.correspondence) != dict(correspondence):
         return None
     return _of_match(matcher, label, finding, finding.verdict, formulas=False)
