@@ -6,6 +6,7 @@ choices for which it was found.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,6 +19,8 @@ from scenicq.forest.nodes import Identity, Index, LogicOp, Node, Select
 __all__ = ["Exclusions"]
 
 _Key: TypeAlias = "Identity | int"
+_OWNER = re.compile(r"(?<![\w.])[\w.]+\.$")
+"""What stands before an attribute; looked for once in each word, however long."""
 
 
 def _key(index: Node) -> _Key:
@@ -88,7 +91,13 @@ class Exclusions:
 
     def conditions(self) -> list[tuple[Node, Span]]:
         """That the choices come out as something else, each with the place that needs it."""
-        return [(_condition(choice), choice.span) for choice in self._found.values()]
+        return [(_condition(choice), _with_owner(choice.span)) for choice in self._found.values()]
+
+
+def _with_owner(span: Span) -> Span:
+    """The place of an attribute, with what it is one of: `ego.lane`, where the attribute alone is underlined."""
+    owner = _OWNER.search(span.source.text[: span.start])
+    return Span(span.source, owner.start(), span.end) if owner else span
 
 
 def _condition(choice: _Choice) -> Node:

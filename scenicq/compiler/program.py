@@ -5,7 +5,6 @@ A scenario is compiled once per map: the road network is part of the program's w
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -120,8 +119,6 @@ def _compiled(
 
 
 _IMPORTS = (ast.Import, ast.ImportFrom, ast.Model)
-_OWNER = re.compile(r"(?<![\w.])[\w.]+\.$")
-"""What stands before an attribute; looked for once in each word, however long."""
 
 
 def _start(source: Source) -> Span:
@@ -249,7 +246,8 @@ def _scenario(
     requirements = [
         _written(_at_the_end(requirement.condition, requirement.span), requirement.span) for requirement in hard
     ]
-    requirements += [_written(condition, _with_owner(span)) for condition, span in run.excluded.conditions()]
+    dynamics, excluded = run.timed.dynamics(run) if run.timed is not None else (None, [])
+    requirements += [_written(condition, span) for condition, span in (*run.excluded.conditions(), *excluded)]
     requirements = [requirement for requirement in requirements if requirement is not None]
     requirements += _built_in(run, ego)
     ego.label = ego.label or "ego"
@@ -271,7 +269,7 @@ def _scenario(
             for each in soft
         ),
         tuple(run.ignored), (*warnings, *(run.timed.remarks() if run.timed is not None else ())),
-        dynamics=run.timed.dynamics() if run.timed is not None else None,
+        dynamics=dynamics,
     )  # fmt: skip
 
 
@@ -345,12 +343,6 @@ def _mutated(instance: Instance) -> frozenset[str]:
     if is_zero(scale):
         return frozenset()
     return frozenset(name for name in ("position", "heading") if not is_zero(instance.properties[f"{name}StdDev"]))
-
-
-def _with_owner(span: Span) -> Span:
-    """The place of an attribute, with what it is one of: `ego.lane`, where the attribute alone is underlined."""
-    owner = _OWNER.search(span.source.text[: span.start])
-    return Span(span.source, owner.start(), span.end) if owner else span
 
 
 def _written(condition: Node, span: Span) -> Requirement | None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 from scenicq.compiler.coerce import read_over_time
+from scenicq.compiler.environment import Runner
+from scenicq.compiler.exclusions import Exclusions
 from scenicq.errors import Diagnostic, Span
-from scenicq.forest.nodes import Node
+from scenicq.forest.nodes import Feature, Node
 from scenicq.forest.temporal import (
     Always,
     And,
@@ -17,13 +19,17 @@ from scenicq.forest.temporal import (
     Eventually,
     Formula,
     Monitor,
+    MonitorStep,
     Next,
     Not,
     Or,
+    Reject,
     TemporalRequirement,
     Termination,
+    Test,
     Until,
 )
+from scenicq.forest.walk import postorder
 from scenicq.syntax import ast
 from scenicq.syntax.walk import walk
 
@@ -81,18 +87,37 @@ class TimedStatements:
         self._conditions.append(condition)
         return Atom(len(self._conditions) - 1)
 
-    def dynamics(self) -> Dynamics | None:
-        """What has been collected; None for a static program."""
+    def dynamics(self, run: Runner) -> tuple[Dynamics | None, list[tuple[Node, Span]]]:
+        """What has been collected, None for a static program; and what of it excludes scenes, whatever the sample.
+
+        Where a condition asks for something that is not there, Scenic rejects the run when it reads the condition:
+        that of a requirement or a termination at each sample, that of a monitor where the monitor comes to it.
+        """
         if not self.used:
-            return None
+            return None, []
+        tested = {step.condition.number for each in self._monitors for step in each.steps if isinstance(step, Test)}
+        always, at_test = Exclusions(), {number: Exclusions() for number in tested}
+        of_scene = run.excluded
+        nodes: list[Node] = []
         with read_over_time():
-            conditions = tuple(condition() for condition in self._conditions)
-        return Dynamics(
-            conditions,
-            tuple(self._requirements),
-            tuple(self._terminations),
-            tuple(self._monitors),
-        )
+            for number, condition in enumerate(self._conditions):
+                run.excluded = at_test.get(number, always)
+                nodes.append(condition())
+        run.excluded = of_scene
+        requirements, excluded = list(self._requirements), list[tuple[Node, Span]]()
+        for condition, span in always.conditions():
+            if any(isinstance(node, Feature) and node.current for node in postorder([condition])):
+                requirements.append(TemporalRequirement(Always(Atom(len(nodes))), span))
+                nodes.append(condition)
+            else:
+                excluded.append((condition, span))
+        guards: dict[int, list[tuple[Atom, Span]]] = {}
+        for number, exclusions in at_test.items():
+            for condition, span in exclusions.conditions():
+                guards.setdefault(number, []).append((Atom(len(nodes)), span))
+                nodes.append(condition)
+        monitors = tuple(_guarded(monitor, guards) for monitor in self._monitors)
+        return Dynamics(tuple(nodes), tuple(requirements), tuple(self._terminations), monitors), excluded
 
     def remarks(self) -> list[Diagnostic]:
         """What the author should know."""
@@ -122,3 +147,15 @@ class TimedStatements:
             case _:
                 # evaluating it says what is wrong with an operator of time inside
                 return self.atom(deferred(node))
+
+
+def _guarded(monitor: Monitor, guards: Mapping[int, list[tuple[Atom, Span]]]) -> Monitor:
+    """The monitor, rejecting where it comes to a test whose guards do not hold; guards by number of the condition."""
+    steps: list[MonitorStep] = list(monitor.steps)
+    for number, step in enumerate(monitor.steps):
+        if not isinstance(step, Test):
+            continue
+        for guard, span in guards.get(step.condition.number, ()):
+            steps += [steps[number], Reject(span)]
+            steps[number] = Test(guard, len(steps) - 2, len(steps) - 1)
+    return Monitor(monitor.span, tuple(steps))

@@ -120,7 +120,8 @@ class Examples:
             look()
             known, assumed, examples = cases.pop()
             run = self.decide(known)
-            place = None if run.truth != UNKNOWN else self._open_place(known, examples[0])
+            settled = run.truth != UNKNOWN and not run.open_
+            place = None if settled else self._open_place(known, examples[0])
             if place is None:
                 found.append(ExampleOutcome(run, examples[0]))
                 continue

@@ -202,7 +202,7 @@ class HiddenRuns:
 
         runs = self.runs.follow(one, atom)
         start, end = int(one.starts[0]), int(runs.ends[0])
-        return Run(start, end, int(runs.truth[0]), runs.broken[0], bool(runs.cut_off[0]))
+        return Run(start, end, int(runs.truth[0]), runs.broken[0], bool(runs.cut_off[0]), bool(runs.open_[0]))
 
     def _in_cell(self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node]) -> Runs:
         known: dict[int, Truth] = {}

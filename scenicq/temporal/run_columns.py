@@ -29,24 +29,26 @@ class Runs:
         truth: Whether they match.
         broken: What keeps each from matching, as an array of `Span | None`.
         cut_off: Whether the samples are over before the program ends.
+        open_: Whether a later end is not excluded.
     """
 
     ends: Places
     truth: Truth
     broken: NDArray[np.object_]
     cut_off: NDArray[np.bool_]
+    open_: NDArray[np.bool_]
 
     @classmethod
     def unknown(cls, ends: Places) -> Runs:
         """Runs of which nothing is known, with their ends."""
         n = len(ends)
-        return cls(ends, np.full(n, UNKNOWN), np.full(n, None, dtype=object), np.zeros(n, np.bool_))
+        return cls(ends, np.full(n, UNKNOWN), np.full(n, None, dtype=object), *np.zeros((2, n), np.bool_))
 
     def put(self, where: slice, found: Sequence[Run], first: int) -> None:
         """Write down what became of the runs of one stretch, which begins at place `first`."""
         for place, run in zip(range(where.start, where.stop), found, strict=True):
             self.ends[place], self.truth[place] = first + run.end, run.truth
-            self.broken[place], self.cut_off[place] = run.broken, run.cut_off
+            self.broken[place], self.cut_off[place], self.open_[place] = run.broken, run.cut_off, run.open_
 
 
 @dataclass(eq=False, slots=True)
@@ -91,7 +93,7 @@ class RunColumns:
             may = _hold(clauses, atom, int(UNKNOWN), starts, ends)
             broken[~may & (truth > FALSE)] = requirement.span
             truth = np.minimum(truth, np.where(sure, TRUE, np.where(may, UNKNOWN, FALSE)))
-        runs = Runs(ends, truth, broken, over)
+        runs = Runs(ends, truth, broken, over, np.zeros(len(starts), np.bool_))
         return self._one_by_one(stretches, atom, runs, unclear) if unclear.any() else runs
 
     def _open(self, stretches: Stretches, atom: Callable[[Atom], Truth]) -> Runs:
@@ -103,7 +105,7 @@ class RunColumns:
             starts.copy(),
             np.full(len(starts), FALSE),
             np.full(len(starts), None, object),
-            np.zeros(len(starts), np.bool_),
+            *np.zeros((2, len(starts)), np.bool_),
         )
         for level in (UNKNOWN, TRUE):
             best = np.full(len(starts), -1)
@@ -111,8 +113,9 @@ class RunColumns:
                 low, high = _between(clause, atom, int(level), starts)
                 high = np.minimum(high, last)
                 best = np.maximum(best, np.where(np.maximum(low, starts) <= high, high, -1))
-            runs.truth[best >= 0] = level
-            runs.ends[best >= 0] = best[best >= 0]
+            held = best >= 0
+            runs.open_[held] = runs.ends[held] > best[held]
+            runs.truth[held], runs.ends[held] = level, best[held]
         lost = np.flatnonzero(runs.truth == FALSE)
         for requirement, clauses in zip(self.dynamics.requirements, self.clauses, strict=True):
             may = _hold(clauses, atom, int(UNKNOWN), starts[lost], starts[lost])

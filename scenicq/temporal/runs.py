@@ -39,6 +39,7 @@ class Run:
         truth: Whether it matches.
         broken: What keeps it from matching, in the program; None where nothing does, and where it is cut off.
         cut_off: Whether the samples are over before the program ends.
+        open_: Whether a later end is not excluded: of a match that what is unknown may let go on.
     """
 
     start: int
@@ -46,6 +47,7 @@ class Run:
     truth: int
     broken: Span | None = None
     cut_off: bool = False
+    open_: bool = False
 
 
 def runs_from(
@@ -80,7 +82,10 @@ def runs_from(
             best = int(row.max(initial=FALSE))
             # a later end of the same truth counts, one that is less sure does not
             if best > FALSE and best >= found[start].truth:
-                found[start] = Run(start, int(ends[np.flatnonzero(row == best)[-1]]), best)
+                held = np.flatnonzero(row == best)[-1]
+                found[start] = Run(start, int(ends[held]), best, open_=bool((row[held + 1 :] > FALSE).any()))
+            elif best > FALSE:
+                found[start] = replace(found[start], open_=True)
             if first <= start < first + size:
                 broken[start] = _broken(dynamics, values[:, start, start - first], outcomes)
     return [run if run.truth > FALSE else replace(run, broken=broken[run.start]) for run in found.values()]

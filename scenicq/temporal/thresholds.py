@@ -159,7 +159,7 @@ def thresholds_of(
             broken[left] = runs.dynamics.requirements[-1].span
     except (_NoInterval, UnclearVariable):
         return None
-    return Thresholds(Runs(ends, truth, broken, over), values, unclear | (thin & ~over))
+    return Thresholds(Runs(ends, truth, broken, over, np.zeros(len(ends), np.bool_)), values, unclear | (thin & ~over))
 
 
 @dataclass(eq=False, slots=True)

@@ -7,7 +7,7 @@ with the same outcomes share one table, so that a lane, its centreline and its l
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TypeAlias, cast
@@ -16,11 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.bounds import scalar_bounds, vector_bounds
+from scenicq.forest.interpret import interpret, steps_of
+from scenicq.forest.interval_ends import ARRAYS
+from scenicq.forest.interval_values import Interval
+from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Constant, Identity, Index, Kind, Node, Select, Undefined
+from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Kind, Node, Select, Undefined
 from scenicq.forest.walk import children, leaves, postorder
+from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
+from scenicq.match.tolerance import SLACK
 
 __all__ = ["ChoiceTree", "ChoiceVariable", "Outcomes", "TooManyOutcomesError", "above_choices", "tree_of"]
 
@@ -28,6 +34,7 @@ ChoiceVariable: TypeAlias = Identity | Node
 """A random index by its identity; else the expression that says which option is taken."""
 
 MOST_OUTCOMES = 50_000
+_DOMAIN = IntervalDomain(ARRAYS)
 
 
 class TooManyOutcomesError(Exception):
@@ -170,12 +177,32 @@ def _options(node: Select, path: dict[ChoiceVariable, int]) -> Iterator[tuple[No
         asked = index.index if isinstance(index, Select) else index
         variable: ChoiceVariable = asked.identity if isinstance(asked, Index) else asked
         options = index.options if isinstance(index, Select) else node.options
-        numbers = [known[variable]] if variable in known else range(len(options))
+        numbers = [known[variable]] if variable in known else _possible(asked, len(options))
         found = [(options[number], {**known, variable: number}) for number in numbers]
         if isinstance(index, Select):
             todo += reversed(found)
         else:
             yield from found
+
+
+@lru_cache(maxsize=256)
+def _possible(index: Node, count: int) -> Sequence[int]:
+    """Which of some options an index may take: what is looked up at a place is one of those near its bounds."""
+    fields = [node for node in postorder((index,)) if isinstance(node, DirectionAt)]
+    every = range(count)
+    if len(fields) != 1 or not isinstance(fields[0].field, Constant):
+        return every
+    box = np.array(vector_bounds(fields[0].point)).T
+    if not np.isfinite(box).all():
+        return every
+    field = cast(VectorField, fields[0].field.value)
+    _, headings = field.headings(np.concatenate([box[0] - SLACK, box[1] + SLACK])[None])
+    with np.errstate(all="ignore"):
+        value = interpret(steps_of(index), _DOMAIN, {id(fields[0]): Interval(headings, headings)})[id(index)]
+    if not isinstance(value, Interval):
+        return every
+    low, high = np.ceil(value.low - SLACK), np.floor(value.high + SLACK)
+    return [number for number in every if ((low <= number) & (number <= high)).any()]
 
 
 def above_choices(root: Node) -> Iterator[tuple[Node, tuple[Node, ...]]]:
