@@ -20,7 +20,7 @@ from scenicq.lint.program import lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import ready
-from scenicq.query.execution.compiled_map import about_dataset, program_network, read_network
+from scenicq.query.execution.compiled_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.option_texts import VERSIONS
 from scenicq.query.execution.program_files import sibling_loader
@@ -137,8 +137,7 @@ def _found(
         except ScenarioError as error:
             if asked.dataset is not None:
                 error = about_dataset(error, asked.dataset, network.name)
-            codes = {diagnostic.code for diagnostic in error.diagnostics}
-            (lacking if codes == {"map-lacks"} else errors).extend(error.diagnostics)
+            (lacking if is_about_map(error) else errors).extend(error.diagnostics)
             continue
         compiled.append((scenario, network if asked.real else None))
         lines += [_told(scenario), *(f"  {line}" for part in details for line in part(scenario))]

@@ -62,8 +62,10 @@ def show_funnel(query: Query, elapsed_s: float) -> None:
         query: After its results were taken.
         elapsed_s: Seconds that it took.
     """
-    # what is never compared was said before the results
-    show(each for each in query.funnel.warnings if each.code not in ("never-compared", "no-tracks"))
+    # what is never compared or lacking was said before the results
+    told = ("never-compared", "no-tracks")
+    misfits = query.misfits()
+    show(each for each in query.funnel.warnings if each.code not in told and each not in misfits)
     lines = columns(_steps(query), right=frozenset({0}))
     lines += [*_failures(query.funnel), *_broken(query.funnel)]
     for what, frames in sorted(query.funnel.missing.items()):

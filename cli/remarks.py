@@ -22,7 +22,7 @@ _LINES = 5
 
 
 def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagnostic], list[Diagnostic]]:
-    """What is never compared, and what compiles but cannot be meant.
+    """What is never compared, or what maps lack; and what compiles but cannot be meant.
 
     Args:
         query: The query.
@@ -31,7 +31,7 @@ def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagn
     Raises:
         ScenarioError: The program is wrong, or the options are strict and there is anything to be said.
     """
-    unseen = list(query.coverage(maps).warnings)
+    unseen = [*(query.misfits() if maps is None else ()), *query.coverage(maps).warnings]
     compiled = ((each.scenario, each.network) for each in islice(query.fitting(maps), LINTED_MAPS))
     found = lint(query.source, compiled, query.options.match, properties=False)
     if query.options.strict and found:
@@ -40,7 +40,7 @@ def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagn
 
 
 def show_remarks(query: Query, unseen: Iterable[Diagnostic], found: Sequence[Diagnostic]) -> None:
-    """Print on standard error what is never compared, and a line for each thing that cannot be meant.
+    """Print on standard error what is never compared or lacking, and a line for each thing that cannot be meant.
 
     Args:
         query: The query.

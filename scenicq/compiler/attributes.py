@@ -17,7 +17,7 @@ from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_flat, is_random
 from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import property_node, to_heading, to_scalar, to_vector
-from scenicq.compiler.elements import MISSING, names_of, of_element, of_network
+from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.following import follow
 from scenicq.compiler.lookups import look_up
@@ -114,6 +114,9 @@ def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
             "not found",
             (f"`X.laneSection.laneTo{'Left' if left else 'Right'}` is the lane beside that of an object `X`",),
         )
+    if value is None and is_of_elements(name):
+        return fail("map-lacks", f"the map has no element here that `{name}` could be of", span, "this is of None",
+                    ("leave out with a condition where there is none",))  # fmt: skip
     close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
     hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
     if isinstance(value, Network) and name in ("bikeLanes", "bikeLane", "bicycleLanes"):

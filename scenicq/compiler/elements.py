@@ -14,17 +14,26 @@ from scenicq.compiler.element_lookups import LOOKUPS
 from scenicq.compiler.element_methods import METHODS, find_among, method_of, nominal_directions
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.lookups import look_up
-from scenicq.compiler.road_attributes import names_worked_out, worked_out
+from scenicq.compiler.road_attributes import is_worked_out, names_worked_out, worked_out
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.geometry.angles import heading_of, normalize
-from scenicq.geometry.elements import Lane, Maneuver, MissingElementError, NetworkElement
+from scenicq.geometry.elements import (
+    Intersection,
+    Lane,
+    LaneGroup,
+    LaneSection,
+    Maneuver,
+    MissingElementError,
+    NetworkElement,
+    Road,
+)
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
-__all__ = ["MANEUVER_TYPES", "MISSING", "names_of", "of_element", "of_network"]
+__all__ = ["MANEUVER_TYPES", "MISSING", "is_of_elements", "names_of", "of_element", "of_network"]
 
 MISSING = object()
 """What stands for an attribute that does not exist."""
@@ -49,6 +58,13 @@ def names_of(value: Network | NetworkElement | Maneuver) -> set[str]:
         return set(_NETWORK | LOOKUPS.keys() | METHODS | {"findPointIn"}) | names_worked_out(value)
     own = {name for name in dir(value) if not name.startswith("__")} - _HIDDEN
     return own | (_MANEUVER if isinstance(value, Maneuver) else METHODS | names_worked_out(value))
+
+
+def is_of_elements(name: str) -> bool:
+    """Whether elements of some kind have an attribute; those without one of their own only have what others have."""
+    kinds = (Lane, LaneSection, LaneGroup, Road, Intersection)
+    own = any(hasattr(kind, name) or name in kind.__annotations__ for kind in kinds) and name not in _HIDDEN
+    return own or name in METHODS or is_worked_out(name)
 
 
 def of_network(run: Runner, network: Network, name: str, span: Span) -> ModelValue:

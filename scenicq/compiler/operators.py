@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from scenicq.compiler.absent import absent_parts
 from scenicq.compiler.coerce import (
     kind_of_model,
     property_node,
@@ -44,8 +45,6 @@ from scenicq.forest.nodes import (
 from scenicq.geometry.regions import (
     DifferenceOf,
     IntersectionOf,
-    PolygonSet,
-    PolylineSet,
     UnionOf,
 )
 
@@ -267,24 +266,17 @@ def existing(value: ModelValue, span: Span | None) -> Node:
     Raises:
         ScenarioError: map-lacks, where the map has nothing of the kind; wrong-type.
     """
+    if value is None:
+        raise fail("map-lacks", "the map has no such element", span, "there is none here", _ELSEWHERE)
     area = to_region(value, span)
-    names = _lacking(area.value) if isinstance(area, Constant) else ()
-    if names:
-        listed = " and ".join(f"`{name}`" for name in names)
-        raise fail("map-lacks", f"the map has nothing for {listed}", span, "there is none",
-                   ("the map of another dataset may have it", "leave out what the program asks of it"))  # fmt: skip
+    names = absent_parts(area)
+    if names is not None:
+        listed = " and ".join(f"`{name}`" for name in names) or "this"
+        raise fail("map-lacks", f"the map has nothing for {listed}", span, "there is none", _ELSEWHERE)
     return area
 
 
-def _lacking(value: object) -> tuple[str, ...]:
-    """What an area consists of, if none of it is on the map."""
-    if isinstance(value, PolygonSet | PolylineSet):
-        # `road` is the area that one can drive on
-        return () if value.pieces else ("road" if value.name == "drivable" else value.name,)
-    if isinstance(value, UnionOf):
-        parts = [_lacking(part) for part in value.parts]
-        return tuple(name for names in parts for name in names) if all(parts) else ()
-    return ()
+_ELSEWHERE = ("the map of another dataset may have it", "leave out what the program asks of it")
 
 
 def within(item: ModelValue, region: ModelValue, span: Span) -> Node:

@@ -6,11 +6,9 @@ import math
 from collections.abc import Callable
 from typing import cast
 
-from scenicq.compiler.values import fail
-from scenicq.errors import Note, Span
+from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import (
-    Arithmetic,
     Constant,
     DirectionAt,
     Node,
@@ -21,11 +19,9 @@ from scenicq.forest.nodes import (
     Select,
     Undefined,
 )
-from scenicq.forest.scenario import ScenarioObject
 from scenicq.geometry.regions import PolygonSet, Region, orientation_of
-from scenicq.geometry.road_direction import RoadDirection
 
-__all__ = ["check_direction", "is_always_there", "orientation"]
+__all__ = ["is_always_there", "orientation"]
 
 
 def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
@@ -102,28 +98,3 @@ def _chosen_orientation(region: Select, point: Node, span: Span | None) -> Node 
         return known[0]
     fields = tuple((known[0] if heading is None else cast(DirectionAt, heading)).field for heading in found)
     return DirectionAt(Select(region.index, fields, span=span), point, span=span)
-
-
-def check_direction(owner: ScenarioObject) -> None:
-    """Refuse a heading along lanes on a map that has none: no label could ever match.
-
-    Raises:
-        ScenarioError: map-lacks.
-    """
-    heading = owner.properties.get("heading")
-    if heading is None or "heading" in owner.mutated:
-        return
-    terms = heading.value.args if isinstance(heading.value, Arithmetic) else (heading.value,)
-    for term in terms:
-        match term:
-            case DirectionAt(field=Constant(value=RoadDirection(lanes=()) as field)):
-                placed = heading.explicit and heading.span is not None
-                raise fail(
-                    "map-lacks", f"the map has no lane that `{field.name}` could be the direction of",
-                    heading.span if placed else owner.span,
-                    "needs lanes" if placed else f"the default heading of `{owner.category}` needs lanes",
-                    ("`facing Range(0, 360) deg` asks nothing of the map",),
-                    (Note(term.span, "the default"),) if term.span is not None and not placed else (),
-                )  # fmt: skip
-            case _:
-                pass

@@ -13,6 +13,7 @@ from typing import TypeVar, cast
 
 from scenicq.budget import TimeIsUp, limited
 from scenicq.compiler import operators
+from scenicq.compiler.absent import check_directions
 from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
@@ -27,7 +28,6 @@ from scenicq.compiler.models import (
     network_names,
     plain_module,
 )
-from scenicq.compiler.orientations import check_direction
 from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
 from scenicq.compiler.temporal import Behaviors, TimedStatements
@@ -253,8 +253,7 @@ def _scenario(
     ego.label = ego.label or "ego"
     names = _names(run.objects)
     objects = tuple(_object(instance, names[number]) for number, instance in enumerate(run.objects))
-    for each in objects:
-        check_direction(each)
+    check_directions(objects, requirements)
     params = {
         name: Property(_at_the_end(partial(to_node, value, span), span), explicit=not library, span=span)
         for name, (value, span, library) in run.params.items()
@@ -376,10 +375,10 @@ def _built_in(run: Interpreter, ego: Instance) -> list[Requirement]:
             found.append(Requirement(fold(Intersects(seen, box, span=span)), span, BuiltIn.VISIBILITY, (index,)))
         explicit = "regionContainedIn" in instance.explicit
         for region, author in ((instance.properties["regionContainedIn"], explicit), (run.workspace, False)):
-            area = to_region(region, span)
+            place = instance.spans.get("regionContainedIn") or instance.span
+            area = operators.existing(region, place) if author and region is not None else to_region(region, place)
             if isinstance(area, Constant) and isinstance(area.value, Everywhere):
                 continue
-            place = instance.spans.get("regionContainedIn") or instance.span
             inside = fold(Encloses(area, box, span=place))
             found.append(Requirement(inside, place, None if author else BuiltIn.CONTAINMENT, (index,)))
     return found

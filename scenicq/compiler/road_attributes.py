@@ -37,7 +37,7 @@ from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
 from scenicq.geometry.road_direction import along_lines
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["names_worked_out", "worked_out"]
+__all__ = ["is_worked_out", "names_worked_out", "worked_out"]
 
 _CURB, _SIDEWALK, _SHOULDER = 5.0, 8.0, 1.0
 """Metres from a road's right edge within which a curb, sidewalk or shoulder belongs to it."""
@@ -175,6 +175,11 @@ _REFUSED: dict[str, tuple[type | tuple[type, ...], str]] = {
     "sectionAt": (Road, "use `laneSectionAt`"),
     "shiftLanes": (Road, "use `shiftedBy` of a lane section"),
 }
+
+
+def is_worked_out(name: str) -> bool:
+    """Whether an attribute is worked out for elements of some kind."""
+    return name in _WORKED_OUT or name.removeprefix("_") in _UNDERSCORED
 
 
 def names_worked_out(value: NetworkElement | Network) -> set[str]:

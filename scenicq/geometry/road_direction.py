@@ -85,6 +85,11 @@ class RoadDirection:
     lanes: tuple[DirectedLane, ...] = field(repr=False)
     name: str = "roadDirection"
 
+    @property
+    def is_nowhere(self) -> bool:
+        """Whether no lane has a direction."""
+        return not any(len(_segments(lane.centerline)) for lane in self.lanes)
+
     def values(self, x: float, y: float) -> tuple[float, ...]:
         """The headings allowed at a point, in (-pi, pi]; none where the field is undefined."""
         return self._values(np.array([(x, y)], dtype=float))[0]

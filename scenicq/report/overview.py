@@ -105,7 +105,10 @@ def funnel_section(funnel: Funnel, total: int) -> str:
     rows = [_step(name, number, funnel.frames) for name, number in steps]
     rows += [_step(name, number) for name, number in counted]
     stopped = f"Stopped after {funnel.frames:,} of {total:,} frames (--limit)." if funnel.frames < total else ""
-    told = [f"{each.message}{f' ({each.span.place})' if each.span is not None else ''}" for each in funnel.warnings]
+    told = [
+        "; ".join((f"{each.message}{f' ({each.span.place})' if each.span is not None else ''}", *each.hints))
+        for each in funnel.warnings
+    ]
     told += [
         f"`{what}` is missing in {count:,} frame{'' if count == 1 else 's'} of the dataset, and not compared there"
         for what, count in sorted(funnel.missing.items())

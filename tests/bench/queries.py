@@ -7,6 +7,7 @@ the numbers to bench-results/.
 from __future__ import annotations
 
 import json
+import os
 import platform
 import statistics
 import subprocess
@@ -46,6 +47,20 @@ def median(*args: object) -> tuple[float, str]:
     """The median of several runs, and the output of the last."""
     runs = [timed(*args) for _ in range(ROUNDS)]
     return statistics.median(seconds for seconds, _ in runs), runs[-1][1]
+
+
+def near(dataset: Path) -> dict[str, float]:
+    """CPU seconds of a match that also says which frames come closest, beside the same match alone; medians."""
+    scenario = ROOT / "sample_data" / "scenarios" / "01_pedestrian_facing_ego.scenic"
+    plain, both = list[float](), list[float]()
+    for _ in range(ROUNDS):
+        for times, more in ((plain, ()), (both, ("--near", "3"))):
+            before = os.times()
+            timed("match", scenario, dataset, "--format", "jsonl", "--jobs", "1", *more)
+            after = os.times()
+            times.append(after.children_user + after.children_system - before.children_user - before.children_system)
+    seconds, alone = statistics.median(both), statistics.median(plain)
+    return {"seconds": seconds, "% of the plain match": 100 * seconds / alone}
 
 
 def compiling() -> dict[str, float]:
@@ -88,6 +103,7 @@ def measure(source: Path, folder: Path) -> dict[str, dict[str, float]]:
     for scenario in sorted((ROOT / "sample_data" / "scenarios").glob("*.scenic")):
         seconds, output = median("match", scenario, dataset, *SETTING)
         found[scenario.stem] = {"seconds": seconds, "matches": len(output.splitlines())}
+    found["--near 3"] = near(dataset)
     return found
 
 

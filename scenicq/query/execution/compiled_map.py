@@ -6,6 +6,7 @@ map that the program names is used.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,9 +15,20 @@ from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 from scenicq.store.dataset import Dataset
+from scenicq.store.manifest import Manifest
 
-__all__ = ["about_dataset", "map_remark", "program_network", "program_remarks", "read_network"]
+__all__ = [
+    "about_dataset",
+    "is_about_map",
+    "map_remark",
+    "misfit_remarks",
+    "program_network",
+    "program_remarks",
+    "read_network",
+]
 
+_NAMED_MAPS = 4
+"""Maps that one warning names."""
 _SUFFIXES = (".xodr", ".geojson", ".json")
 _HINT = "`--map FILE` gives a map to use instead"
 
@@ -83,6 +95,17 @@ def _inside(named: NamedMap, folder: Path) -> Path:
     return file
 
 
+def is_about_map(error: ScenarioError) -> bool:
+    """Whether an error may be one of the map alone: a program that it fits has what this one lacks.
+
+    Lists of elements are empty there, and requirements fail that hold of elements elsewhere.
+    """
+    return {each.code for each in error.diagnostics} <= _OF_MAPS
+
+
+_OF_MAPS = frozenset({"map-lacks", "runtime-error", "impossible-requirement"})
+
+
 def about_dataset(error: ScenarioError, dataset: Dataset, map_name: str) -> ScenarioError:
     """The error with the dataset in it, where a map lacks what the program needs; any other as it is."""
     absent = not dataset.features(map_name)
@@ -102,6 +125,31 @@ def about_dataset(error: ScenarioError, dataset: Dataset, map_name: str) -> Scen
             where = f"dataset {dataset.name}" if map_name in each.message else f"map `{map_name}` of {dataset.name}"
             told.append(replace(each, message=f"{each.message} ({where})"))
     return ScenarioError(told)
+
+
+def misfit_remarks(lacking: Mapping[str, Diagnostic], manifest: Manifest) -> Iterator[Diagnostic]:
+    """Warnings of maps on which no frame can match; those that lack the same are spoken of together.
+
+    Args:
+        lacking: What each of them lacks, by name.
+        manifest: Of the dataset; maps without frames are passed over.
+    """
+    frames = {name: counts.frames for name, counts in manifest.by_map.items()}
+    grouped: dict[str, list[str]] = {}
+    for name, told in lacking.items():
+        if frames.get(name):
+            grouped.setdefault(told.message.replace(f"`{name}`", ""), []).append(name)
+    for alike in grouped.values():
+        count = sum(frames[name] for name in alike)
+        shown = ", ".join(f"`{name}`" for name in alike[:_NAMED_MAPS])
+        told = lacking[alike[0]]
+        message = (
+            f"{count} frames on map {shown} cannot match: {told.message}"
+            if len(alike) == 1
+            else f"{count} frames on {len(alike)} maps ({shown}{', ...' if len(alike) > _NAMED_MAPS else ''}) "
+            f"cannot match; of `{alike[0]}`: {told.message}"
+        )
+        yield replace(told, code="map-lacks", message=message, severity="warning")
 
 
 def map_remark(source: Source, version: int | None, dataset: Dataset) -> Diagnostic | None:

@@ -24,7 +24,13 @@ from scenicq.match.problem.preprocess import ready
 from scenicq.match.verdict import Cause, Match, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
-from scenicq.query.execution.compiled_map import about_dataset, map_remark, program_remarks
+from scenicq.query.execution.compiled_map import (
+    about_dataset,
+    is_about_map,
+    map_remark,
+    misfit_remarks,
+    program_remarks,
+)
 from scenicq.query.execution.frames_ahead import FramesAhead, telling
 from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
 from scenicq.query.execution.never_compared import Coverage, coverage
@@ -40,8 +46,6 @@ __all__ = ["MAP_LACKS", "Query", "QueryOptions", "RecordingRange"]
 
 MAP_LACKS = "map "
 """How the name of what excludes frames begins where it is their map; the map's follows."""
-_NAMED_MAPS = 4
-"""Maps that one warning names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,35 +188,31 @@ class Query:
             try:
                 self.compiled_map(name)
             except ScenarioError as error:
-                if error.diagnostics[0].code != "map-lacks":
+                if not is_about_map(error):
                     raise
                 lacking[name] = error
         if lacking and len(lacking) == len(self.dataset.maps):
-            raise next(iter(lacking.values()))
+            wrong = (error for error in lacking.values() if error.diagnostics[0].code != "map-lacks")
+            raise next(wrong, None) or next(iter(lacking.values()))
         told = {name: error.diagnostics[0] for name, error in lacking.items()}
         return {name: told.get(name) or self.compiled_map(name) for name in self.dataset.maps}
 
+    def misfits(self) -> list[Diagnostic]:
+        """Warnings of the maps on which no frame can match, one for all that lack the same.
+
+        Raises:
+            ScenarioError: The program is wrong, or fits no map.
+        """
+        told = {name: each for name, each in self._compiled_maps().items() if isinstance(each, Diagnostic)}
+        return list(misfit_remarks(told, self.dataset.manifest))
+
     def _warn(self, compiled: Mapping[str, CompiledMap | Diagnostic]) -> None:
         """Note in the funnel what the author should know, and count the frames on maps that cannot match."""
-        lacking: dict[str, list[tuple[str, Diagnostic]]] = {}
         for name, told in compiled.items():
-            if isinstance(told, Diagnostic):
-                # maps that lack the same are spoken of together
-                lacking.setdefault(told.message.replace(f"`{name}`", ""), []).append((name, told))
-                if here := self.frames(name):
-                    self.funnel.frames += here
-                    self.funnel.excluded[f"{MAP_LACKS}{name}"] += here
-        for alike in lacking.values():
-            count = sum(self.dataset.manifest.by_map.get(name, Counts()).frames for name, _ in alike)
-            shown = ", ".join(f"`{name}`" for name, _ in alike[:_NAMED_MAPS])
-            first, told = alike[0]
-            message = (
-                f"{count} frames on map {shown} cannot match: {told.message}"
-                if len(alike) == 1
-                else f"{count} frames on {len(alike)} maps ({shown}{', ...' if len(alike) > _NAMED_MAPS else ''}) "
-                f"cannot match; of `{first}`: {told.message}"
-            )
-            self.funnel.warnings.append(Diagnostic("map-lacks", message, hints=told.hints, severity="warning"))
+            if isinstance(told, Diagnostic) and (here := self.frames(name)):
+                self.funnel.frames += here
+                self.funnel.excluded[f"{MAP_LACKS}{name}"] += here
+        self.funnel.warnings += self.misfits()
         fitting = [each for each in compiled.values() if isinstance(each, CompiledMap)]
         if fitting:
             compared = self.coverage()
@@ -234,7 +234,7 @@ class Query:
             try:
                 yield self.compiled_map(name)
             except ScenarioError as error:
-                if error.diagnostics[0].code != "map-lacks":
+                if not is_about_map(error):
                     raise
 
     def coverage(self, maps: Sequence[str] | None = None) -> Coverage:

@@ -190,3 +190,13 @@ def test_what_a_condition_over_time_reads_and_no_label_has_is_told(tmp_path):
     speed = PAIR + "terminate when other.speed > 2"
     assert [code for code, _ in over_time(tmp_path / "1", speed)] == ["no-tracks", "never-compared"]
     assert over_time(tmp_path / "2", speed, track="t") == []
+
+
+def test_the_report_names_it_with_its_line(dataset, run, tmp_path):
+    file = tmp_path / "p.scenic"
+    file.write_text(f"model scenic.domains.driving.model\nego = new Car {PLACED}\nnew Car {PLACED}, with spede 3\n")
+    assert run("match", file, dataset.folder, "--report", tmp_path / "pages").exit_code == 0
+    page = (tmp_path / "pages" / "index.html").read_text()
+    assert "`Car#2.spede` is never compared" in page
+    assert "p.scenic:3:" in page
+    assert "the labels have of `Car`: heading, width, length, velocity, speed, colour" in page
