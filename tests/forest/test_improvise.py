@@ -235,3 +235,12 @@ def test_what_geometry_cannot_make_is_no_scene() -> None:
                         "other = new Object at (3, 3), with reach -1\n"
                         "require ego in CircularRegion(ego.position, other.reach)\n")  # fmt: skip
     assert Improviser(scenario).draw(random.Random(1), 20) is None
+
+
+def test_that_geometry_cannot_tell_what_holds_is_said() -> None:
+    text = "area = RectangularRegion((0, 0), 0, 100, 100)\nfor i in range(20):\n"
+    text += "    area = area.difference(CircularRegion((2 * i - 20, (i * 7) % 20 - 10), 1.7))\n"
+    scenario = compiled(f"{text}ego = new Object at (0, 0), with width 40, with length 40\nrequire ego in area\n")
+    improviser = Improviser(scenario)
+    assert improviser.draw(random.Random(1), 0) is None
+    assert "holds a box" in improviser.undecided
