@@ -14,12 +14,14 @@ from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest import improvise
+from scenicq.forest.containment_pruning import _area
 from scenicq.forest.draws import draw_leaf
 from scenicq.forest.evaluate import evaluate_all
 from scenicq.forest.improvise import Improviser
 from scenicq.forest.inline import assemble
 from scenicq.forest.nodes import Constant, Identity, Leaf, TruncatedNormal, Undefined, Value
 from scenicq.forest.scenario import BuiltIn, Scenario
+from scenicq.geometry.regions import Disc, Rectangle, UnionOf
 
 STREET = street()
 ALL = frozenset(BuiltIn)
@@ -244,3 +246,10 @@ def test_that_geometry_cannot_tell_what_holds_is_said() -> None:
     improviser = Improviser(scenario)
     assert improviser.draw(random.Random(1), 0) is None
     assert "holds a box" in improviser.undecided
+
+
+def test_a_region_of_several_parts_is_one_shape_with_the_area_of_all() -> None:
+    parts = (Rectangle((0.0, 0.0), 0.0, 2.0, 2.0), Rectangle((1.0, 0.0), 0.0, 2.0, 2.0), Rectangle((9.0, 0.0), 0, 1, 1))
+    assert _area(UnionOf(parts)).area == pytest.approx(7.0)  # type: ignore[union-attr]
+    assert _area(parts[0]).area == pytest.approx(4.0)  # type: ignore[union-attr]
+    assert _area(UnionOf((parts[0], Disc((0.0, 0.0), 1.0)))) is None
