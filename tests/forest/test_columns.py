@@ -18,7 +18,17 @@ from test_intervals import observing
 from scenicq.compiler.default_street import street
 from scenicq.forest import build
 from scenicq.forest.column_domain import ColumnDomain
-from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Coded, Column, Placed, column_of, constant_column
+from scenicq.forest.columns import (
+    DEFINED,
+    UNDEFINED,
+    UNKNOWN,
+    Coded,
+    Column,
+    Placed,
+    column_of,
+    constant_column,
+    truth_of,
+)
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.interpret import interpret, steps_of
@@ -293,3 +303,15 @@ def test_numbers_and_vectors_are_computed_for_all_places_together(name):
     for place in range(50):
         seen = {key: float(column.data[place]) for key, column in values.items()}
         assert agrees(found, place, (50,), evaluate(NUMERIC[name], {}, seen))
+
+
+@pytest.mark.parametrize(
+    "value", [2.0, True, (1.0, 2.0), "text", None, Disc((0.0, 0.0), 1.0), Undefined("nothing there")], ids=repr
+)
+def test_a_value_that_is_the_same_everywhere_is_so_at_any_number_of_places(value):
+    column = constant_column(value)
+    parts = column.data if isinstance(column.data, tuple) else (column.data,)
+    arrays = [part.which if isinstance(part, Coded) else part for part in parts]
+    for count in (1, 5):
+        assert {np.broadcast_to(each, count).shape for each in (*arrays, column.status)} == {(count,)}
+        assert np.broadcast_to(truth_of(column.data), count).shape == (count,)

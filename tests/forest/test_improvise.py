@@ -14,12 +14,14 @@ from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest import improvise
+from scenicq.forest.containment_pruning import _area
 from scenicq.forest.draws import draw_leaf
 from scenicq.forest.evaluate import evaluate_all
 from scenicq.forest.improvise import Improviser
 from scenicq.forest.inline import assemble
 from scenicq.forest.nodes import Constant, Identity, Leaf, TruncatedNormal, Undefined, Value
 from scenicq.forest.scenario import BuiltIn, Scenario
+from scenicq.geometry.regions import Disc, Rectangle, UnionOf
 
 STREET = street()
 ALL = frozenset(BuiltIn)
@@ -235,3 +237,19 @@ def test_what_geometry_cannot_make_is_no_scene() -> None:
                         "other = new Object at (3, 3), with reach -1\n"
                         "require ego in CircularRegion(ego.position, other.reach)\n")  # fmt: skip
     assert Improviser(scenario).draw(random.Random(1), 20) is None
+
+
+def test_that_geometry_cannot_tell_what_holds_is_said() -> None:
+    text = "area = RectangularRegion((0, 0), 0, 100, 100)\nfor i in range(20):\n"
+    text += "    area = area.difference(CircularRegion((2 * i - 20, (i * 7) % 20 - 10), 1.7))\n"
+    scenario = compiled(f"{text}ego = new Object at (0, 0), with width 40, with length 40\nrequire ego in area\n")
+    improviser = Improviser(scenario)
+    assert improviser.draw(random.Random(1), 0) is None
+    assert "holds a box" in improviser.undecided
+
+
+def test_a_region_of_several_parts_is_one_shape_with_the_area_of_all() -> None:
+    parts = (Rectangle((0.0, 0.0), 0.0, 2.0, 2.0), Rectangle((1.0, 0.0), 0.0, 2.0, 2.0), Rectangle((9.0, 0.0), 0, 1, 1))
+    assert _area(UnionOf(parts)).area == pytest.approx(7.0)  # type: ignore[union-attr]
+    assert _area(parts[0]).area == pytest.approx(4.0)  # type: ignore[union-attr]
+    assert _area(UnionOf((parts[0], Disc((0.0, 0.0), 1.0)))) is None

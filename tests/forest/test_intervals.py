@@ -189,3 +189,24 @@ def test_without_boxes_nothing_is_said_of_what_is_asked_of_regions():
         truth = interpret(steps_of(meeting), domain)[id(meeting)]
         assert bounds[0] == (49.0 if boxed else 0.0)
         assert truth.can_hold is (not boxed)
+
+
+def test_ends_in_arrays_are_those_in_numbers():
+    values = [-math.inf, -2.5, -1.0, 0.0, 0.5, 3.0, math.inf, math.nan]
+    with np.errstate(invalid="ignore"):
+        for some in (values, values[1:-2], values[-1:]):
+            found = ARRAYS.known(np.array(some))
+            expected = [FLOATS.known(value) for value in some]
+            assert np.broadcast_to(found.low, len(some)).tolist() == [each.low for each in expected]
+            assert np.broadcast_to(found.high, len(some)).tolist() == [each.high for each in expected]
+            assert found.exact == all(each.exact for each in expected)
+
+
+@pytest.mark.parametrize("ends", [FLOATS, ARRAYS])
+def test_what_is_chosen_lies_in_the_hull_of_numbers_or_of_vectors(ends):
+    domain = IntervalDomain(ends)
+    numbers = [Interval(1.0, 1.0, True), Interval(-2.0, 0.5), Interval(4.0, 5.0)]
+    vectors = [IntervalVector(one, other) for one, other in itertools.pairwise(numbers)]
+    assert domain.select(None, numbers)[:2] == (-2.0, 5.0)
+    assert [each[:2] for each in domain.select(None, vectors)] == [(-2.0, 1.0), (-2.0, 5.0)]
+    assert domain.select(None, [*numbers, *vectors]) is None

@@ -45,6 +45,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.show import show
 from scenicq.forest.simplify import simplify
 from scenicq.forest.walk import features, leaves, postorder, transform
+from scenicq.geometry.membership import contains
 from scenicq.geometry.regions import PolygonSet
 
 STREET = street()
@@ -267,3 +268,12 @@ def test_operators_are_shown_between_what_they_join_and_functions_before():
     assert show(Arithmetic(ArithmeticOp.MAX, (b, a))) == "max(0.width, 1)"
     assert show(Arithmetic(ArithmeticOp.NEG, (b,))) == "neg(0.width)"
     assert show(Arithmetic(ArithmeticOp.ADD, (b, a, b))) == "+(0.width, 1, 0.width)"
+
+
+def test_a_point_in_one_of_several_regions_is_in_their_union_whatever_they_are_made_of():
+    text = "Uniform(CircularRegion((500, 500), 2), PolygonalRegion([(0, 0), (9, 0), (9, 9)]), {})"
+    for more in ("RectangularRegion((-50, -50), 0, 4, 4)", "PolygonalRegion([(-9, 0), (0, 0), (0, -9)])"):
+        scenario = simplify(compiled(f"ego = new Object in {text.format(more)}"))
+        (point,) = leaves(scenario.objects[0].properties["position"].value)
+        assert all(contains(point.region.value, *place) for place in ((500.5, 500.5), (8.0, 1.0)))
+        assert contains(point.region.value, -50.0, -50.0) or contains(point.region.value, -1.0, -1.0)

@@ -47,7 +47,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
 
     Args:
         parts: The constraints, conditioned, in parts that share no random variable but one.
-        shared: The random number that they share, if there are several parts.
+        shared: The random number that all of them share, if there are several parts.
         tolerance: Per feature.
     """
     start = BoxSet.start(ConstraintNetwork([item for part in parts for item in part], tolerance), {}).narrowed()
@@ -64,7 +64,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     limits: list[FloatInterval] = []
     try:
         for network in networks:
-            known = {shared: limits} if limits and shared in network.leaves else {}
+            known = {shared: limits} if limits else {}
             found = list(directed(BoxSet.start(network, known)))
             if not found:
                 return Refuted(network.items[0][0])

@@ -133,7 +133,7 @@ class _Prover:
         # of a third object there are no columns
         bounds, texts, places, chosen = self.reader.of(objects), list[str](), list[tuple[int, str]](), 0
         for constraint in group.constraints:
-            texts += self._observed(constraint, bounds)
+            _check_columns(constraint, bounds)
             if isinstance(constraint, Condition):
                 texts.append(_told(SQL.negation(bounds.can_fail(constraint.expression))))
                 continue
@@ -146,19 +146,6 @@ class _Prover:
         return SufficientCondition(
             objects, " AND ".join(dict.fromkeys(f"({text})" for text in texts if text)), tuple(places)
         )
-
-    def _observed(self, constraint: Constraint, bounds: SqlBounds) -> list[str]:
-        """That everything is observed which a constraint speaks of."""
-        asked = set(features(constraint.expression))
-        if isinstance(constraint, Comparison):
-            asked.add((constraint.object, constraint.property))
-        found: list[str] = []
-        for key in sorted(asked):
-            column = bounds.columns.get(key)
-            if column is None:
-                raise _OpenError
-            found += [f"{part} IS NOT NULL" for part in ((column,) if isinstance(column, str) else column)]
-        return found
 
     def _comparison(self, item: Comparison, bounds: SqlBounds) -> tuple[str, list[tuple[int, str]]]:
         own, node = bounds.columns[item.object, item.property], item.expression
@@ -347,6 +334,14 @@ def _close(off: Sequence[Expr], sure: float) -> str:
     x, y = off
     squares = [SQL.times(each, each) for each in (x, y)]
     return _told(SQL.at_most(SQL.plus(*squares), sure * sure))
+
+
+def _check_columns(constraint: Constraint, bounds: SqlBounds) -> None:
+    """Raise unless there are columns for all that a constraint speaks of; where a label lacks it they are null."""
+    asked = features(constraint.expression)
+    own = [(constraint.object, constraint.property)] if isinstance(constraint, Comparison) else []
+    if not all(key in bounds.columns for key in (*asked, *own)):
+        raise _OpenError
 
 
 def _told(condition: str | bool) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import random
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -12,15 +14,17 @@ from conditioned_groups import groups
 from scenicq.forest import build
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.condition import condition
-from scenicq.forest.nodes import ArithmeticOp
+from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, VectorOf
 from scenicq.forest.walk import leaves
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.fields import field_solver
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.linear.linear_relaxation import extent_affine
 from scenicq.match.problem.evaluation import replay
-from scenicq.match.problem.outcome import Refuted, Satisfied
-from scenicq.match.tolerance import Tolerance
+from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
+from scenicq.match.tolerance import EXACT, Tolerance
+
+from .patchwork import HEADINGS, SIDE, Beside, patchwork
 
 CROSSING = """
 ego = new Car on intersection
@@ -94,3 +98,66 @@ def test_one_shift_suits_all_cars_exactly_where_some_value_of_it_does(asked):
     assert {Refuted, Satisfied} <= set(told)
     assert max(map(len, asked)) == 3
     assert max(map(max, asked)) > 1
+
+
+def blamed(outcome, parts):
+    """Whether what is to blame is one of the constraints."""
+    return any(outcome.constraint is constraint for part in parts for constraint, _, _ in part)
+
+
+@pytest.mark.parametrize("far", [3.0, 12.0])
+def test_parts_suit_each_other_exactly_where_arithmetic_says_so(far, monkeypatch):
+    monkeypatch.setattr(field_solver, "probed", lambda start, tolerance: None)
+    rng, met = random.Random(1), Counter()
+    for _ in range(18):
+        field, value = patchwork(rng, 4), rng.uniform(0.5, 5.5)
+        cars = [Beside(field, rng.uniform(0.0, 3 * SIDE - 2.0), number, far) for number in range(rng.choice((2, 3)))]
+        # each of them alone can be as it is seen; together perhaps
+        seen = [car.seen(rng.choice((value, value, rng.uniform(0.0, 6.0))), rng) for car in cars]
+        shared = between(0.0, 6.0)
+        parts = [car.items(shared, each) for car, each in zip(cars, seen, strict=True)]
+        outcome = field_solver.decide_directions(parts, shared.identity, EXACT)
+        may, must = (
+            any(
+                max(low for low, _ in some) <= min(high for _, high in some)
+                for some in itertools.product(
+                    [(0.0, 6.0)], *(car.allowed(each, slack) for car, each in zip(cars, seen, strict=True))
+                )
+            )
+            for slack in (0.01, -0.01)
+        )
+        if isinstance(outcome, Satisfied):
+            assert may
+            assert replay([item for part in parts for item in part], outcome.values, EXACT, 1e-6)
+        else:
+            assert isinstance(outcome, Refuted)
+            assert not must
+            assert blamed(outcome, parts)
+        met[type(outcome)] += 1
+    assert min(met[Satisfied], met[Refuted]) > 3
+
+
+def test_parts_that_ask_for_one_direction_get_one(monkeypatch):
+    told = []
+    monkeypatch.setattr(field_solver, "probed", lambda start, tolerance: None)
+
+    def noted(*args):
+        told.append(find_shared_value(*args))
+        return told[-1]
+
+    monkeypatch.setattr(field_solver, "find_shared_value", noted)
+    rng, met = random.Random(2), set()
+    for _ in range(30):
+        field, shared = patchwork(rng, 4), between(0.0, 4 * SIDE)
+        heading = DirectionAt(Constant(field), VectorOf(shared, c(rng.uniform(0.1, 3.9))))
+        parts = [[compared("heading", build.add(heading, between(-0.1, 0.1)), rng.choice(HEADINGS))] for _ in range(2)]
+        outcome = field_solver.decide_directions(parts, shared.identity, EXACT)
+        one, other = (part[0][2] for part in parts)
+        assert isinstance(outcome, Satisfied if one == other and one in field.tiles[:, 0] else Refuted)
+        if isinstance(outcome, Satisfied):
+            assert replay([*parts[0], *parts[1]], outcome.values, EXACT, 1e-6)
+        assert all(isinstance(each, Satisfied) or blamed(each, parts) for each in told)
+        met |= {type(outcome), *map(type, told)}
+        told.clear()
+    # that the parts do not agree on the direction is not known before all are put together
+    assert met == {Satisfied, Refuted, Undecided}

@@ -107,3 +107,39 @@ def test_two_cars_on_one_random_lane_are_on_one() -> None:
         assert isinstance(matcher.match(label), Match if shared else NoMatch), (one, other)
         matched.add(shared)
     assert matched == {True, False}
+
+
+def chosen(name: str, options: dict[str, list[float | str]], picks: dict[str, int]) -> float:
+    """The number that a choice comes out as, where some of the choices are among others."""
+    found = options[name][picks[name]]
+    return chosen(found, options, picks) if isinstance(found, str) else found
+
+
+def test_choices_that_several_objects_share_come_out_the_same_in_all() -> None:
+    found = []
+    for seed in range(40):
+        rng = random.Random(seed)
+        options: dict[str, list[float | str]] = {}
+        for number in range(rng.randint(4, 7)):
+            some: list[float | str] = [0.0, 5.0, 10.0] if number < 2 else [*options, *options, 0.0, 5.0]
+            options[f"v{number}"] = [rng.choice(some) for _ in range(rng.randint(2, 3))]
+        names = [*options][-rng.randint(2, 3) :]
+        lines = [f"{name} = Uniform({', '.join(map(str, those))})" for name, those in options.items()]
+        lines += [f"new Object at ({name}, {10 * number})" for number, name in enumerate(names)]
+        text = "\n".join(["ego = new Object at (0, 50)", *lines, ""])
+        scenario = compile_scenario(Source("shared.scenic", text), street())
+        matcher = Matcher(scenario, MatchOptions(tolerance=EXACT, enforce=frozenset()))
+        all_picks = [dict(zip(options, each, strict=True)) for each in itertools.product(
+            *(range(len(those)) for those in options.values())
+        )]  # fmt: skip
+        possible = {tuple(chosen(name, options, picks) for name in names) for picks in all_picks}
+        ego = LabelObject("ego", "Object", "Object", 0.0, 50.0, 0.0, 1.0, 1.0)
+        for xs in itertools.product((0.0, 5.0, 10.0), repeat=len(names)):
+            things = tuple(
+                LabelObject(str(number), "Object", "Object", x, 10.0 * number, 0.0, 1.0, 1.0)
+                for number, x in enumerate(xs)
+            )
+            verdict = matcher.match(Label("f", "r", 0, "street", ego, things))
+            assert isinstance(verdict, Match if xs in possible else NoMatch), (text, xs, verdict)
+            found.append(xs in possible)
+    assert 0.2 < sum(found) / len(found) < 0.8

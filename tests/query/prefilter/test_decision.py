@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import random
 import sys
+from collections import Counter
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -252,3 +255,45 @@ def test_without_proofs_the_same_frames_match(dataset, name):
         frames.append([each.frame for each in query.results() if isinstance(each.verdict, Match)])
         assert query.funnel.matches == len(frames[-1])
     assert frames[0] == frames[1] != []
+
+
+def test_of_what_a_label_lacks_nothing_is_known(tmp_path):
+    """Whatever is required of numbers that some labels have and others do not."""
+    lacking = list(itertools.product([0.0, 1.5, None], [1.2, 2.4, None], [0.0, 3.0, None]))
+    labels = []
+    for at, (speed, width, own) in enumerate(lacking):
+        ego = LabelObject("ego", "Car", "car", 1.75, 50.0, 0.0, 2.0, 4.5, velocity=None if own is None else (0.0, own))
+        other = LabelObject(
+            "a", "Car", "car", 1.75, 60.0, 0.0, width, 4.5, velocity=None if speed is None else (0.0, speed)
+        )
+        labels.append(Label(f"{at}", "r", at, "street", ego, (other,)))
+    write_dataset(tmp_path / "d", [Recording("r", "street", tuple(labels))], {"street": STREET.features}, name="d")
+    dataset, decided = open_dataset(tmp_path / "d"), Counter()
+    for seed in range(30):
+        rng = random.Random(seed)
+
+        def number(depth, rng=rng):
+            if not depth or rng.random() < 0.3:
+                return rng.choice(["other.speed", "other.width", "ego.speed", "(distance to other)", "0", "1", "2"])
+            one, two = number(depth - 1), number(depth - 1)
+            ways = [f"({one} + {two})", f"({one} - {two})", f"({one} * {two})", f"max({one}, {two})", f"abs({one})"]
+            return rng.choice([*ways, f"min({one}, {two})"])
+
+        def truth(depth, rng=rng, number=number):
+            if not depth:
+                return f"({number(2)} {rng.choice('<>')} {number(1)})"
+            one, two = truth(depth - 1), truth(depth - 1)
+            return rng.choice([f"({one} and {two})", f"({one} or {two})", f"(not {one})"])
+
+        try:
+            speed = rng.choice(["", ", with speed Range(0, 2)"])
+            plan, matcher = plan_of(f"{CAR}{speed}\nrequire {truth(2)}", OPTIONS["default"])
+        except ScenarioError:
+            continue  # it never or always holds
+        sure = set(sure_frames(dataset, plan)[0]) if plan.decision else set()
+        for label, lacks in zip(labels, lacking, strict=True):
+            if label.frame in sure:
+                assert isinstance(matcher.match(label), Match), (plan.decision, label)
+                decided[None in lacks] += 1
+    assert decided[False] > 40
+    assert decided[True] > 40
