@@ -17,7 +17,7 @@ import click
 
 from scenicq import __version__
 from scenicq.errors import Diagnostic, ScenicqError
-from scenicq.garbage import seldom_collected, without_collector
+from scenicq.garbage import seldom_collected
 
 from .failures import refused_by_system
 from .interrupts import Interrupts
@@ -66,9 +66,12 @@ class Commands(click.Group):
         """Import a subcommand."""
         if cmd_name not in COMMANDS:
             return None
-        with without_collector():
-            module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
-        seldom_collected()
+        module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
+        if not gc.isenabled():
+            # the process is our own (`main`), and what is loaded stays: neither now nor at the end need the collector
+            # go through it; DuckDB, which reports what is never freed, is loaded later
+            gc.freeze()
+            seldom_collected()
         command: click.Command = getattr(module, cmd_name)
         return command
 

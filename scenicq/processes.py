@@ -7,7 +7,6 @@ order of the tasks, so that nothing depends on how many processes there are or w
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
 import pickle
 import signal
@@ -17,14 +16,15 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, field
 from itertools import islice
-from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
 from types import ModuleType, TracebackType
-from typing import Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import seldom_collected
+
+if TYPE_CHECKING:  # whoever starts no process need not load what starts them
+    from multiprocessing.connection import Connection
+    from multiprocessing.context import SpawnProcess
 
 __all__ = ["Lost", "Work", "Workers", "as_many_as_pay", "processors"]
 
@@ -178,6 +178,8 @@ class Workers(Generic[Task, Answer]):
                 self._bury(worker)
 
     def _begin(self) -> _Worker:
+        import multiprocessing  # noqa: PLC0415 - see above
+
         context = multiprocessing.get_context("spawn")
         mine, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs, *self._call), daemon=False)
@@ -190,6 +192,8 @@ class Workers(Generic[Task, Answer]):
 
     def _listen(self) -> None:
         """Wait until a worker says something or dies."""
+        from multiprocessing.connection import wait  # noqa: PLC0415
+
         by_connection = {worker.connection: worker for worker in self._workers}
         for ready in wait(list(by_connection)):
             worker = by_connection[ready]  # pyright: ignore[reportArgumentType]
@@ -233,6 +237,8 @@ def _uninterrupted() -> Generator[None]:
 
     Else one that comes while a worker is still importing modules would make it tell of that.
     """
+    from multiprocessing import resource_tracker  # noqa: PLC0415
+
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -272,6 +278,8 @@ def _main_hidden() -> Generator[None]:
 
 def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]], setup: tuple[Any, ...]) -> None:
     """The life of a worker."""
+    import multiprocessing  # noqa: PLC0415
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _interrupts())
@@ -294,6 +302,8 @@ def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]
 
 def _end_with(sentinel: int) -> None:
     """A parent that is killed says nothing."""
+    from multiprocessing.connection import wait  # noqa: PLC0415
+
     wait([sentinel])
     os._exit(1)
 

@@ -18,6 +18,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
 from scenicq.importers.base import Entry, Labels, Reader
 from scenicq.importers.report import Report
+from scenicq.processes import Lost, Workers, as_many_as_pay
 from scenicq.store.columns import columns_of
 from scenicq.store.labels import Recording
 from scenicq.store.schema import SCHEMA_VERSION
@@ -116,8 +117,6 @@ def write_segments(
     """
     many = 1 if len(jobs) <= 1 else at_once
     if not many:
-        from scenicq.processes import as_many_as_pay  # noqa: PLC0415 - slow to load, and for several segments
-
         many = as_many_as_pay()
     if many > 1:
         yield from _write_apart(world, jobs, many, on_recording)
@@ -129,8 +128,6 @@ def write_segments(
 
 def _write_apart(world: World, jobs: Sequence[Job], many: int, on_recording: OnRecording) -> Iterator[Segment]:
     """Write segments in so many processes."""
-    from scenicq.processes import Lost, Workers  # noqa: PLC0415 - slow to load, and for several segments
-
     workers: Workers[Job, Segment] = Workers(min(many, len(jobs)), _start_worker, (world,))
     known: set[tuple[str, int]] = set()
 

@@ -10,8 +10,8 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import duckdb
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +27,9 @@ from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
 from scenicq.store.sql import sql_list
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["Dataset", "open_dataset"]
 
@@ -154,6 +157,8 @@ class Dataset:
         except (ScenicqError, MemoryError):
             raise
         except Exception as error:
+            import duckdb  # noqa: PLC0415 - takes long to load
+
             if self.folder is not None:
                 self.verify()
             elif isinstance(error, (duckdb.Error, OSError, ValueError)):

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-
-import duckdb
+from typing import TYPE_CHECKING
 
 from scenicq.errors import DataError, Diagnostic
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["find_frame", "find_recording", "shortened"]
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-import duckdb
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["connect_in_memory"]
 
@@ -15,9 +18,11 @@ def connect_in_memory(config: Mapping[str, bool | int | str] | None = None) -> d
     Args:
         config: Settings that DuckDB takes at the start.
     """
+    import duckdb  # noqa: PLC0415 - takes long to load
+
     connection = duckdb.connect(":memory:", config={**(config or {})})
     # where Python is interactive, DuckDB draws how far a long query has come, between whatever the program writes;
     # in a notebook without widgets it does not, and cannot be asked not to
-    if connection.execute("SELECT current_setting('enable_progress_bar')").fetchall() == [(True,)]:
+    with contextlib.suppress(duckdb.Error):
         connection.execute("SET enable_progress_bar = false")
     return connection

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-
-import duckdb
+from typing import TYPE_CHECKING
 
 from scenicq.store.dataset import Dataset
 from scenicq.store.motion import LONGEST_GAP_US
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["Gaps", "Known", "LabelIntervals", "ObservedMotion", "observed_motion"]
 

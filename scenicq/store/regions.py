@@ -62,17 +62,17 @@ def read_features(files: Iterable[StoreFile], map_name: str) -> tuple[MapFeature
     features: list[MapFeature] = []
     for file in files:
         with open_parquet(file) as parquet:
-            table = parquet.read()
+            # threads take longer to start than they save
+            table = parquet.read(use_threads=False)
         # those of a map are together
         maps = table["map"].to_pylist()
         first = maps.index(map_name) if map_name in maps else 0
         table = table.slice(first, maps.count(map_name))
         shapes = shapely.from_wkb(table["geometry"].to_pylist())
-        columns = (table[name].to_pylist() for name in ("id", "kind", "properties"))
-        features += [
-            MapFeature(id=id, kind=kind, shape=shape, properties=json.loads(properties))
-            for id, kind, properties, shape in zip(*columns, shapes, strict=True)
-        ]
+        ids, kinds, texts = (table[name].to_pylist() for name in ("id", "kind", "properties"))
+        # as one text they take half the time
+        every = json.loads(f"[{','.join(texts)}]")
+        features += map(MapFeature, ids, kinds, shapes, every)
     return tuple(features)
 
 

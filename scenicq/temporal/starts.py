@@ -21,9 +21,9 @@ from scenicq.forest.walk import features, leaves
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.matcher import Matcher
-from scenicq.match.problem.constraints import Signature, describe_constraint
+from scenicq.match.problem.constraints import Signature, describe_constraint, relevant_properties
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.search.group_plan import MatchPlan, relevant_properties
+from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.plan_cache import PlanCache
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns

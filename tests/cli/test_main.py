@@ -36,6 +36,21 @@ def test_an_ingest_loads_nothing_that_only_queries_need():
     assert {"duckdb", "highspy", "dreal", "tqdm"}.isdisjoint(done.stdout.split())
 
 
+def test_names_that_sql_decides_load_no_matcher(crossroads):
+    text = "ego = new Car; other = new Car ahead of ego by Range(0, 40)"
+    program = (
+        "import sys; from scenicq_cli.main import main\n"
+        f"sys.argv = ['scenicq', 'match', '-e', {text!r}, {str(crossroads)!r}, '--format', 'ids']\n"
+        "try: main()\n"
+        "finally: print(*sorted(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout
+    loaded = done.stderr.split()
+    assert "scenicq.query.prefilter.decision" in loaded
+    assert {"scenicq.match.matcher", "multiprocessing", "tqdm"}.isdisjoint(loaded)
+
+
 def test_the_list_of_commands_is_what_their_own_help_says():
     context = click.Context(cli)
     for name, summary in COMMANDS.items():

@@ -12,14 +12,30 @@ from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
 from scenicq.forest.nodes import Feature, Node
 from scenicq.forest.scenario import BuiltIn, Scenario, ScenarioObject
+from scenicq.forest.walk import features
 from scenicq.match.options import MatchOptions
 
-__all__ = ["Signature", "build_groups", "describe_constraint"]
+__all__ = ["Signature", "build_groups", "describe_constraint", "relevant_properties"]
 
 Signature = tuple[frozenset[str], ...]
 """What is observed of each object of the scenario, by index; of the parameters at the end."""
 
 _ALWAYS = ("position", "heading")
+
+
+def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[frozenset[str], ...]:
+    """For each object, the properties for which it matters whether a label observes them."""
+    used: dict[int, set[str]] = {owner.index: {"position", "heading"} for owner in scenario.objects}
+    roots = [given.value for owner in scenario.objects for given in owner.properties.values()]
+    roots += [requirement.condition for requirement in scenario.requirements]
+    roots += [given.value for given in scenario.params.values()]
+    for index, name in features(*roots):
+        used[index].add(name)
+    for owner in scenario.objects:
+        used[owner.index].update(name for name, given in owner.properties.items() if given.explicit)
+        if BuiltIn.COLLISION in options.enforce:
+            used[owner.index].update(("width", "length"))
+    return tuple(frozenset(used[owner.index]) for owner in scenario.objects)
 
 
 def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, noisy: bool = False) -> Node | None:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from scenicq.forest.groups import Group
 from scenicq.forest.interpret import Steps, steps_of
-from scenicq.forest.scenario import BuiltIn, Scenario
-from scenicq.forest.walk import features
+from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.closed_forms import closed_form_of
 from scenicq.match.options import MatchOptions
@@ -16,7 +15,7 @@ from scenicq.match.problem.constraints import Signature, build_groups
 from scenicq.match.problem.subgroups import subgroups_of
 from scenicq.match.problem.symmetry import GroupShape, interchangeable, shape_of
 
-__all__ = ["GroupPlan", "MatchPlan", "make_plan", "relevant_properties"]
+__all__ = ["GroupPlan", "MatchPlan", "make_plan"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,21 +60,6 @@ class MatchPlan:
     twins: Mapping[int, int]
     links: Mapping[int, frozenset[int]]
     signature: Signature
-
-
-def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[frozenset[str], ...]:
-    """For each object, the properties for which it matters whether a label observes them."""
-    used: dict[int, set[str]] = {owner.index: {"position", "heading"} for owner in scenario.objects}
-    roots = [given.value for owner in scenario.objects for given in owner.properties.values()]
-    roots += [requirement.condition for requirement in scenario.requirements]
-    roots += [given.value for given in scenario.params.values()]
-    for index, name in features(*roots):
-        used[index].add(name)
-    for owner in scenario.objects:
-        used[owner.index].update(name for name, given in owner.properties.items() if given.explicit)
-        if BuiltIn.COLLISION in options.enforce:
-            used[owner.index].update(("width", "length"))
-    return tuple(frozenset(used[owner.index]) for owner in scenario.objects)
 
 
 def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, kinds: dict[Hashable, int]) -> MatchPlan:

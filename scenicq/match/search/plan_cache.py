@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates, candidates_of
-from scenicq.match.problem.constraints import Signature
+from scenicq.match.problem.constraints import Signature, relevant_properties
 from scenicq.match.search.first_fit import FirstFit, LabelRow, first_fit_of, signature_of
-from scenicq.match.search.group_plan import MatchPlan, make_plan, relevant_properties
+from scenicq.match.search.group_plan import MatchPlan, make_plan
 from scenicq.store.labels import Label
 
 __all__ = ["PlanCache"]

@@ -8,16 +8,13 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import TYPE_CHECKING
 
-import duckdb
 import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
-from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import Candidates
-from scenicq.match.search.group_plan import relevant_properties
+from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Match, Verdict
 from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
@@ -37,7 +34,11 @@ from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.temporal.interval_options import IntervalOptions
 
-if TYPE_CHECKING:  # takes long to load, and for queries over time
+if TYPE_CHECKING:  # they take long to load, and not every query needs the last two
+    import duckdb
+
+    from scenicq.match.matcher import Matcher
+    from scenicq.match.problem.candidates import Candidates
     from scenicq.query.execution.recording_matcher import DecidedRecordings
 
 _FIRST_BATCH, _BATCH = 16, 512
@@ -117,9 +118,8 @@ class Decider:
     every: bool
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
-    _compiled: dict[str, tuple[CompiledMap, Matcher]] = field(
-        default_factory=dict["str", "tuple[CompiledMap, Matcher]"]
-    )
+    _compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
+    _matchers: dict[str, Matcher] = field(default_factory=dict["str", "Matcher"])
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
     _solver: LazySolver | None = None
@@ -151,44 +151,43 @@ class Decider:
         check_deadline(self.until)
         connection = self.connection
         if block.map not in self._compiled:
-            compiled = self.compile_map(block.map)
-            self._compiled[block.map] = compiled, Matcher(compiled.scenario, self.options, self._solver)
-        compiled, matcher = self._compiled[block.map]
+            self._compiled[block.map] = self.compile_map(block.map)
+        compiled = self._compiled[block.map]
         if block.runs:
-            return self._recordings(compiled, matcher, block)
+            return self._recordings(compiled, block)
         if not compiled.plan.stages:
             labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=compiled.motion)]
-            return Decided(np.full(len(labels), -1, np.int16), self._matched(matcher, iter(labels)), [])
+            return Decided(np.full(len(labels), -1, np.int16), self._matched(compiled, iter(labels)), [])
         missed = run_prefilter(self.dataset, connection, compiled.plan, block)
         named = names(self.dataset, connection, block) if self.every else []
         if not (missed < 0).any():
             return Decided(missed, [], named)
         if compiled.plan.decision and not self.all_matches:
-            return Decided(missed, self._partly_decided(compiled, matcher), named)
+            return Decided(missed, self._partly_decided(compiled), named)
         left = candidates(connection, compiled.plan, motion=compiled.motion)
-        return Decided(missed, self._matched(matcher, left), named)
+        return Decided(missed, self._matched(compiled, left), named)
 
-    def _partly_decided(self, compiled: CompiledMap, matcher: Matcher) -> Iterator[list[Result]]:
+    def _partly_decided(self, compiled: CompiledMap) -> Iterator[list[Result]]:
         """The results of the frames that the prefilter has left, where SQL says that some surely match."""
         rows = decided_frames(self.connection, compiled.plan.decision, LABELS, compiled.plan.left)
         open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
         left = (
             candidates(self.connection, compiled.plan, motion=compiled.motion, among=open_) if len(open_) else iter(())
         )
-        asked = self._matched(matcher, left)
+        asked = self._matched(compiled, left)
         proved = Match({}, {})
         for _, sure, frame, recording, time in rows:
             check_deadline(self.until)
             yield [Result(frame, recording, time, proved)] if sure else next(asked)
 
-    def _recordings(self, compiled: CompiledMap, matcher: Matcher, block: Block) -> Decided:
+    def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
         # takes long to load
         from scenicq.query.execution.recording_matcher import RecordingMatcher, Survivors  # noqa: PLC0415
         from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
         intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver)
-        recordings = RecordingMatcher(self.dataset, matcher, intervals)
+        recordings = RecordingMatcher(self.dataset, self._matcher(compiled), intervals)
         connection, plan = self.connection, compiled.plan
         rows: CandidateRows | None = None
         if not plan.stages:
@@ -211,8 +210,19 @@ class Decider:
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))
 
-    def _matched(self, matcher: Matcher, left: Iterator[Candidate]) -> Iterator[list[Result]]:
+    def _matcher(self, compiled: CompiledMap) -> Matcher:
+        """The matcher of a map, where SQL has not decided everything."""
+        name = compiled.network.name
+        if name not in self._matchers:
+            # takes long to load
+            from scenicq.match.matcher import Matcher  # noqa: PLC0415
+
+            self._matchers[name] = Matcher(compiled.scenario, self.options, self._solver)
+        return self._matchers[name]
+
+    def _matched(self, compiled: CompiledMap, left: Iterator[Candidate]) -> Iterator[list[Result]]:
         """The results of labels, whose places are looked up so many at a time."""
+        matcher = self._matcher(compiled)
         size = _FIRST_BATCH
         while batch := list(islice(left, size)):
             labels = [(each.label, each.among) for each in batch]

@@ -7,13 +7,12 @@ what no label has is named with its line, what labels have instead, and a name s
 from __future__ import annotations
 
 import difflib
+import itertools
 import json
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
-from typing import Any
-
-import duckdb
+from typing import TYPE_CHECKING, Any
 
 from scenicq.errors import Diagnostic, Span
 from scenicq.forest.groups import PARAMS
@@ -22,7 +21,11 @@ from scenicq.forest.walk import features
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.dataset import Dataset
+from scenicq.store.place import open_parquet
 from scenicq.store.sql import sql_list, sql_text
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["Coverage", "coverage"]
 
@@ -128,7 +131,12 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
             places.setdefault((each.span, each.name, each.category), each)
     found = sorted(places.values(), key=lambda each: each.span.start if each.span is not None else 0)
     without = _without_tracks(dataset, scenarios)
-    if not found or not dataset.manifest.total.frames:
+    if not dataset.manifest.total.frames:
+        return Coverage(without)
+    with dataset.blamed():
+        # connecting takes longer than most questions, and of most programs the statistics say that nothing is missing
+        found = _perhaps_missing(dataset, found)
+    if not found:
         return Coverage(without)
     with closing(dataset.connect(views=False)) as connection, dataset.blamed():
         counts = _counts(dataset, connection, [each for each in found if each.comparable], options)
@@ -173,10 +181,7 @@ def _counts(
     """For each property the rows that could have it, those that do, and the frames in which one does not."""
     found: dict[_Setting, tuple[int, int, int]] = {}
     for table in ("labels", "objects"):
-        mine = [each for each in asked if each.ego == (table == "labels")]
-        full = _full_columns(dataset, connection, table, {_column(each) for each in mine} - {None})
-        found |= {each: (1, 1, 0) for each in mine if _column(each) in full}
-        mine = [each for each in mine if each not in found]
+        mine = [each for each in asked if _table(each) == table]
         rows = [f"count(*) FILTER ({_own(each, options)})" for each in mine]
         present = [f"count(*) FILTER ({_own(each, options)} AND {_present(each)})" for each in mine]
         numbers = _row(dataset, connection, [*rows, *present], table)
@@ -217,18 +222,35 @@ def _row(dataset: Dataset, connection: duckdb.DuckDBPyConnection, columns: list[
     return row
 
 
-def _full_columns(
-    dataset: Dataset, connection: duckdb.DuckDBPyConnection, table: str, names: Collection[str | None]
-) -> set[str]:
-    """Those of some columns in which every row has a value, by the statistics of the files: no row need be read."""
-    if not names:
-        return set()
-    listed = ", ".join(sql_text(name) for name in names if name is not None)
-    rows = connection.execute(
-        f"SELECT path_in_schema FROM parquet_metadata({_paths(dataset, table)}) WHERE path_in_schema IN ({listed}) "
-        "GROUP BY 1 HAVING count(*) = count(stats_null_count) AND sum(stats_null_count) = 0"
-    ).fetchall()
-    return {name for (name,) in rows}
+def _perhaps_missing(dataset: Dataset, found: Iterable[_Setting]) -> list[_Setting]:
+    """The properties without those whose column has a value in every row, by the statistics of the files."""
+    asked = [each for each in found if each.comparable]
+    full = {
+        (table, name)
+        for table in ("labels", "objects")
+        for name in _full_columns(dataset, table, {_column(each) for each in asked if _table(each) == table} - {None})
+    }
+    return [each for each in found if not each.comparable or (_table(each), _column(each)) not in full]
+
+
+def _table(each: _Setting) -> str:
+    return "labels" if each.ego else "objects"
+
+
+def _full_columns(dataset: Dataset, table: str, names: Collection[str | None]) -> Collection[str | None]:
+    """Those of some columns of a table in which no row lacks a value."""
+    full = set(names)
+    for file in dataset.files(table):
+        if not full:
+            break
+        with open_parquet(file) as parquet:
+            metadata = parquet.metadata
+            places = [place for place in range(metadata.num_columns) if metadata.schema.column(place).path in full]
+            for group, place in itertools.product(range(metadata.num_row_groups), places):
+                column = metadata.row_group(group).column(place)
+                if column.statistics is None or column.statistics.null_count != 0:
+                    full.discard(column.path_in_schema)
+    return full
 
 
 def _known(dataset: Dataset, connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.match.matcher import Matcher
-from scenicq.match.search.group_plan import relevant_properties
+from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.recording_starts import DecidedStart, label_of, start_table, starts_of
 from scenicq.query.execution.results import IntervalSpan, Result

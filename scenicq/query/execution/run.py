@@ -10,9 +10,7 @@ from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal, cast
-
-import duckdb
+from typing import TYPE_CHECKING, Literal, cast
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.temporal import Behaviors
@@ -41,6 +39,9 @@ from scenicq.query.prefilter.plan import Plan
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.manifest import Counts
 from scenicq.temporal.interval_options import IntervalOptions
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["MAP_LACKS", "Query", "QueryOptions", "RecordingRange"]
 
@@ -264,10 +265,9 @@ class Query:
             compiled: The scenario over that map, with its prefilter.
             match: The options.
         """
-        frames = self.dataset.manifest.by_recording[recording].frames
         known = replace(self._known, compiled={**self._known.compiled, map_name: compiled})
         options = replace(self.options, match=match, jobs=1, limit=None, every=False)
-        chosen = {map_name: RecordingRange(recording, recording, frames)}
+        chosen = {map_name: RecordingRange(recording, recording, self.dataset.manifest.by_recording[recording].frames)}
         return Query(self.dataset, self.source, options, chosen, file=self.file, _known=known)
 
     def frames(self, map_name: str) -> int:

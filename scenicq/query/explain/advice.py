@@ -16,8 +16,8 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from itertools import islice
+from typing import TYPE_CHECKING
 
-import duckdb
 import numpy as np
 
 from scenicq.errors import Span
@@ -34,6 +34,9 @@ from scenicq.query.explain.nearest_miss import show_tolerance
 from scenicq.query.explain.prefilter_counts import spots
 from scenicq.query.prefilter.executor import candidates, hold, run_plan
 from scenicq.store.classes import ancestors, is_class
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["Advice", "Outlook", "ProgramChange", "advice"]
 

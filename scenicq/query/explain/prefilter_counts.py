@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-import duckdb
 import numpy as np
 
 from scenicq.query.execution.run import Query
 from scenicq.query.prefilter.executor import Block, run_prefilter
 from scenicq.query.prefilter.plan import Plan
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["PrefilterCounts", "prefilter_counts", "spots"]
 

@@ -9,14 +9,16 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterable, Mapping, Sequence
-
-import duckdb
+from typing import TYPE_CHECKING
 
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.query.prefilter.sufficient import SufficientCondition
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = ["columns_of", "decided_frames", "decision", "new_table"]
 

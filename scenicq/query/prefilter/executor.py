@@ -12,9 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import duckdb
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
@@ -25,6 +24,9 @@ from scenicq.store.labels import Label
 from scenicq.store.reader import EGO_COLUMNS, LABEL_COLUMNS, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
 from scenicq.store.schema import ArrowTable
 from scenicq.store.sql import sql_text
+
+if TYPE_CHECKING:
+    import duckdb
 
 __all__ = [
     "Block",
@@ -208,12 +210,11 @@ def _rows_of(
     """The views that a plan reads, with the SQL of each; of the objects only the rows of the block are looked at."""
     files = {view: sql_text(str(dataset.files(table)[block.part])) for view, table in _TABLES.items()}
     numbered = "SELECT *, {} + file_row_number AS number FROM read_parquet({}, file_row_number = true)"
-    ends = connection.execute(
+    (ends,) = connection.execute(
         "SELECT min(first_object), max(first_object + object_count), min(first_sensor), "
         f"max(first_sensor + sensor_count) FROM read_parquet({files[LABELS]}, file_row_number = true) "
         f"WHERE {block.where}"
-    ).fetchone()
-    assert ends is not None
+    ).fetchall()
     limits = {OBJECTS: ends[:2], _SENSORS: ends[2:]}
     for view, path in files.items():
         where = ""
@@ -257,9 +258,8 @@ def hold(dataset: Dataset, connection: duckdb.DuckDBPyConnection, chosen: Sequen
         mine = "" if view == LABELS else f" WHERE frame IN (SELECT frame FROM {LABELS})"
         distinct = dict.fromkeys(selected)  # memberships may be of a whole part
         connection.execute(f"CREATE TEMP TABLE {view} AS SELECT * FROM ({' UNION ALL '.join(distinct)}){mine}")
-    row = connection.execute(f"SELECT count(*) FROM {LABELS}").fetchone()
-    assert row is not None
-    return int(row[0])
+    ((count,),) = connection.execute(f"SELECT count(*) FROM {LABELS}").fetchall()
+    return int(count)
 
 
 def run_prefilter(

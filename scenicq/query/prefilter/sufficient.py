@@ -41,8 +41,7 @@ from scenicq.forest.walk import features, postorder
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import IntersectionOf, Region
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.constraints import build_groups
-from scenicq.match.search.group_plan import relevant_properties
+from scenicq.match.problem.constraints import build_groups, relevant_properties
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO, ConditionReader, difference, object_columns, turned_within
 from scenicq.query.prefilter.regions import RegionNames, near_region

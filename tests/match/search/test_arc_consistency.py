@@ -12,8 +12,8 @@ from scenes import compiled, drawn, label_of
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import find_candidates
+from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.search.arc_consistency import arc_consistent
-from scenicq.match.search.group_plan import relevant_properties
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.store.labels import Label, LabelObject
 
