@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import random
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from scenicq.forest.condition import condition
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, VectorOf
 from scenicq.forest.walk import leaves
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.fields import field_solver
+from scenicq.match.fields import field_solver, shared_variable
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.linear.linear_relaxation import extent_affine
 from scenicq.match.problem.evaluation import replay
@@ -69,6 +70,27 @@ def asked(monkeypatch):
 
     monkeypatch.setattr(field_solver, "find_shared_value", counted)
     return counts
+
+
+@pytest.mark.parametrize("exact", list(itertools.product([True, False], repeat=2)))
+def test_a_way_without_a_solution_excludes_only_if_its_program_is_exact(monkeypatch, exact):
+    # no linear program has a solution, of which an inexact one proves nothing
+    found = []
+    monkeypatch.setattr(field_solver, "probed", lambda start, tolerance: None)
+    monkeypatch.setattr(
+        field_solver, "find_shared_value", lambda *given: found.append(given) or find_shared_value(*given)
+    )
+    items = next(items for items, true in groups(CROSSING.format(cars=3), 1) if true and len(items) >= 6)
+    decide_decomposed(items, Tolerance(position=0.05, heading=0.02))
+    parts, *rest = found[0]
+    ways = [replace(part[0], exact=one, sharp=True) for part, one in zip(parts, exact, strict=False)]
+    limits = next(each.limits for each in ways)
+    ways = [[replace(way, limits=limits)] for way in ways]
+    monkeypatch.setattr(shared_variable, "solved", lambda way, *_: Undecided(way.case.network.items[0][0], "nonlinear"))
+    monkeypatch.setattr(shared_variable, "extent", lambda *_: None)
+    outcome = find_shared_value(ways, *rest)
+    # the first part is asked first, and is the one that has nothing left
+    assert isinstance(outcome, Refuted if exact[0] else Undecided)
 
 
 def test_one_shift_suits_all_cars_exactly_where_some_value_of_it_does(asked):

@@ -66,6 +66,9 @@ SINGLE = {name: f"ego = new Car\n{text}" for name, text in SINGLE.items()}
 SINGLE["seen"] = (
     "ego = new Car with visibleDistance 15, with viewAngle 200 deg\nother = new Pedestrian on visible road, facing 3"
 )
+SINGLE["around"] = (
+    "ego = new Car with visibleDistance 15, with viewAngle 360 deg\nother = new Pedestrian on visible road"
+)
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +130,7 @@ def test_what_sql_decides_of_random_programs_has_a_proof(dataset, first):
 
 
 @pytest.mark.parametrize(
-    "name", ["range", "ahead", "options", "steps", "walker", "view", "seen", "or", "two", "crossing"]
+    "name", ["range", "ahead", "options", "steps", "walker", "view", "seen", "around", "or", "two", "crossing"]
 )
 def test_sql_decides_what_it_can(dataset, name):
     sure, left = check(dataset, SINGLE[name], OPTIONS["default"])
