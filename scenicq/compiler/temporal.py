@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 from scenicq.compiler.coerce import read_over_time
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.exclusions import Exclusions
+from scenicq.compiler.values import fail
 from scenicq.errors import Diagnostic, Span
-from scenicq.forest.nodes import Feature, Node
+from scenicq.forest.nodes import Constant, Feature, Node
 from scenicq.forest.temporal import (
     Always,
     And,
@@ -92,6 +93,9 @@ class TimedStatements:
 
         Where a condition asks for something that is not there, Scenic rejects the run when it reads the condition:
         that of a requirement or a termination at each sample, that of a monitor where the monitor comes to it.
+
+        Raises:
+            ScenarioError: impossible-requirement, where no run satisfies one.
         """
         if not self.used:
             return None, []
@@ -104,6 +108,11 @@ class TimedStatements:
                 run.excluded = at_test.get(number, always)
                 nodes.append(condition())
         run.excluded = of_scene
+        for requirement in self._requirements:
+            if _known(requirement.formula, nodes) is False:
+                raise fail(
+                    "impossible-requirement", "no run satisfies this requirement", requirement.span, "always false"
+                )
         requirements, excluded = list(self._requirements), list[tuple[Node, Span]]()
         for condition, span in always.conditions():
             if any(isinstance(node, Feature) and node.current for node in postorder([condition])):
@@ -159,3 +168,25 @@ def _guarded(monitor: Monitor, guards: Mapping[int, list[tuple[Atom, Span]]]) ->
             steps += [steps[number], Reject(span)]
             steps[number] = Test(guard, len(steps) - 2, len(steps) - 1)
     return Monitor(monitor.span, tuple(steps))
+
+
+def _known(formula: Formula, nodes: Sequence[Node]) -> bool | None:
+    """What a formula is whatever the run, where its constant atoms tell; None where they do not."""
+    match formula:
+        case Atom():
+            node = nodes[formula.number]
+            return None if not isinstance(node, Constant) else node.value is True
+        case Not():
+            value = _known(formula.operand, nodes)
+            return None if value is None else not value
+        case And() | Or():
+            values = [_known(part, nodes) for part in formula.operands]
+            decisive = isinstance(formula, Or)
+            return decisive if decisive in values else None if None in values else not decisive
+        case Always() | Eventually():
+            return _known(formula.operand, nodes)
+        case Next():
+            # there may be no next sample
+            return False if _known(formula.operand, nodes) is False else None
+        case Until():
+            return _known(formula.right, nodes)

@@ -189,6 +189,10 @@ def dataset(tmp_path_factory):
         f"ego = new Car {HERE}\nrequire ego._lane is not None",
         f"ego = new Car in network.lanes[0], {FREE}",
         f"ego = new Car {HERE}\nrequire (roadDirection at ego) < 4",
+        f"ego = new Car {HERE}\nrequire always ego._lane is not None",
+        f"ego = new Car {HERE}\nrequire not (always ego._lane is None)",
+        f"ego = new Car {HERE}\nrequire (ego.speed > -1) until (ego._lane is not None)",
+        f"ego = new Car {HERE}\nrequire (eventually ego._lane is not None) and (always ego.position.x < 99)",
     ],
 )
 def test_frames_of_a_map_that_does_not_do_are_told_and_the_others_found(dataset, text):
