@@ -72,7 +72,7 @@ def read_features(files: Iterable[StoreFile], map_name: str) -> tuple[MapFeature
         ids, kinds, texts = (table[name].to_pylist() for name in ("id", "kind", "properties"))
         # as one text they take half the time
         every = json.loads(f"[{','.join(texts)}]")
-        features += map(MapFeature, ids, kinds, shapes, every)
+        features += [MapFeature(*each) for each in zip(ids, kinds, shapes, every, strict=True)]
     return tuple(features)
 
 
