@@ -4,6 +4,9 @@ A `KeyboardInterrupt` can get lost on its way. What `__del__` or a callback of a
 happens to one interrupt in a hundred that come at random, as the locks of imports have such callbacks. Python tells of
 what it drops, and the interrupt is raised again at once. DuckDB turns an interrupt into an error of its own, and what
 other libraries do is theirs; so it is also remembered, and raised again while the command goes on as if nothing were.
+
+While a module loads, an interrupt waits: an extension module whose loading was broken off may not be loaded again, as
+where an error is handled that only it can name. DuckDB's ends the process then.
 """
 
 from __future__ import annotations
@@ -25,6 +28,8 @@ _LOOK_S = 0.5
 """Seconds between looks at whether anything is being cleaned up; else the interrupt is lost, and raised again."""
 _AT_ONCE_S = 0.001
 """Seconds until one that is known to be lost is raised again, outside of what lost it."""
+_LOADED_S = 0.01
+"""Seconds between looks at whether a module has loaded."""
 
 
 class Interrupts:
@@ -65,12 +70,25 @@ class Interrupts:
 
     def _notice(self, number: int, frame: FrameType | None) -> None:
         now = time.monotonic()
-        again = self.noticed and hasattr(signal, "SIGALRM") and number == signal.SIGALRM
+        timed = hasattr(signal, "setitimer")
+        again = self.noticed and timed and number == signal.SIGALRM
+        in_time = now < self._until if again else timed
+        loads = in_time and _loads_a_module(frame)
         # while anything is cleaned up, the interrupt or what has become of it is being handled
-        wait = again and sys.exc_info()[0] is not None and now < self._until
-        if not wait:
+        wait = loads or (again and in_time and sys.exc_info()[0] is not None)
+        if not (again and wait):
             self.noticed, self._until = True, now + INSIST_S
-        if hasattr(signal, "setitimer"):
-            signal.setitimer(signal.ITIMER_REAL, min(_LOOK_S, max(_AT_ONCE_S, self._until - now)))
+        if timed:
+            look_s = _LOADED_S if loads else _LOOK_S
+            signal.setitimer(signal.ITIMER_REAL, min(look_s, max(_AT_ONCE_S, self._until - now)))
         if not wait:
             raise KeyboardInterrupt
+
+
+def _loads_a_module(frame: FrameType | None) -> bool:
+    """Whether a module is loading where the signal has arrived."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False

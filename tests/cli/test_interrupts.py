@@ -163,6 +163,59 @@ def test_processes_that_are_only_starting_say_nothing_when_interrupted(tmp_path)
     assert (process.returncode, *told) == (130, "", "interrupted\n")
 
 
+LOADING = """
+import sys, time
+import click
+from scenicq_cli import main
+
+@click.command()
+def info():
+    try:
+        import native
+    except Exception:
+        import native  # an extension module may end the process here
+    finally:
+        print(getattr(sys.modules.get("native"), "whole", None))
+    time.sleep(5)
+    print("went on")
+
+main.Commands.get_command = lambda *_: info
+sys.argv = ["scenicq", "info"]
+main.main()
+"""
+NATIVE = """
+import os, signal, time
+print("loads")
+try:
+    os.kill(os.getpid(), signal.{name})
+    time.sleep(0.1)
+except KeyboardInterrupt:
+    raise ImportError("as an extension module says it")
+whole = True
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_module_is_loaded_once_and_whole_before_an_interrupt_arrives(tmp_path, name):
+    (tmp_path / "native.py").write_text(NATIVE.format(name=name))
+    (tmp_path / "program.py").write_text(LOADING)
+    command = [sys.executable, str(tmp_path / "program.py")]
+    heed = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False, **heed)
+    assert done.stdout == "loads\nTrue\n"
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+def test_a_module_that_does_not_end_loading_is_interrupted_all_the_same(tmp_path):
+    (tmp_path / "native.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGTERM)\ntime.sleep(30)")
+    program = LOADING.replace("from scenicq_cli import main", "from scenicq_cli import interrupts, main\n")
+    (tmp_path / "program.py").write_text(program.replace("@click", "interrupts.INSIST_S = 0.2\n\n@click", 1))
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "program.py")], capture_output=True, text=True, timeout=20, check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
 def test_an_ignored_interrupt_stays_ignored():
     program = (
         "import os, signal\nfrom scenicq_cli.interrupts import Interrupts\n"
