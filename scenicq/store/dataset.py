@@ -6,6 +6,7 @@ nothing: every connection is an in-memory database with views over the manifest'
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -157,11 +158,12 @@ class Dataset:
         except (ScenicqError, MemoryError):
             raise
         except Exception as error:
-            import duckdb  # noqa: PLC0415 - takes long to load
-
+            # what has failed may be the loading of DuckDB, which tried twice may end the process
+            duckdb = sys.modules.get("duckdb")
+            of_files = (OSError, ValueError) if duckdb is None else (duckdb.Error, OSError, ValueError)
             if self.folder is not None:
                 self.verify()
-            elif isinstance(error, (duckdb.Error, OSError, ValueError)):
+            elif isinstance(error, of_files):
                 message = f"{self.name} cannot be read: {' '.join(str(error).split())}"
                 hint = f"`scenicq info {self.name} --verify` reads all of it and names the files that have changed"
                 raise DataError(Diagnostic("store-damaged", message, hints=(hint,))) from error
