@@ -20,6 +20,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
 
 from .nested_choices import REACH, Composer, clear, label_for, small_map
@@ -143,3 +144,38 @@ def test_choices_that_several_objects_share_come_out_the_same_in_all() -> None:
             assert isinstance(verdict, Match if xs in possible else NoMatch), (text, xs, verdict)
             found.append(xs in possible)
     assert 0.2 < sum(found) / len(found) < 0.8
+
+
+NONLINEAR = """class Thing:
+    position: (Range(-99, 99), Range(-99, 99))
+    heading: Range(-180, 180) deg
+k = Uniform(1, 3, 9)
+a = Range(1, 2)
+b = Range(1, 2)
+c = Range(1, 2)
+ego = new Thing with pace k * a * b * c, with drive k + a * b - b * c, with third a * a * b + c * k
+"""
+
+
+@pytest.mark.parametrize(("chosen", "option"), [(1, 0), (3, 1), (9, 2), (5, None)])
+def test_what_is_left_of_an_option_goes_to_a_solver_where_nothing_else_decides_it(
+    chosen: float, option: float | None
+) -> None:
+    a, b, c = 1.3, 1.7, 1.1
+    shown = {"pace": chosen * a * b * c, "drive": chosen + a * b - b * c, "third": a * a * b + c * chosen}
+    ego = LabelObject("ego", "Object", "thing", 0.0, 0.0, heading=0.0, attributes=shown)
+    label = Label("frame", "recording", 0, "street", ego)
+    scenario = compile_scenario(Source("nonlinear.scenic", NONLINEAR), street())
+    options = MatchOptions(tolerance=EXACT)
+    assert isinstance(Matcher(scenario, options).match(label), Unknown)
+    with open_solver("portable") as solver:
+        verdict = Matcher(scenario, options, solver).match(label)
+    if option is None:
+        assert isinstance(verdict, NoMatch)
+        return
+    assert isinstance(verdict, Match)
+    assert verdict.witness["nonlinear.scenic:4:5"] == option
+    for found, drawn in zip(
+        [verdict.witness[f"nonlinear.scenic:{line}:5"] for line in (5, 6, 7)], (a, b, c), strict=True
+    ):
+        assert found == pytest.approx(drawn, abs=0.01)
