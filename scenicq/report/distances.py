@@ -30,6 +30,10 @@ Measured = tuple[XY, XY]
 
 _ASIDE = 130
 """Centimetres from a line to its length: more than half the width of a car."""
+_PARTS = (1 / 2, 1 / 3, 2 / 3, 1 / 5, 4 / 5)
+"""Where along a line its length may stand, the best first."""
+_LETTER = 0.6
+"""Width of a letter by its height."""
 
 
 def measured_distances(scenario: Scenario, observed: Observation, bounds: Bounds) -> list[Measured]:
@@ -79,7 +83,7 @@ def _known(node: Node, observed: Observation) -> object:
 
 
 def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
-    """Lines between both ends, each with its length beside its middle.
+    """Lines between both ends, each with its length beside its middle, or where that of another is not.
 
     Args:
         found: As `measured_distances` gives them.
@@ -87,6 +91,7 @@ def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
         size: Height of the letters in centimetres.
     """
     parts: list[str] = []
+    taken: list[tuple[float, float, float]] = []  # of each length its centre and half its width
     for (x0, y0), (x1, y1) in found:
         metres = math.hypot(x1 - x0, y1 - y0)
         if 100 * metres < size:
@@ -96,13 +101,28 @@ def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
         # beside the line, where no box at one of its ends hides it
         upright = abs(bottom - top) > abs(right - left)
         aside, above = (_ASIDE, -round(size * 0.35)) if upright else (0, _ASIDE)
+        told = f"{metres:.1f} m"
+        wide = size * _LETTER * len(told) / 2
+        spots = [
+            (left + part * (right - left) - aside, top + part * (bottom - top) - above, wide if upright else 0.0)
+            for part in _PARTS
+        ]
+
+        def crowded(spot: tuple[float, float, float], wide: float = wide) -> int:
+            x, y, before = spot
+            return sum(
+                abs(x - before - across) < wide + half and abs(y - along) < size for across, along, half in taken
+            )
+
+        x, y, before = min(spots, key=crowded)
+        taken.append((x - before, y, wide))
         parts.append(
             element(
                 "text",
-                f"{metres:.1f} m",
+                told,
                 class_="metres",
-                x=(left + right) // 2 - aside,
-                y=(top + bottom) // 2 - above,
+                x=round(x),
+                y=round(y),
                 font_size=size,
                 text_anchor="end" if upright else "middle",
             )

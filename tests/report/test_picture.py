@@ -17,7 +17,7 @@ from scenicq.match.verdict import Match
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.report.backdrop import Backdrop
-from scenicq.report.distances import measured_distances
+from scenicq.report.distances import draw_distances, measured_distances
 from scenicq.report.outlines import allowed_headings, allowed_place, outline
 from scenicq.report.picture import Shot, caption, draw, view_of
 from scenicq.report.png import can_make_png, png
@@ -262,6 +262,23 @@ def test_no_box_hides_a_length(shoot):
     assert abs(y1 - y0) > abs(x1 - x0)
     assert length.get("text-anchor") == "end"
     assert min(x0, x1) - int(length.get("x")) > 100  # centimetres; the ego is 2 m wide
+
+
+@pytest.mark.parametrize("size", [100, 200, 300])
+@pytest.mark.parametrize(("to_east", "to_north"), [(40, 10), (10, 40), (40, 0), (0, -40)])
+def test_lengths_of_distances_alongside_do_not_hide_one_another(to_east, to_north, size):
+    ends = [(part * to_east, part * to_north) for part in (1.0, 1.05, 1.1)]
+    texts = Drawn(
+        f'<svg data-origin="0 0">{draw_distances([((0.0, 0.0), end) for end in ends], Plane((0.0, 0.0)), size)}</svg>'
+    ).with_class("metres")
+    spans = []
+    for text in texts:
+        wide, x = 0.5 * size * len(text.text), int(text.get("x"))
+        right = x if text.get("text-anchor") == "end" else x + wide / 2
+        spans.append((right - wide, right, int(text.get("y"))))
+    assert [text.text for text in texts] == [f"{math.hypot(*end):.1f} m" for end in ends]
+    for (left, right, y), (start, end, line) in itertools.combinations(spans, 2):
+        assert right <= start or end <= left or abs(y - line) >= 0.7 * size
 
 
 @pytest.mark.parametrize("half", [50, 100])
