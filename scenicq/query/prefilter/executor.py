@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, pairwise
+from itertools import groupby, islice, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -207,9 +207,13 @@ _TABLES = {LABELS: "labels", OBJECTS: "objects", MEMBERSHIPS: "memberships", _SE
 def _rows_of(
     dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block, offset: int = 0
 ) -> Iterator[tuple[str, str]]:
-    """The views that a plan reads, with the SQL of each; of the objects only the rows of the block are looked at."""
+    """The views that a plan reads, with the SQL of each; of the objects only the rows of the block are looked at.
+
+    That of the labels comes first, and the rest costs nothing until it is asked for.
+    """
     files = {view: sql_text(str(dataset.files(table)[block.part])) for view, table in _TABLES.items()}
     numbered = "SELECT *, {} + file_row_number AS number FROM read_parquet({}, file_row_number = true)"
+    yield LABELS, f"{numbered.format(offset, files[LABELS])} WHERE {block.where}"
     (ends,) = connection.execute(
         "SELECT min(first_object), max(first_object + object_count), min(first_sensor), "
         f"max(first_sensor + sensor_count) FROM read_parquet({files[LABELS]}, file_row_number = true) "
@@ -219,8 +223,8 @@ def _rows_of(
     for view, path in files.items():
         where = ""
         if view == LABELS:
-            where = f" WHERE {block.where}"
-        elif view in limits and None not in limits[view]:
+            continue
+        if view in limits and None not in limits[view]:
             where = " WHERE file_row_number BETWEEN {} AND {} - 1".format(*limits[view])
         elif view == MEMBERSHIPS and block.end - block.first <= _MOST_NAMED:
             selected = f"SELECT frame FROM read_parquet({files[LABELS]}, file_row_number = true) WHERE {block.where}"
@@ -229,9 +233,9 @@ def _rows_of(
         yield view, numbered.format(offset, path) + where
 
 
-def _open(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block) -> None:
-    """Make the views that a plan reads."""
-    for view, rows in _rows_of(dataset, connection, block):
+def _open(connection: duckdb.DuckDBPyConnection, views: Iterable[tuple[str, str]]) -> None:
+    """Make views of some rows."""
+    for view, rows in views:
         connection.execute(f"CREATE OR REPLACE TEMP VIEW {view} AS {rows}")
 
 
@@ -276,12 +280,21 @@ def run_prefilter(
     Returns:
         For each frame in order the number of the step that excludes it, -1 for candidates.
     """
-    _open(dataset, connection, block)
-    return run_plan(connection, plan)
+    views = _rows_of(dataset, connection, block)
+    _open(connection, islice(views, 1))
+    return run_plan(connection, plan, views)
 
 
-def run_plan(connection: duckdb.DuckDBPyConnection, plan: Plan) -> NDArray[np.int16]:
-    """Run a plan on the frames that a connection holds; see `run_prefilter`."""
+def run_plan(
+    connection: duckdb.DuckDBPyConnection, plan: Plan, views: Iterable[tuple[str, str]] = ()
+) -> NDArray[np.int16]:
+    """Run a plan on the frames that a connection holds; see `run_prefilter`.
+
+    Args:
+        connection: The connection.
+        plan: The plan.
+        views: Those besides the labels', which are made where the columns of the frames alone do not exclude all.
+    """
     numbers, missed = np.empty(0, np.int64), np.empty(0, np.int16)
     for place, stage in enumerate(plan.stages):
         for statement in stage.statements:
@@ -294,12 +307,14 @@ def run_plan(connection: duckdb.DuckDBPyConnection, plan: Plan) -> NDArray[np.in
             missed[np.searchsorted(numbers, found["f"])] = found["missed"]
         if not (missed < 0).any():
             break
+        if not place:
+            _open(connection, views)
     return missed
 
 
 def names(dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block) -> list[tuple[str, str, int]]:
     """Frame, recording and timestamp of every frame of a block, in order."""
-    _open(dataset, connection, block)
+    _open(connection, islice(_rows_of(dataset, connection, block), 1))
     return connection.execute(f"SELECT frame, recording, timestamp_us FROM {LABELS} ORDER BY number").fetchall()
 
 
