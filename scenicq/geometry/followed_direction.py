@@ -18,7 +18,7 @@ from scenicq.budget import look
 from scenicq.geometry import shapes
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
-from scenicq.geometry.road_direction import ONE_HEADING, RoadDirection
+from scenicq.geometry.road_direction import ONE_HEADING, RoadDirection, distinct_pairs
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
 __all__ = ["OFF_ROAD", "FollowedDirection"]
@@ -63,12 +63,7 @@ class FollowedDirection(RoadDirection):
         """Pairs (box, heading) that hold every heading somewhere in each of some boxes, see `VectorField`."""
         owner, heading = self.base.headings(boxes)
         off = self._partly_off(boxes)
-        owner, heading = np.concatenate([owner, off]), np.concatenate([heading, np.full(len(off), OFF_ROAD)])
-        order = np.lexsort((heading, owner))
-        owner, heading = owner[order], heading[order]
-        again = (owner[1:] == owner[:-1]) & (heading[1:] == heading[:-1])
-        kept = np.concatenate([[True], ~again])[: len(owner)]
-        return owner[kept], heading[kept]
+        return distinct_pairs(np.concatenate([owner, off]), np.concatenate([heading, np.full(len(off), OFF_ROAD)]))
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes and tiles stay whole."""

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
-__all__ = ["ONE_HEADING", "DirectedLane", "RoadDirection", "along_lines"]
+__all__ = ["ONE_HEADING", "DirectedLane", "RoadDirection", "along_lines", "distinct_pairs"]
 
 REACH = 20.0
 """Metres within which a point off all lanes takes the direction of the nearest one."""
@@ -188,10 +189,10 @@ class RoadDirection:
         best = np.full(len(lane), np.inf)
         np.minimum.at(best, pair, away)
         chosen = np.nonzero(away <= best[pair] + _TIE)[0]
-        found: list[dict[float, None]] = [{} for _ in range(len(xy))]
-        for index, heading in zip(point[pair[chosen]].tolist(), headings[segment[chosen]].tolist(), strict=True):
-            found[index][heading] = None
-        return [tuple(sorted(values)) for values in found]
+        owner, heading = distinct_pairs(point[pair[chosen]], headings[segment[chosen]])
+        values: list[float] = heading.tolist()
+        ends: list[int] = np.searchsorted(owner, np.arange(len(xy) + 1)).tolist()
+        return [tuple(values[first:end]) for first, end in pairwise(ends)]
 
     def _headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         segments, _, starts = self._all
@@ -351,6 +352,17 @@ class RoadDirection:
                 if cell is not None:
                     cells.append(cell)
         return cells
+
+
+def distinct_pairs(
+    owner: NDArray[np.intp], heading: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Pairs (owner, heading) in order, each once; shapes (n,)."""
+    order = np.lexsort((heading, owner))
+    owner, heading = owner[order], heading[order]
+    again = (owner[1:] == owner[:-1]) & (heading[1:] == heading[:-1])
+    kept = np.concatenate([[True], ~again])[: len(owner)]
+    return owner[kept], heading[kept]
 
 
 def _corners(box: Bounds) -> NDArray[np.float64]:

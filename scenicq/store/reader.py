@@ -19,6 +19,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from scenicq.geometry.camera import Camera
 from scenicq.store.camera_rows import CAMERA_COLUMNS, cameras_of
 from scenicq.store.columns import OUT_OF_PLANE
 from scenicq.store.labels import Label, LabelObject, Motion, OutOfPlane
@@ -154,18 +155,20 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
     """
     others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], objects, "")
     egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)], frames, "ego_")
-    channels, paths, cameras = _values(sensors, "channel"), _values(sensors, "path"), [*cameras_of(sensors)]
+    channels, paths, cameras = _values(sensors, "channel"), _values(sensors, "path"), cameras_of(sensors)
+    seeing = any(camera is not None for camera in cameras)
     first = first_sensor = 0
-    columns = [_values(frames, name) for name in LABEL_COLUMNS]
-    for ego, (frame, recording, time, map_name, params, count, sensor_count, *_) in zip(
-        egos, zip(*columns, strict=True), strict=True
-    ):
-        mine, end = tuple(others[first : first + count]), first_sensor + sensor_count
-        names, seeing = channels[first_sensor:end], cameras[first_sensor:end]
+    columns = [_values(frames, name) for name in LABEL_COLUMNS[:-2]]
+    for ego, frame, recording, time, map_name, params, count, sensor_count in zip(egos, *columns, strict=True):
+        stop, end = first + count, first_sensor + sensor_count
+        names = channels[first_sensor:end]
         files = dict(zip(names, paths[first_sensor:end], strict=True))
-        known = {name: camera for name, camera in zip(names, seeing, strict=True) if camera is not None}
-        first, first_sensor = first + count, end
-        yield Label(frame, recording, time, map_name, ego, mine, params, files, known)
+        known: dict[str, Camera] = {}
+        if seeing:
+            pairs = zip(names, cameras[first_sensor:end], strict=True)
+            known = {name: camera for name, camera in pairs if camera is not None}
+        yield Label(frame, recording, time, map_name, ego, tuple(others[first:stop]), params, files, known)
+        first, first_sensor = stop, end
 
 
 def _motions(table: ArrowTable, prefix: str) -> Iterable[Motion | None]:
@@ -190,39 +193,9 @@ def _spaces(table: ArrowTable, prefix: str) -> Iterable[OutOfPlane | None]:
 
 def _objects(columns: list[list[Any]], table: ArrowTable, prefix: str) -> list[LabelObject]:
     motions, spaces = _motions(table, prefix), _spaces(table, prefix)
-    return [
-        LabelObject(
-            id,
-            category,
-            source_class,
-            x,
-            y,
-            heading,
-            width,
-            length,
-            height,
-            None if vx is None else (vx, vy),
-            track,
-            attributes,
-            motion,
-            space,
-        )
-        for (
-            id,
-            category,
-            source_class,
-            x,
-            y,
-            heading,
-            width,
-            length,
-            height,
-            vx,
-            vy,
-            track,
-            attributes,
-        ), motion, space in zip(zip(*columns, strict=True), motions, spaces, strict=False)
-    ]
+    *before, vx, vy, track, attributes = columns
+    velocities = [None if x is None else (x, y) for x, y in zip(vx, vy, strict=True)]
+    return [*map(LabelObject, *before, velocities, track, attributes, motions, spaces)]
 
 
 def _values(table: ArrowTable, name: str) -> list[Any]:

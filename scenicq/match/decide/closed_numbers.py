@@ -133,7 +133,7 @@ def heading(item: Comparison) -> ClosedForm | None:
     where = cast(Feature, along.point).object if along is not None else -1
 
     def directions(get: Get, lookups: MapLookups) -> list[tuple[float, ...]]:
-        return [lookups.allowed(cast(RoadDirection, flow), place) for place in each_position(get(where, "position"))]
+        return lookups.allowed(cast(RoadDirection, flow), each_position(get(where, "position")))
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         margin, seen = options.tolerance.of(index, "heading"), cast(float, get(index, "heading"))

@@ -84,9 +84,9 @@ def _constant(region: Region) -> _Test:
     def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
         # how far off a place is, is not looked up
         if isinstance(get, Columns):
-            held = np.array([lookups.within(region, place) for place in each_position(position)], dtype=np.bool_)
+            held = np.array(lookups.within(region, each_position(position)), dtype=np.bool_)
             return held, ~held if reach <= 0 else np.zeros(get.size, dtype=np.bool_)
-        within = lookups.within(region, cast(XY, position))
+        (within,) = lookups.within(region, [cast(XY, position)])
         return within, not within and reach <= 0
 
     return test

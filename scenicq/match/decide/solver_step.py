@@ -47,19 +47,19 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
         options: The options.
         solver: The solver, if there is one.
     """
+    flat = [item for group in items for item in group]
+    blame = flat[0][0]
+    if solver is None:
+        return Undecided(blame, "no solver")  # without encoding: cells of fields take seconds
     from scenicq.match.fields.field_solver import repaired  # noqa: PLC0415 - these take long to load
     from scenicq.smt.answer import NoAnswer, Sat, Unsat  # noqa: PLC0415
     from scenicq.smt.case_split import check_by_cases  # noqa: PLC0415
     from scenicq.smt.encode import UnsupportedError  # noqa: PLC0415
 
-    flat = [item for group in items for item in group]
-    blame = flat[0][0]
     try:
         encoding = encoded(items, options, borders=False)
     except UnsupportedError as error:
         return Undecided(blame, f"unsupported: {error}")
-    if solver is None:
-        return Undecided(blame, "no solver")
     precision = options.precision
     for attempt in range(_ATTEMPTS):
         if attempt == 1:

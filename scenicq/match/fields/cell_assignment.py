@@ -206,7 +206,16 @@ def _cells(cases: BoxSet, number: int, node: DirectionAt) -> tuple[Bounds, list[
     (x0, x1), (y0, y1) = cases.place(node)[:, :, number].tolist()
     box = (x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN)
     heading = float(cases.chosen[id(node)][:, number].mean())
-    field = cast(VectorField, cast(Constant, node.field).value)
+    # cases that differ in other choices ask the same again
+    key, known = (id(node), heading, box), cases.network.cells
+    if key not in known:
+        known[key] = _cells_in(cast(VectorField, cast(Constant, node.field).value), heading, box)
+    found = known[key]
+    return None if found is None else (box, found)
+
+
+def _cells_in(field: VectorField, heading: float, box: Bounds) -> list[FieldCell] | None:
+    """Where in a box a field may have a heading; None if it has it in all of the box."""
     found: list[FieldCell] = []
     for whole in field.cells_of(heading, box) if isinstance(field, Ranked | RoadDirection) else field.cells(box):
         cell = whole.part(box) if abs(whole.heading - heading) <= SAME and _meets(whole, box) else None
@@ -215,7 +224,7 @@ def _cells(cases: BoxSet, number: int, node: DirectionAt) -> tuple[Bounds, list[
         if cell.exact and _covers(cell, box):
             return None
         found.append(cell)
-    return box, found
+    return found
 
 
 def _within(place: AffineVector, cell: FieldCell, box: Bounds) -> list[Row]:

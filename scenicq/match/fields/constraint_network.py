@@ -11,6 +11,8 @@ import numpy as np
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node
 from scenicq.forest.walk import is_leaf, postorder
+from scenicq.geometry.fields import FieldCell
+from scenicq.geometry.shapes import Bounds
 from scenicq.match.fields.interval_domain import Enclosure
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import SLACK, Tolerance
@@ -49,6 +51,11 @@ class ConstraintNetwork:
                 allowed = self.tolerance.of(constraint.object, "heading").size + SLACK
                 found[id(node)] = np.array([[seen - allowed], [seen + allowed]])
         return found
+
+    @cached_property
+    def cells(self) -> dict[tuple[int, float, Bounds], list[FieldCell] | None]:
+        """Cells found so far, by the id of the use of a field, its heading in radians and the box of its point."""
+        return {}
 
     @cached_property
     def choices(self) -> list[Index | DirectionAt]:

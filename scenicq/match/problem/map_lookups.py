@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,16 +45,18 @@ class MapLookups:
             found = contains_many(region, xy).tolist()
             self.inside.setdefault(id(region), (region, {}))[1].update(zip(wanted, found, strict=True))
 
-    def allowed(self, one: RoadDirection, place: XY) -> tuple[float, ...]:
-        """The headings that a field allows at a place."""
+    def allowed(self, one: RoadDirection, places: Sequence[XY]) -> list[tuple[float, ...]]:
+        """The headings that a field allows at places."""
         known = self.directions.setdefault(one, {})
-        if place not in known:
-            known[place] = one.values(*place)
-        return known[place]
+        for place in places:
+            if place not in known:
+                known[place] = one.values(*place)
+        return [known[place] for place in places]
 
-    def within(self, region: Region, place: XY) -> bool:
-        """Whether a place lies in a region."""
+    def within(self, region: Region, places: Sequence[XY]) -> list[bool]:
+        """Which places lie in a region."""
         known = self.inside.setdefault(id(region), (region, {}))[1]
-        if place not in known:
-            known[place] = contains(region, *place)
-        return known[place]
+        for place in places:
+            if place not in known:
+                known[place] = contains(region, *place)
+        return [known[place] for place in places]

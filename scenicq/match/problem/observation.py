@@ -49,16 +49,18 @@ def observe(label_object: LabelObject) -> Mapping[str, Value]:
 def observed_names(label_object: LabelObject) -> frozenset[str]:
     """The names of the properties that a label object has."""
     motion, velocity = label_object.motion, label_object.velocity
-    parts: tuple[object, ...] = (
-        label_object.heading,
-        label_object.width,
-        label_object.length,
-        label_object.height,
-        velocity,
+    # written out: all objects of all labels come here
+    present: tuple[bool, ...] = (
+        label_object.heading is not None,
+        label_object.width is not None,
+        label_object.length is not None,
+        label_object.height is not None,
+        velocity is not None,
     )
     if motion is not None:
-        parts = (*parts[:4], velocity or motion.velocity, motion.acceleration, motion.yaw_rate)
-    return _names(tuple([part is not None for part in parts]), tuple(label_object.attributes))
+        seen = velocity is not None or motion.velocity is not None
+        present = (*present[:4], seen, motion.acceleration is not None, motion.yaw_rate is not None)
+    return _names(present, tuple(label_object.attributes))
 
 
 @lru_cache(maxsize=4096)

@@ -37,10 +37,10 @@ def look_up_positions(
     of_fields: dict[RoadDirection, list[tuple[float, float]]] = {}
     for index, (fields, regions) in asked.items():
         found: list[tuple[float, float]] = []
-        for label, among in labels:
-            if index == ego:
-                found.append((label.ego.x, label.ego.y))
-            else:
+        if index == ego:
+            found = [(label.ego.x, label.ego.y) for label, _ in labels]
+        else:
+            for label, among in labels:
                 numbers = range(1, len(label.objects) + 1) if among is None else among.get(index, ())
                 found += [(label.objects[number - 1].x, label.objects[number - 1].y) for number in numbers]
         for field in fields:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
     from scenicq.match.problem.candidates import Candidates
     from scenicq.query.execution.recording_matcher import DecidedRecordings
 
-_FIRST_BATCH, _BATCH = 16, 512
+_FIRST_BATCH, _BATCH = 16, 2048
 """Labels whose places are looked up together: few until it is known what matters."""
 _MOTION = frozenset({"speed", "velocity", "angularSpeed", "acceleration"})
 """Properties that the store computes of tracks."""

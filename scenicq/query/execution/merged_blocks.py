@@ -55,15 +55,18 @@ def merge_frames(
         every: Whether frames that do not match are results too.
     """
     for block in until_deadline(decided, funnel):
-        found = until_deadline(block.found, funnel)
+        found = iter(block.found)
         start = 0
         try:
             for place in np.flatnonzero(block.missed < 0).tolist():
                 if every:
                     yield from _excluded(plan, block, start, place)
-                verdicts = next(found, None)
+                try:
+                    verdicts = next(found, None)
+                except DeadlineError:
+                    verdicts = None
                 if verdicts is None:
-                    # the time was over in another process
+                    # the time was over, here or in another process
                     funnel.cut = True
                     return
                 first, *more = verdicts

@@ -81,12 +81,14 @@ def _cause(cause: Cause) -> dict[str, Any]:
     return {key: value for key, value in found.items() if value}
 
 
+_NAMES = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}
+
+
 def record(result: Result) -> dict[str, Any]:
     """A result as plain values with stable keys in a stable order, ready for JSON."""
     verdict = result.verdict
-    name = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}[type(verdict)]
     found = _which(result)
-    found["verdict"], found["correspondence"], found["witness"] = name, {}, {}
+    found["verdict"], found["correspondence"], found["witness"] = _NAMES[type(verdict)], {}, {}
     match verdict:
         case Match():
             found["correspondence"] = dict(verdict.correspondence)

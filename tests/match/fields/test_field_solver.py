@@ -15,7 +15,7 @@ from scenes import STREET, compiled, drawn, label_of
 from scenicq.forest.nodes import PointIn
 from scenicq.forest.walk import leaves
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.fields import interval_domain
+from scenicq.match.fields import cell_assignment, field_solver, interval_domain
 from scenicq.match.fields.field_solver import repaired
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -84,6 +84,26 @@ def test_chains_through_an_intersection_are_decided_without_a_solver(cars, label
         away = replace(last, x=last.x + 30.0, y=last.y + 25.0)
         pushed = replace(label, objects=tuple(away if thing is last else thing for thing in label.objects))
         assert isinstance(matcher.match(pushed), NoMatch)
+
+
+def test_cells_of_one_box_are_looked_for_once(monkeypatch):
+    asked = []
+
+    def watched(field, heading, box):
+        asked.append((id(field), heading, box))
+        return real(field, heading, box)
+
+    real = cell_assignment._cells_in
+    monkeypatch.setattr(cell_assignment, "_cells_in", watched)
+    monkeypatch.setattr(field_solver, "probed", lambda *_: None)
+    tolerance, most = MatchOptions(tolerance=EXACT).tolerance, 0
+    for seed in range(6):
+        for items, _ in groups(CHAIN.format(cars=1), seed):
+            asked.clear()
+            decide_decomposed(items, tolerance)
+            assert len(set(asked)) == len(asked)
+            most = max(most, len(asked))
+    assert most > 1
 
 
 def test_what_misses_a_solution_by_little_is_repaired():
