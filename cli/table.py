@@ -105,7 +105,7 @@ def fitted(rows: list[Row], width: int, short: ShortNames, *, over_time: bool = 
         short: Cuts names short.
         over_time: Whether the rows are intervals.
     """
-    head = list(_INTERVAL_HEAD if over_time else _HEAD)
+    head: list[str] = [*(_INTERVAL_HEAD if over_time else _HEAD)]
     time, recording = (1, 0) if over_time else (2, 1)
     kept = [column for column in range(len(head)) if over_time or column != _LAST]
     table = [list(row) for row in rows]

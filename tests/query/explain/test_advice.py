@@ -142,6 +142,39 @@ def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroad
     assert asked.stderr.startswith("5 matches in 156 frames; ")
 
 
+@pytest.mark.parametrize(("frames", "told"), [(1000, False), (1001, True)])
+def test_less_than_a_frame_in_a_thousand_is_hardly_any(frames, told, run, tmp_path):
+    """One match in 1,000 frames is left alone; of one in 1,001 it is said what excludes the others."""
+    ego = {"position": [0, 0], "heading": 0, "width": 2, "length": 4, "class": "Car"}
+    labels = (
+        {
+            "id": f"f{number:04}", "recording": f"r{number // 100}", "timestamp_us": number * 100_000, "map": "none",
+            "ego": ego, "objects": [ego | {"id": "a", "position": [0, 10 if number == 7 else 30]}],
+        }
+        for number in range(frames)
+    )  # fmt: skip
+    source = tmp_path / "source"
+    source.mkdir()
+    (source / "labels.jsonl").write_text("".join(json.dumps(label) + "\n" for label in labels))
+    header = {"name": "many", "interchange": 1, "angle": "heading", "classes": "scenic"}
+    (source / "dataset.json").write_text(json.dumps(header))
+    ingest(source, tmp_path / "many")
+    file = tmp_path / "p.scenic"
+    placed = "in everywhere, facing Range(0, 360) deg"
+    file.write_text(
+        "model scenic.domains.driving.model\n"
+        f"ego = new Car {placed}\nother = new Car {placed}\nrequire (distance to other) < 20\n"
+    )
+    done = run("match", file, tmp_path / "many", "--format", "ids")
+    assert (done.exit_code, done.stdout) == (0, "f0007\n")
+    first, *rest = done.stderr.splitlines() or [""]
+    assert (first == "1 match in 1,001 frames; 1,000 fail first at `require (distance to other) < 20`") is told
+    assert (
+        any(re.match(r" +(16 to )?1,001  without `require \(distance to other\) < 20`  line 4", each) for each in rest)
+        is told
+    )
+
+
 def two_maps(folder, lacking=("elsewhere", "nowhere")):
     """The sample, of which every third recording lies on each of two maps that the dataset does not have."""
     source = Path(shutil.copytree(SAMPLES / "crossroads", folder / "source"))
