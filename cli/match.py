@@ -213,9 +213,12 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
             raise
         if pieces is not None and not query.funnel.cut:
             shutil.rmtree(pieces, ignore_errors=True)
+    INTERRUPTS.advice = "  = hint: all results are written"
     if query.funnel.cut:
         _tell_cut(query, resume=resume)
-    whole = query.options.limit is None and not query.funnel.cut and not query.funnel.over_time
+    limit = query.options.limit
+    reached = limit is not None and query.funnel.matches >= limit
+    whole = not reached and not query.funnel.cut and not query.funnel.over_time
     if advised or (not quiet and whole and is_nearly_empty(query)):
         advise(query, asked=advised)
     _conclude(ctx, query, told, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)

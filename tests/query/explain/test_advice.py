@@ -135,8 +135,10 @@ def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroad
     assert "line 5" in done.stderr
     assert run("match", file, crossroads).stderr.startswith("0 matches in 156 frames; ")
     assert run("match", file, crossroads, "--quiet").stderr == ""
+    assert run("match", file, crossroads, "--limit", "3").stderr.startswith("0 matches in 156 frames; ")
     crossing = scenarios / "02_crossing_cars.scenic"
     assert run("match", crossing, crossroads).stderr == ""
+    assert run("match", crossing, crossroads, "--limit", "1").stderr == ""
     asked = run("match", crossing, crossroads, "--advise")
     assert asked.exit_code == 0
     assert asked.stderr.startswith("5 matches in 156 frames; ")
@@ -173,6 +175,18 @@ def test_less_than_a_frame_in_a_thousand_is_hardly_any(frames, told, run, tmp_pa
         any(re.match(r" +(16 to )?1,001  without `require \(distance to other\) < 20`  line 4", each) for each in rest)
         is told
     )
+
+
+def test_an_interrupt_of_advice_leaves_the_results(run, crossroads, tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("scenicq_cli.match.advise", interrupted)
+    file = tmp_path / "p.scenic"
+    file.write_text(TEXT)
+    done = run("match", file, crossroads, "-o", tmp_path / "found.jsonl")
+    assert (done.exit_code, done.stderr) == (130, "interrupted\n  = hint: all results are written\n")
+    assert (tmp_path / "found.jsonl").exists()
 
 
 def two_maps(folder, lacking=("elsewhere", "nowhere")):
