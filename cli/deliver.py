@@ -86,7 +86,7 @@ def _deliver(
                 wanted.form,
                 sink,
                 query.roles,
-                query.dataset.short_frames,
+                query.dataset.short_names,
                 origin=origin,
                 ranked=wanted.ranked,
                 over_time=query.is_over_time(),

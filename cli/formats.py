@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, Protocol
 
 from scenicq.query.execution.result_origin import ORIGIN
 from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
+from scenicq.store.frame_names import ShortNames
 
 from .report import CONTROL as _CONTROL
 from .report import plain
@@ -149,7 +150,7 @@ def make_writer(
     name: str,
     sink: BinaryIO,
     roles: Callable[[], Sequence[str]],
-    shorten: Callable[[], Callable[[str], str]] | None = None,
+    shorten: Callable[[], ShortNames] | None = None,
     *,
     origin: str = "",
     ranked: bool = False,
@@ -161,7 +162,7 @@ def make_writer(
         name: One of `FORMATS`.
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
-        shorten: Gives what cuts names of frames short; asked where a table would not fit the terminal.
+        shorten: Gives what cuts names short; asked where a table would not fit the terminal.
         origin: The dataset that the results come from; "" where it is not known.
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import click
 
+from scenicq.errors import Diagnostic
 from scenicq.forest.scenario import BuiltIn
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
@@ -55,17 +58,15 @@ def _broken(funnel: Funnel) -> list[str]:
     return columns([("then failed at", "bindings"), *rows], right=frozenset({1})) if rows else []
 
 
-def show_funnel(query: Query, elapsed_s: float) -> None:
+def show_funnel(query: Query, elapsed_s: float, told: Collection[Diagnostic]) -> None:
     """Print the summary on standard error.
 
     Args:
         query: After its results were taken.
         elapsed_s: Seconds that it took.
+        told: Warnings that were shown before the results.
     """
-    # what is never compared or lacking was said before the results
-    told = ("never-compared", "no-tracks")
-    misfits = query.misfits()
-    show(each for each in query.funnel.warnings if each.code not in told and each not in misfits)
+    show(each for each in query.funnel.warnings if each not in told)
     lines = columns(_steps(query), right=frozenset({0}))
     lines += [*_failures(query.funnel), *_broken(query.funnel)]
     for what, frames in sorted(query.funnel.missing.items()):

@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Collection, Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -184,12 +184,12 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         show_plan(query)
         return
     with ProgressBar(query.dataset.manifest.total.frames, quiet=quiet) as bar:
-        told = remarks(query)
+        told, found = remarks(query)
         with bar.aside():
-            show_remarks(query, *told)
+            show_remarks(query, told, found)
     if shard is not None and file is not None:
         query.funnel = replace(run_shard(query, shard, file, quiet=quiet), warnings=query.funnel.warnings)
-        _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
+        _conclude(ctx, query, told, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
     pieces = None
     again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
@@ -213,12 +213,15 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
             raise
         if pieces is not None and not query.funnel.cut:
             shutil.rmtree(pieces, ignore_errors=True)
+    INTERRUPTS.advice = "  = hint: all results are written"
     if query.funnel.cut:
         _tell_cut(query, resume=resume)
-    whole = query.options.limit is None and not query.funnel.cut and not query.funnel.over_time
+    limit = query.options.limit
+    reached = limit is not None and query.funnel.matches >= limit
+    whole = not reached and not query.funnel.cut and not query.funnel.over_time
     if advised or (not quiet and whole and is_nearly_empty(query)):
         advise(query, asked=advised)
-    _conclude(ctx, query, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
+    _conclude(ctx, query, told, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 
 def _tell_cut(query: Query, *, resume: bool) -> None:
@@ -244,10 +247,17 @@ def _selected(
 
 
 def _conclude(
-    ctx: click.Context, query: Query, elapsed_s: float, *, summary: bool, quiet: bool, exit_zero: bool
+    ctx: click.Context,
+    query: Query,
+    told: Collection[Diagnostic],
+    elapsed_s: float,
+    *,
+    summary: bool,
+    quiet: bool,
+    exit_zero: bool,
 ) -> None:
     """Print the summary and choose the exit code."""
     if summary or (sys.stderr.isatty() and not quiet):
-        show_funnel(query, elapsed_s)
+        show_funnel(query, elapsed_s, told)
     if query.funnel.matches == 0 and not exit_zero:
         ctx.exit(NOTHING)

@@ -42,12 +42,17 @@ def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagn
 def show_remarks(query: Query, unseen: Iterable[Diagnostic], found: Sequence[Diagnostic]) -> None:
     """Print on standard error what is never compared or lacking, and a line for each thing that cannot be meant.
 
+    Of a program that is no file all is said at once.
+
     Args:
         query: The query.
         unseen: The first list that `remarks` gives.
         found: The second.
     """
     show(unseen)
+    if query.source.name.startswith("<"):  # it is no file that `check` could be given
+        show(found)
+        return
     for each in found[:_LINES]:
         place = f"{each.span.place}: " if each.span is not None else ""
         kind = click.style(f"{each.severity}[{each.code}]", fg="yellow", bold=True)

@@ -9,19 +9,23 @@ from typing import IO, Any, BinaryIO, cast
 
 import click
 
+from scenicq.store.frame_names import ShortNames
+
 from .report import columns, moment, plain
 
 __all__ = ["Table", "TextStream", "fitted"]
 
 _INTERVAL_HEAD = ("RECORDING", "START", "SECONDS", "VERDICT", "OBJECTS", "FRAMES")
 _HEAD = ("FRAME", "RECORDING", "TIME", "VERDICT", "OBJECTS", "SENSOR")
-_FRAME, _RECORDING, _TIME, _VERDICT, _OBJECTS, _SENSOR = range(6)
+_VERDICT, _OBJECTS, _LAST = 3, 4, 5
+"""Of either table; of the last column, that of frames names sensors, and that of intervals frames."""
 _BLOCK = 100
 """Rows that are aligned together."""
 _COLOURS = {"match": "green", "unknown": "yellow"}
 _DATE = len("2018-09-18 ")
 _SHORTEST_ID = 6
 _NARROWEST = 12
+_FROM = " from "
 
 Row = tuple[str, ...]
 
@@ -50,19 +54,19 @@ class Table:
     """Aligned columns for a terminal; a block of rows at a time."""
 
     def __init__(
-        self, text: TextStream, shorten: Callable[[], Callable[[str], str]] | None = None, *, over_time: bool = False
+        self, text: TextStream, shorten: Callable[[], ShortNames] | None = None, *, over_time: bool = False
     ) -> None:
         """Take where to write.
 
         Args:
             text: The stream; on a terminal the table fits its width.
-            shorten: Gives what cuts names of frames short; asked only where the table does not fit.
-            over_time: Whether the results are intervals, whose table is as wide as it is.
+            shorten: Gives what cuts names short; asked only where the table does not fit.
+            over_time: Whether the results are intervals.
         """
         self._text, self._over_time = text, over_time
         self._width = shutil.get_terminal_size().columns if text.isatty() else None
         self._shorten = shorten
-        self._short: Callable[[str], str] | None = None
+        self._short: ShortNames | None = None
         self._rows: list[Row] = []
 
     def write(self, record: Mapping[str, Any]) -> None:
@@ -76,10 +80,10 @@ class Table:
         if not self._rows:
             return
         lines = columns([_INTERVAL_HEAD if self._over_time else _HEAD, *self._rows], indent="")
-        if not self._over_time and self._width is not None and max(map(len, lines)) > self._width:
+        if self._width is not None and max(map(len, lines)) > self._width:
             if self._short is None:
-                self._short = self._shorten() if self._shorten is not None else str
-            lines = fitted(self._rows, self._width, self._short)
+                self._short = self._shorten() if self._shorten is not None else ShortNames(str, str)
+            lines = fitted(self._rows, self._width, self._short, over_time=self._over_time)
         verdicts = iter(self._rows)
         colour = None
         for number, line in enumerate(lines):
@@ -89,7 +93,7 @@ class Table:
         self._rows.clear()
 
 
-def fitted(rows: list[Row], width: int, short: Callable[[str], str]) -> list[str]:
+def fitted(rows: list[Row], width: int, short: ShortNames, *, over_time: bool = False) -> list[str]:
     """Rows as lines of a table that is no wider than it may be, the head first; no word is broken.
 
     Names are cut to what tells them apart; what all rows share, or other columns say, is left out; long cells go on
@@ -98,33 +102,48 @@ def fitted(rows: list[Row], width: int, short: Callable[[str], str]) -> list[str
     Args:
         rows: The cells, as many as the head has.
         width: Columns of the terminal.
-        short: Cuts names of frames short.
+        short: Cuts names short.
+        over_time: Whether the rows are intervals.
     """
-    head: list[str] = [*_HEAD[:_SENSOR]]
-    table = [row[:_SENSOR] for row in rows]
-    kept = list(range(_SENSOR))
-    dates = {row[_TIME][:_DATE] for row in table}
+    head: list[str] = [*(_INTERVAL_HEAD if over_time else _HEAD)]
+    time, recording = (1, 0) if over_time else (2, 1)
+    kept = [column for column in range(len(head)) if over_time or column != _LAST]
+    table = [list(row) for row in rows]
+    dates = {row[time][:_DATE] for row in table}
     if (
         not _fits(head, table, kept, width)
         and len(dates) == 1
-        and all(row[_TIME][_DATE - 1 :][:1] == " " for row in table)
+        and all(row[time][_DATE - 1 :][:1] == " " for row in table)
     ):
-        head[_TIME] = dates.pop().strip()
-        table = [(*row[:_TIME], row[_TIME][_DATE:], *row[_VERDICT:]) for row in table]
+        head[time] = dates.pop().strip()
+        for row in table:
+            row[time] = row[time][_DATE:]
     if not _fits(head, table, kept, width):
-        table = [(short(row[_FRAME]), *row[_RECORDING:]) for row in table]
-    if not _fits(head, table, kept, width) and all(row[_FRAME].startswith(f"{row[_RECORDING]}/") for row in rows):
-        kept.remove(_RECORDING)
+        for row in table:
+            if over_time:
+                number, _, first = row[_LAST].partition(_FROM)
+                row[_LAST] = f"{number}{_FROM}{short.frame(first)}"
+            else:
+                row[0] = short.frame(row[0])
+    if not _fits(head, table, kept, width):
+        if not over_time and all(row[0].startswith(f"{row[recording]}/") for row in rows):
+            kept.remove(recording)
+        for row in table:
+            row[recording] = short.recording(row[recording])
     if not _fits(head, table, kept, width):
         ids = _cut([part.partition("=")[2] for row in rows for part in row[_OBJECTS].split()])
-        table = [(*row[:_OBJECTS], _with_ids(row[_OBJECTS], ids)) for row in table]
-    for dispensable in (_TIME, _RECORDING):
+        for row in table:
+            row[_OBJECTS] = _with_ids(row[_OBJECTS], ids)
+    if over_time and not _fits(head, table, kept, width) and _narrowest(table, kept) > width:
+        for row in table:
+            row[_LAST] = row[_LAST].partition(_FROM)[0]
+    for dispensable in (_LAST, time) if over_time else (time, recording):
         if dispensable in kept and not _fits(head, table, kept, width) and _narrowest(table, kept) > width:
             kept.remove(dispensable)
-    return _wrapped([tuple(head), *table], kept, width)
+    return _wrapped([head, *table], kept, width)
 
 
-def _fits(head: Sequence[str], table: list[Row], kept: list[int], width: int) -> bool:
+def _fits(head: Sequence[str], table: Sequence[Sequence[str]], kept: list[int], width: int) -> bool:
     """Whether rows fit without long cells going on below."""
     widths = [max(len(plain(row[column])) for row in (head, *table)) for column in kept]
     return sum(widths) + 2 * (len(kept) - 1) <= width
@@ -144,22 +163,24 @@ def _with_ids(objects: str, ids: Mapping[str, str]) -> str:
     return " ".join(f"{role}={ids[label]}" if equals else role for role, equals, label in parts)
 
 
-def _longest_word(table: list[Row], column: int) -> int:
+def _longest_word(table: Sequence[Sequence[str]], column: int) -> int:
     return max(len(word) for row in table for word in (row[column].split() or [""]))
 
 
-def _narrowest(table: list[Row], kept: list[int]) -> int:
+def _narrowest(table: Sequence[Sequence[str]], kept: list[int]) -> int:
     """The width below which a word would have to be broken, with some room for long cells."""
     widths = [
-        max(_NARROWEST, _longest_word(table, column)) if column >= _VERDICT else max(len(row[column]) for row in table)
+        max(_NARROWEST, _longest_word(table, column))
+        if column in (_VERDICT, _OBJECTS)
+        else max(len(row[column]) for row in table)
         for column in kept
     ]
     return sum(widths) + 2 * (len(kept) - 1)
 
 
-def _wrapped(table: list[Row], kept: list[int], width: int) -> list[str]:
+def _wrapped(table: Sequence[Sequence[str]], kept: list[int], width: int) -> list[str]:
     widths = {column: max(len(plain(row[column])) for row in table) for column in kept}
-    room = width - sum(widths[column] for column in kept if column < _VERDICT) - 2 * (len(kept) - 1)
+    room = width - sum(widths[column] for column in kept if column not in (_VERDICT, _OBJECTS)) - 2 * (len(kept) - 1)
     least = _longest_word(table, _VERDICT)
     if widths[_VERDICT] + widths[_OBJECTS] > room:
         wanted = max(least, room - widths[_OBJECTS], room // 2)
@@ -197,7 +218,7 @@ def _cells(record: Mapping[str, Any]) -> Row:
             f"{(record['end_us'] - record['start_us']) / 1e6:.1f}",
             verdict,
             " ".join(objects) or "-",
-            f"{frames['count']} from {frames['first']}",
+            f"{frames['count']}{_FROM}{frames['first']}",
         )
     sensors = sorted(record["sensors"].items(), key=lambda item: (not item[0].startswith("CAM_FRONT"), item))
     return (

@@ -133,6 +133,16 @@ def test_duckdb_is_connected_in_one_place_alone():
     code += "print(c().execute(\"SELECT current_setting('enable_progress_bar')\").fetchone())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "(False,)\n"
+    # DuckDB takes this for a notebook without widgets, where it draws none and refuses to be told so
+    notebook = (
+        "import sys, types\nkernel = types.SimpleNamespace(config={'IPKernelApp': {}})\n"
+        "sys.modules['IPython'] = types.SimpleNamespace(get_ipython=lambda: kernel)\n"
+    )
+    refused = "import duckdb\nduckdb.connect(':memory:').execute('SET enable_progress_bar = false')"
+    told = subprocess.run([sys.executable, "-c", notebook + refused], capture_output=True, text=True, check=False)
+    assert "ipywidgets" in told.stderr
+    done = subprocess.run([sys.executable, "-c", notebook + code], capture_output=True, text=True, check=True)
+    assert done.stdout == "(False,)\n"
 
 
 def test_the_core_knows_no_dataset():

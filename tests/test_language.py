@@ -13,7 +13,7 @@ import math
 import random
 import re
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import dropwhile, takewhile
 from pathlib import Path
 
@@ -126,13 +126,26 @@ def test_block(block: Block) -> None:
 WARNED = [block for block in BLOCKS if block.page == "warnings.md" and not block.marks]
 
 
-@pytest.mark.parametrize("block", WARNED, ids=lambda block: f"{block.page}:{block.line}")
-def test_warnings(block: Block) -> None:
-    """What the page of warnings marks is warned of, and nothing else."""
+def warned(block: Block) -> set[tuple[int, str]]:
+    """Lines and codes of the warnings of a block."""
     scenario = block.compiled()
     options = MatchOptions(tolerance=Tolerance(), classes="coarse" if "coarse" in block.options else "fine")
     found = lint(scenario.source, [(scenario, street())], options)
-    assert {(d.span.source.position(d.span.start)[0], d.code) for d in found if d.span} == block.marked(_WARNING)
+    return {(d.span.source.position(d.span.start)[0], d.code) for d in found if d.span}
+
+
+@pytest.mark.parametrize("block", WARNED, ids=lambda block: f"{block.page}:{block.line}")
+def test_warnings(block: Block) -> None:
+    """What the page of warnings marks is warned of, and nothing else."""
+    assert warned(block) == block.marked(_WARNING)
+
+
+@pytest.mark.parametrize("block", WARNED, ids=lambda block: f"{block.page}:{block.line}")
+def test_every_warning_can_be_silenced(block: Block) -> None:
+    """A comment in the place of each mark silences the one that it names, and no other."""
+    assert warned(replace(block, text=_WARNING.sub(r"# scenicq: ignore[\1]", block.text))) == set()
+    others = replace(block, text=_WARNING.sub("# scenicq: ignore[no-such-code]", block.text))
+    assert warned(others) == block.marked(_WARNING)
 
 
 def test_every_warning_is_shown() -> None:

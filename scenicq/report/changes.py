@@ -94,7 +94,8 @@ def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) ->
         after: Records of the second.
 
     Returns:
-        A warning where the files are of different versions or have no recording in common; None where all is well.
+        A warning where the files are of different versions or have no recording in common, or one of them is empty
+        and names no dataset; None where all is well.
 
     Raises:
         DataError: option-invalid, where the names differ, or a frame of both has another recording or time.
@@ -106,6 +107,9 @@ def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) ->
             message = f"the files are of different datasets: frame `{frame}` is of {old[0]} at {old[1]} in A, of "
             message += f"{new[0]} at {new[1]} in B"
             raise DataError(Diagnostic("option-invalid", message))
+    if bool(before) != bool(after):
+        message = f"{'B' if before else 'A'} holds no results: nothing says of which dataset it is"
+        return Diagnostic("option-invalid", message, severity="warning")
     recordings = [{each["recording"] for each in records.values()} for records in (before, after)]
     if doubt is None and before and after and recordings[0].isdisjoint(recordings[1]):
         message = "the files have no recording in common: they may be of different datasets"

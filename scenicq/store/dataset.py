@@ -7,7 +7,7 @@ nothing: every connection is an in-memory database with views over the manifest'
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ from scenicq.errors import DataError, Diagnostic, ScenicqError
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.store.frame_index import find_rows
-from scenicq.store.frame_names import find_frame, shortened
+from scenicq.store.frame_names import ShortNames, find_frame, shortened
 from scenicq.store.in_memory import connect_in_memory
 from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, read_manifest
@@ -181,8 +181,8 @@ class Dataset:
             name = find_frame(connection, frame)
         return next(self.labels([name]))
 
-    def short_frames(self) -> Callable[[str], str]:
-        """Cuts names of frames short, as far as `label` still finds them."""
+    def short_names(self) -> ShortNames:
+        """What cuts names of frames and recordings short, as far as they are still found."""
         with closing(self.connect()) as connection, self.blamed():
             return shortened(connection)
 

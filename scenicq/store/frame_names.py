@@ -1,4 +1,4 @@
-"""Names of frames, cut short as far as they stay unique, and found again by what is left of them.
+"""Names of frames and recordings, cut short as far as they stay unique, and found again by what is left of them.
 
 A name may have parts with `/` between them, such as a recording and a time; each part may be cut short by itself.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from scenicq.errors import DataError, Diagnostic
@@ -14,7 +15,7 @@ from scenicq.errors import DataError, Diagnostic
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["find_frame", "find_recording", "shortened"]
+__all__ = ["ShortNames", "find_frame", "find_recording", "shortened"]
 
 _SHORTEST = 6
 _SHOWN = 5
@@ -66,20 +67,37 @@ def _ambiguous(what: str, text: str, found: Sequence[str]) -> DataError:
     return DataError(Diagnostic("option-invalid", f"several {what} begin with `{text}`", hints=(hint,)))
 
 
-def shortened(connection: duckdb.DuckDBPyConnection) -> Callable[[str], str]:
-    """Cuts names of frames short, so that `find_frame` still finds them; all to the same length.
+@dataclass(frozen=True, slots=True)
+class ShortNames:
+    """What cuts names short, all of a kind to the same length, so that they are still found.
 
-    Names that do not all have the same number of parts stay as they are.
+    Attributes:
+        frame: Cuts names of frames.
+        recording: Cuts names of recordings.
+    """
+
+    frame: Callable[[str], str]
+    recording: Callable[[str], str]
+
+
+def shortened(connection: duckdb.DuckDBPyConnection) -> ShortNames:
+    """What cuts names short so that `find_frame` and `find_recording` still find them.
+
+    Names of frames that do not all have the same number of parts stay as they are.
 
     Args:
         connection: To a dataset.
     """
+    length = _shortest(connection, "recording")
     rows = connection.execute("SELECT DISTINCT len(string_split(frame, '/')) FROM labels").fetchall()
     if len(rows) != 1:
-        return str
+        return ShortNames(str, lambda recording: recording[:length])
     parts = [f"string_split(frame, '/')[{number}]" for number in range(1, rows[0][0] + 1)]
     lengths = [_shortest(connection, part) for part in parts]
-    return lambda frame: "/".join(part[:length] for part, length in zip(frame.split("/"), lengths, strict=True))
+    return ShortNames(
+        lambda frame: "/".join(part[:length] for part, length in zip(frame.split("/"), lengths, strict=True)),
+        lambda recording: recording[:length],
+    )
 
 
 def _shortest(connection: duckdb.DuckDBPyConnection, part: str) -> int:

@@ -23,6 +23,6 @@ def connect_in_memory(config: Mapping[str, bool | int | str] | None = None) -> d
     connection = duckdb.connect(":memory:", config={**(config or {})})
     # where Python is interactive, DuckDB draws how far a long query has come, between whatever the program writes;
     # in a notebook without widgets it does not, and cannot be asked not to
-    with contextlib.suppress(duckdb.Error):
+    with contextlib.suppress(duckdb.InvalidInputException):
         connection.execute("SET enable_progress_bar = false")
     return connection

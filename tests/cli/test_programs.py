@@ -48,6 +48,21 @@ def test_a_program_on_the_command_line_has_the_driving_model(run, crossroads, tm
     assert frames
 
 
+def test_what_cannot_be_meant_is_told_whole_of_a_program_that_is_no_file(run, crossroads, tmp_path):
+    """No other command can be given it, so that none is advised."""
+    text = "ego = new Car; new Pedestrian ahead of ego by Range(9, 5)"
+    for found in (
+        run("match", "-e", text, crossroads),
+        fed(f"model scenic.domains.driving.model\n{text}\n", "match", "-", crossroads),
+    ):
+        assert "warning[range-reversed]: this `Range` ends before it starts\n" in found.stderr
+        assert "  = hint: write `5, 9`\n" in found.stderr
+        assert "scenicq check" not in found.stderr
+    file = tmp_path / "p.scenic"
+    file.write_text(f"model scenic.domains.driving.model\n{text}\n")
+    assert f"  = hint: `scenicq check {file}` says what to write\n" in run("match", file, crossroads).stderr
+
+
 def test_a_model_of_its_own_is_not_replaced(run, crossroads):
     found = run("match", "-e", "model scenic.simulators.carla.model; ego = new Car", crossroads, "--limit", "1")
     assert found.exit_code == 0

@@ -1,19 +1,37 @@
 """The table of results: it fits the terminal, breaks no word, and names frames as other commands take them."""
 
+import fcntl
 import io
 import itertools
+import json
+import os
+import pty
 import re
+import shutil
+import struct
+import subprocess
+import termios
+import uuid
+from pathlib import Path
 
 import click
 import pytest
 
 from scenicq.errors import DataError
+from scenicq.importers.ingest import ingest
 from scenicq.store.dataset import open_dataset
+from scenicq.store.frame_names import ShortNames, find_recording
 from scenicq_cli.main import cli
 from scenicq_cli.report import moment
 from scenicq_cli.table import Table, TextStream, fitted
 
 UUIDS = ("7fab2350-7eaf-3b7e-a39d-6937a4c1bede", "7fab9911-0510-35b0-a2fa-b4cea13a6d76")
+
+
+TAIL = ShortNames(lambda frame: frame[-6:], str)
+ROOT = Path(__file__).parents[2]
+CROSSING = ROOT / "sample_data" / "scenarios" / "02_crossing_cars.scenic"
+OVER_TIME = ROOT / "sample_data" / "over_time"
 
 
 def rows(count=12):
@@ -38,9 +56,10 @@ def dated(count=12):
 @pytest.mark.parametrize(("width", "made"), list(itertools.product((80, 120), (rows, dated))))
 def test_it_is_no_wider_than_the_terminal_and_breaks_no_word(width, made):
     table = list(made())
-    lines = fitted(
-        table, width, lambda frame: "/".join(part[-24:] if "/" not in frame else part[:8] for part in frame.split("/"))
+    short = ShortNames(
+        lambda frame: "/".join(part[-24:] if "/" not in frame else part[:8] for part in frame.split("/")), str
     )
+    lines = fitted(table, width, short)
     assert max(map(len, lines)) <= width
     words = {word for line in lines for word in line.split()}
     for row in table:
@@ -67,16 +86,16 @@ def test_tables_look_so(width, golden):
         beginnings = {
             row[0]: "/".join(part[:10] if "/" in row[0] else part[-6:] for part in row[0].split("/")) for row in table
         }
-        tables.append("\n".join(fitted(table, width, beginnings.__getitem__)))
+        tables.append("\n".join(fitted(table, width, ShortNames(beginnings.__getitem__, str))))
     golden("\n\n".join(tables) + "\n")
 
 
 def test_what_fits_is_not_left_out():
-    assert "20:48:20.44" in fitted(list(tokens()), 85, lambda frame: frame[-6:])[1]
+    assert "20:48:20.44" in fitted(list(tokens()), 85, TAIL)[1]
 
 
 def test_a_date_that_all_share_stands_in_the_head():
-    lines = fitted(list(dated()), 80, lambda frame: frame[-6:])
+    lines = fitted(list(dated()), 80, TAIL)
     assert "2018-09-18" in lines[0]
     assert not any("2018-09-18" in line for line in lines[1:])
 
@@ -105,7 +124,7 @@ def test_on_a_terminal_it_fits_and_names_frames_as_other_commands_take_them(cros
     monkeypatch.setenv("COLUMNS", "70")
     dataset = open_dataset(crossroads)
     sink = Terminal()
-    table = Table(TextStream(sink), dataset.short_frames)
+    table = Table(TextStream(sink), dataset.short_names)
     labels = list(itertools.islice(dataset.labels(), 120))
     for label in labels:
         table.write({
@@ -120,11 +139,83 @@ def test_on_a_terminal_it_fits_and_names_frames_as_other_commands_take_them(cros
     assert [dataset.label(name).frame for name in names[::40]] == [label.frame for label in labels[::40]]
 
 
+@pytest.fixture(scope="module")
+def named_by_uuids(tmp_path_factory):
+    """The sample with names of recordings, frames and tracks as Argoverse has them, and its clock without a date."""
+    source = Path(shutil.copytree(ROOT / "sample_data" / "crossroads", tmp_path_factory.mktemp("uuids") / "source"))
+
+    def name(text):
+        return str(uuid.uuid5(uuid.NAMESPACE_OID, text))
+
+    labels = [json.loads(line) for line in (source / "labels.jsonl").read_text().splitlines()]
+    for label in labels:
+        label["recording"] = name(label["recording"])
+        label["timestamp_us"] -= 1_700_000_000_000_000 - 315_966_253_660_357
+        label["id"] = f"{label['recording']}/{label['timestamp_us']}000"
+        for each in label["objects"]:
+            each["id"] = name(each["id"])
+            each["track"] = name(each["track"])
+    (source / "labels.jsonl").write_text("".join(json.dumps(label) + "\n" for label in labels))
+    target = source.with_name("town")
+    ingest(source, target)
+    return target
+
+
+def on_a_terminal(width, *words):
+    """What a command writes to a terminal of a width, without colours."""
+    outer, inner = pty.openpty()
+    fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 40, width, 0, 0))
+    environment = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
+    running = subprocess.Popen(words, stdin=inner, stdout=inner, stderr=subprocess.DEVNULL, env=environment)
+    os.close(inner)
+    written = b""
+    try:
+        while block := os.read(outer, 65536):
+            written += block
+    except OSError:  # how a terminal ends on Linux
+        pass
+    os.close(outer)
+    assert running.wait() == 0
+    return re.sub("\x1b\\[[0-9;]*m", "", written.decode()).splitlines()
+
+
+@pytest.mark.parametrize(
+    ("program", "width", "head"),
+    [
+        (CROSSING, 80, "FRAME TIME VERDICT OBJECTS"),
+        (CROSSING, 120, "FRAME TIME VERDICT OBJECTS"),
+        (OVER_TIME / "02_cut_in.scenic", 80, "RECORDING START SECONDS VERDICT OBJECTS FRAMES"),
+        (OVER_TIME / "02_cut_in.scenic", 120, "RECORDING START SECONDS VERDICT OBJECTS FRAMES"),
+    ],
+    ids=lambda value: value.stem if isinstance(value, Path) else None,
+)
+def test_uuids_fit_a_terminal(command, named_by_uuids, program, width, head):
+    """With the installed command: no line is wider, every row is shown, and its names are found again."""
+    lines = on_a_terminal(width, command, "match", program, named_by_uuids, "--near", "3")
+    assert lines[0].split() == head.split()
+    assert max(map(len, lines)) <= width
+    done = subprocess.run([command, "match", program, named_by_uuids, "--near", "3"], capture_output=True, check=True)
+    results = [json.loads(line) for line in done.stdout.splitlines()]
+    shown = [line.split() for line in lines[1:] if not line.startswith(" ")]
+    assert len(shown) == len(results)
+    dataset = open_dataset(named_by_uuids)
+    recordings = {label.recording for label in dataset.labels()}
+    over_time = head.startswith("RECORDING")
+    text = "\n".join(lines)
+    for words, result in zip(shown, results, strict=True):
+        if over_time:
+            assert find_recording(recordings, words[0]) == result["recording"]
+        else:
+            assert dataset.label(words[0]).frame == result["frame"]
+        objects = {role: name for role, name in result["correspondence"].items() if role != "ego"}
+        assert all(re.search(f"{role}={name[:6]}", text) for role, name in objects.items())
+
+
 def test_frames_are_found_by_beginnings_that_no_other_has(crossroads):
     dataset = open_dataset(crossroads)
     assert dataset.label("03-busy-intersection/09").frame == "03-busy-intersection/09"
     assert dataset.label("03-b/09").frame == "03-busy-intersection/09"
-    cut = dataset.short_frames()
+    cut = dataset.short_names().frame
     for label in itertools.islice(dataset.labels(), 0, None, 39):
         assert dataset.label(cut(label.frame)) == label
     with pytest.raises(DataError, match="several frames begin with `03-b`"):

@@ -117,7 +117,11 @@ def test_results_of_different_datasets_are_refused():
 
     mine = of(_line("a", time=1), _line("b", time=2))
     assert check_datasets(mine, of(_line("a", time=1))) is None
-    assert check_datasets(mine, {}) is None
+    assert check_datasets({}, {}) is None
+    for pair, empty in (((mine, {}), "B"), (({}, mine), "A")):
+        told = check_datasets(*pair)
+        assert told is not None
+        assert (told.severity, told.message[:1]) == ("warning", empty)
     for other in (_line("a", time=5), _line("a", time=1, recording="q")):
         with pytest.raises(DataError, match="of different datasets"):
             check_datasets(mine, of(other))

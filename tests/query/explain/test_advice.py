@@ -135,11 +135,58 @@ def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroad
     assert "line 5" in done.stderr
     assert run("match", file, crossroads).stderr.startswith("0 matches in 156 frames; ")
     assert run("match", file, crossroads, "--quiet").stderr == ""
+    assert run("match", file, crossroads, "--limit", "3").stderr.startswith("0 matches in 156 frames; ")
     crossing = scenarios / "02_crossing_cars.scenic"
     assert run("match", crossing, crossroads).stderr == ""
+    assert run("match", crossing, crossroads, "--limit", "1").stderr == ""
     asked = run("match", crossing, crossroads, "--advise")
     assert asked.exit_code == 0
     assert asked.stderr.startswith("5 matches in 156 frames; ")
+
+
+@pytest.mark.parametrize(("frames", "told"), [(1000, False), (1001, True)])
+def test_less_than_a_frame_in_a_thousand_is_hardly_any(frames, told, run, tmp_path):
+    """One match in 1,000 frames is left alone; of one in 1,001 it is said what excludes the others."""
+    ego = {"position": [0, 0], "heading": 0, "width": 2, "length": 4, "class": "Car"}
+    labels = (
+        {
+            "id": f"f{number:04}", "recording": f"r{number // 100}", "timestamp_us": number * 100_000, "map": "none",
+            "ego": ego, "objects": [ego | {"id": "a", "position": [0, 10 if number == 7 else 30]}],
+        }
+        for number in range(frames)
+    )  # fmt: skip
+    source = tmp_path / "source"
+    source.mkdir()
+    (source / "labels.jsonl").write_text("".join(json.dumps(label) + "\n" for label in labels))
+    header = {"name": "many", "interchange": 1, "angle": "heading", "classes": "scenic"}
+    (source / "dataset.json").write_text(json.dumps(header))
+    ingest(source, tmp_path / "many")
+    file = tmp_path / "p.scenic"
+    placed = "in everywhere, facing Range(0, 360) deg"
+    file.write_text(
+        "model scenic.domains.driving.model\n"
+        f"ego = new Car {placed}\nother = new Car {placed}\nrequire (distance to other) < 20\n"
+    )
+    done = run("match", file, tmp_path / "many", "--format", "ids")
+    assert (done.exit_code, done.stdout) == (0, "f0007\n")
+    first, *rest = done.stderr.splitlines() or [""]
+    assert (first == "1 match in 1,001 frames; 1,000 fail first at `require (distance to other) < 20`") is told
+    assert (
+        any(re.match(r" +(16 to )?1,001  without `require \(distance to other\) < 20`  line 4", each) for each in rest)
+        is told
+    )
+
+
+def test_an_interrupt_of_advice_leaves_the_results(run, crossroads, tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("scenicq_cli.match.advise", interrupted)
+    file = tmp_path / "p.scenic"
+    file.write_text(TEXT)
+    done = run("match", file, crossroads, "-o", tmp_path / "found.jsonl")
+    assert (done.exit_code, done.stderr) == (130, "interrupted\n  = hint: all results are written\n")
+    assert (tmp_path / "found.jsonl").exists()
 
 
 def two_maps(folder, lacking=("elsewhere", "nowhere")):
