@@ -82,12 +82,11 @@ class FollowedDirection(RoadDirection):
         west, south, east, north = np.floor(boxes / _TILE).T
         large = (east - west + 1) * (north - south + 1) > _MOST_TILES
         off = large.copy()
-        middle = shapes.points((boxes[:, :2] + boxes[:, 2:]) / 2)
-        radius = np.hypot(*(boxes[:, 2:] - boxes[:, :2]).T) / 2
         small = np.nonzero(~large)[0]
         # most boxes lie within one road or one intersection
-        held, within = shapes.tree_pairs_within(self._paved_tree, middle[small], radius[small])
-        inside = shapes.covers_many(self._paved[within], shapes.boxes(boxes[small[held]]))
+        whole = shapes.boxes(boxes[small])
+        held, within = shapes.tree_pairs(self._paved_tree, whole)
+        inside = shapes.covers_many(self._paved[within], whole[held])
         todo = np.setdiff1d(small, small[held[inside]])
         if len(todo):
             rest = boxes[todo]
@@ -116,7 +115,7 @@ class FollowedDirection(RoadDirection):
 
     @cached_property
     def _paved(self) -> NDArray[np.object_]:
-        return shapes.array(self.paved)
+        return shapes.prepared(self.paved)
 
     @cached_property
     def _paved_tree(self) -> STRtree:

@@ -32,7 +32,7 @@ from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 from scenicq.geometry.shapes import XY, Bounds
 from scenicq.geometry.terms import overlap, terms
 
-__all__ = ["bounds", "contains", "contains_many", "distance", "nearest_point"]
+__all__ = ["bounds", "contains", "contains_many", "distance", "nearest_point", "parts_near"]
 
 _FIRST_REACH = 32.0
 _LAST_REACH = 1e8
@@ -71,6 +71,13 @@ def contains(region: Region, x: float, y: float) -> bool:
 def _part_boxes(region: UnionOf) -> NDArray[np.float64]:
     """Western, southern, eastern and northern ends of a union's parts, shape (4, parts): maps have hundreds."""
     return np.array([bounds(part) for part in region.parts], dtype=np.float64).reshape(-1, 4).T
+
+
+def parts_near(region: UnionOf, box: Bounds) -> list[Region]:
+    """The parts of a union whose boxes meet the given one, in order."""
+    west, south, east, north = _part_boxes(region)
+    near = (west <= box[2]) & (east >= box[0]) & (south <= box[3]) & (north >= box[1])
+    return [region.parts[index] for index in np.flatnonzero(near).tolist()]
 
 
 def contains_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -140,7 +140,7 @@ class RoadDirection:
 
     @cached_property
     def _areas(self) -> NDArray[np.object_]:
-        return shapes.array([area for area, _ in self._directed])
+        return shapes.prepared([area for area, _ in self._directed])
 
     @cached_property
     def _tree(self) -> STRtree:
@@ -174,8 +174,7 @@ class RoadDirection:
         segments, headings, starts = self._all
         if not len(segments):
             return [()] * len(xy)
-        points = shapes.points(xy)
-        point, lane = shapes.tree_pairs_within(self._tree, points, _TIE)
+        point, lane = self._lanes_within(xy, np.full(len(xy), _TIE))
         lanes = np.bincount(point, minlength=len(xy))
         off = np.nonzero(lanes == 0)[0]
         if len(off):
@@ -198,17 +197,15 @@ class RoadDirection:
         segments, _, starts = self._all
         middle = (boxes[:, :2] + boxes[:, 2:]) / 2
         radius = np.hypot(*(boxes[:, 2:] - boxes[:, :2]).T) / 2 + _TIE
-        centers = shapes.points(middle)
         # inside of a lane only those that reach in can count, elsewhere those that may be the nearest
         inside = np.zeros(len(boxes), dtype=bool)
-        box, lane = shapes.tree_pairs_within(self._tree, centers, radius)
+        box, lane = self._lanes_within(middle, radius)
         held = shapes.covers_many(self._areas[lane], shapes.boxes(boxes[box]))
         inside[box[held]] = True
         outer = np.nonzero(~inside)[0]
         if len(outer):
-            reach = REACH + radius[outer]
-            far, other = shapes.tree_pairs_within(self._tree, centers[outer], reach)
-            away = shapes.distances(centers[outer][far], self._areas[other])
+            far, other = self._lanes_within(middle[outer], REACH + radius[outer])
+            away = shapes.distances(shapes.points(middle[outer])[far], self._areas[other])
             least = np.full(len(outer), np.inf)
             np.minimum.at(least, far, away)
             near = away <= least[far] + 2 * radius[outer][far] + _TIE
@@ -225,6 +222,12 @@ class RoadDirection:
         # as one whole number a pair is found once much sooner than as two fractions
         found = np.unique(box[pair[chosen]] * len(distinct) + number[segment[chosen]])
         return found // max(1, len(distinct)), distinct[found % max(1, len(distinct))]
+
+    def _lanes_within(self, xy: Coordinates, reach: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Pairs (point, lane) that are within reach of each other; shapes (n, 2) and (n,)."""
+        point, lane = shapes.tree_pairs_around(self._tree, xy, reach[:, None])
+        near = shapes.within_many(self._areas[lane], shapes.points(xy)[point], reach[point])
+        return point[near], lane[near]
 
     def _nearest_lanes(self, xy: Coordinates) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Pairs (point, lane) of the lanes within reach that are nearest, ties included."""

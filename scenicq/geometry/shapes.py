@@ -109,11 +109,17 @@ def tree_pairs_within(
     return cast("NDArray[np.intp]", found[0]), cast("NDArray[np.intp]", found[1])
 
 
-def tree_pairs_around(tree: STRtree, xy: Coordinates, reach: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """All pairs (index of a point, index in the tree) where the box of the geometry meets a square about the point."""
-    squares = cast("NDArray[Any]", shapely.box(*(xy - reach).T, *(xy + reach).T))
-    found = tree.query(squares)
+def tree_pairs(tree: STRtree, geometries: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All pairs (index of a geometry, index in the tree) whose boxes meet."""
+    found = tree.query(geometries)
     return cast("NDArray[np.intp]", found[0]), cast("NDArray[np.intp]", found[1])
+
+
+def tree_pairs_around(
+    tree: STRtree, xy: Coordinates, reach: float | NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All pairs (index of a point, index in the tree) where the box of the geometry meets a square about the point."""
+    return tree_pairs(tree, cast("NDArray[Any]", shapely.box(*(xy - reach).T, *(xy + reach).T)))
 
 
 def tree_nearest(
@@ -138,6 +144,18 @@ def distances(a: NDArray[Any], b: NDArray[Any] | Shape) -> NDArray[np.float64]:
 def covers(a: Shape, b: Shape) -> bool:
     """Whether no point of b lies outside of a."""
     return bool(shapely.covers(a, b))
+
+
+def prepared(geometries: Sequence[Shape]) -> NDArray[np.object_]:
+    """The geometries as an array, indexed so that comparing those of many corners with many others is fast."""
+    found = array(geometries)
+    shapely.prepare(found)
+    return found
+
+
+def within_many(a: NDArray[Any], b: NDArray[Any], distance: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether two geometries are within a distance of each other, pair by pair; `a` is best prepared."""
+    return shapely.dwithin(a, b, cast(float, distance))
 
 
 def covers_many(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:

@@ -138,3 +138,17 @@ def test_lines_and_points() -> None:
     assert membership.distance(points, 4, 0) == 3
     assert membership.distance(IntersectionOf((line, Disc((0, 0), 1))), 3, 0) == pytest.approx(2)
     assert membership.distance(IntersectionOf((UnionOf((line, points)), Disc((4, 3), 1))), 0, 0) == pytest.approx(5)
+
+
+def test_parts_near_a_box_are_those_whose_boxes_meet_it() -> None:
+    rng = np.random.default_rng(5)
+    centers = rng.uniform(-50, 50, (60, 2)).tolist()
+    union = UnionOf(tuple(Disc((x, y), 3.0) for x, y in centers))
+    for west, south in rng.uniform(-50, 50, (40, 2)).tolist():
+        around = (west, south, west + 8.0, south + 5.0)
+        near = [
+            part
+            for part, (x, y) in zip(union.parts, centers, strict=True)
+            if west - 3.0 <= x <= west + 11.0 and south - 3.0 <= y <= south + 8.0
+        ]
+        assert membership.parts_near(union, around) == near

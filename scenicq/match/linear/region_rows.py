@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from scenicq.geometry.cells import convex_cells
+from scenicq.geometry.membership import parts_near
 from scenicq.geometry.regions import PointSet, PolygonSet, PolylineSet, Rectangle, Region, Sector, UnionOf
 from scenicq.match.linear.affine_forms import Affine, AffineVector
 from scenicq.match.linear.linear_program import NotLinear, Row
@@ -72,7 +73,7 @@ def region_rows(region: Region, limits: tuple[float, float, float, float], place
     """
     x, y = place
     found: Alternative = []
-    for part in region.parts if isinstance(region, UnionOf) else (region,):
+    for part in parts_near(region, limits) if isinstance(region, UnionOf) else (region,):
         match part:
             case PolygonSet() | Rectangle():
                 cells = [cell for cell in convex_cells(part, limits) if _near(cell, limits)]
