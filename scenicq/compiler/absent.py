@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import cast
 
 from scenicq.compiler.values import fail
@@ -10,6 +10,7 @@ from scenicq.errors import Note
 from scenicq.forest.nodes import (
     Constant,
     DirectionAt,
+    Encloses,
     Logic,
     LogicOp,
     Node,
@@ -20,12 +21,12 @@ from scenicq.forest.nodes import (
     Undefined,
     Value,
 )
-from scenicq.forest.scenario import Requirement, ScenarioObject
+from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
 from scenicq.forest.walk import children
 from scenicq.geometry.regions import DifferenceOf, IntersectionOf, PolygonSet, PolylineSet, UnionOf
 from scenicq.geometry.road_direction import RoadDirection
 
-__all__ = ["absent_parts", "check_directions"]
+__all__ = ["absent_parts", "check_directions", "check_enforced", "listed"]
 
 
 def absent_parts(area: Node) -> tuple[str, ...] | None:
@@ -111,6 +112,36 @@ def check_directions(objects: Iterable[ScenarioObject], requirements: Iterable[R
         if needed is not None:
             raise fail("map-lacks", _NO_LANE.format(_named(needed)), needed.span or requirement.span, "needs lanes",
                        ("leave out what the program asks of it",))  # fmt: skip
+
+
+def check_enforced(scenario: Scenario, enforced: Collection[BuiltIn]) -> None:
+    """Refuse to enforce that objects lie where their class wants them, on a map that has no such place.
+
+    Args:
+        scenario: The scenario.
+        enforced: Scenic's own requirements that are in force.
+
+    Raises:
+        ScenarioError: map-lacks.
+    """
+    for requirement in scenario.requirements:
+        kind, condition = requirement.built_in, requirement.condition
+        if kind is None or kind not in enforced or not isinstance(condition, Encloses):
+            continue
+        names = absent_parts(condition.outer)
+        if names is not None:
+            owner = scenario.objects[requirement.objects[0]]
+            raise fail(
+                "map-lacks", f"the map `{scenario.map}` has nothing for {listed(names)}", owner.span,
+                f"`--enforce {kind.value}` wants `{owner.name}` inside",
+                ("without it nothing is asked of the map",),
+                (Note(requirement.span, "the default"),) if requirement.span not in (None, owner.span) else (),
+            )  # fmt: skip
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names of parts of a map, as messages give them."""
+    return " and ".join(f"`{name}`" for name in names) or "this"
 
 
 _NO_LANE = "the map has no lane that `{}` could be the direction of"

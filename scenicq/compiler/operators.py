@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from scenicq.compiler.absent import absent_parts
+from scenicq.compiler.absent import absent_parts, listed
 from scenicq.compiler.coerce import (
     kind_of_model,
     property_node,
@@ -271,8 +271,7 @@ def existing(value: ModelValue, span: Span | None) -> Node:
     area = to_region(value, span)
     names = absent_parts(area)
     if names is not None:
-        listed = " and ".join(f"`{name}`" for name in names) or "this"
-        raise fail("map-lacks", f"the map has nothing for {listed}", span, "there is none", _ELSEWHERE)
+        raise fail("map-lacks", f"the map has nothing for {listed(names)}", span, "there is none", _ELSEWHERE)
     return area
 
 

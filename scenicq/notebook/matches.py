@@ -18,7 +18,7 @@ from scenicq.evaluate.evaluation import evaluate
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.notebook.judgements import Judgement
-from scenicq.notebook.pictures import DisplayedText, Picture
+from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.result_origin import ORIGIN, name_origin
 from scenicq.query.execution.result_tables import result_schema, result_table
@@ -26,7 +26,7 @@ from scenicq.query.execution.results import Funnel, Result, record
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.report.backdrop import Backdrop
-from scenicq.report.picture import Shot, draw
+from scenicq.report.picture import LETTERS, Shot, draw
 from scenicq.report.write import write_report
 
 if TYPE_CHECKING:
@@ -38,6 +38,9 @@ _ROWS, _PICTURES = 20, 3
 """Results that a notebook shows at most: as rows, and as pictures."""
 _SMALL = 260
 """Width in pixels of a picture beside others."""
+_LETTERS = 2 * LETTERS
+"""Height of names in such a picture, where they could not be read else."""
+_TILE = f"display:inline-block;margin:4px;vertical-align:top;width:{_SMALL}px;overflow-wrap:anywhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,16 +275,19 @@ class Matches(Sequence[FrameResult]):
 
     def _repr_html_(self) -> str:
         funnel = self.funnel
-        pictures = "".join(
-            f'<div style="display:inline-block;margin:4px">{self.show(each.frame, width=_SMALL).svg}</div>'
-            for each in self._found[:_PICTURES]
-        )
+        pictures = "".join(f'<div style="{_TILE}">{self._tile(each)}</div>' for each in self._found[:_PICTURES])
         head = "".join(f"<th>{name}</th>" for name in ("frame", "recording", "verdict", "objects"))
         rows = "".join(f"<tr>{_cells(each)}</tr>" for each in self._found[:_ROWS])
         more = f"<p>and {len(self._found) - _ROWS} more</p>" if len(self._found) > _ROWS else ""
         told = f"{funnel.matches} of {funnel.frames} frames match, {funnel.unknowns} unknown"
-        notes = "".join(f"<pre>{escape(text)}</pre>" for text in self.warnings)
-        return f"<p>{told}</p>{notes}<div>{pictures}</div><table><tr>{head}</tr>{rows}</table>{more}"
+        notes = "".join(f'<pre style="{SCROLLS}">{escape(text)}</pre>' for text in self.warnings)
+        table = f'<div style="{SCROLLS}"><table><tr>{head}</tr>{rows}</table></div>'
+        return f"<p>{told}</p>{notes}<div>{pictures}</div>{table}{more}"
+
+    def _tile(self, each: FrameResult) -> str:
+        """A small picture, with its frame in letters of the notebook's size below."""
+        shot, backdrop = self._shot(each.frame)
+        return f"{draw(shot, backdrop, pixels=_SMALL, captioned=False, letters=_LETTERS)}<br>{escape(each.frame)}"
 
 
 def _cells(each: FrameResult) -> str:

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-__all__ = ["DisplayedText", "Picture"]
+__all__ = ["SCROLLS", "DisplayedText", "Picture"]
+
+SCROLLS = "overflow-x:auto;max-width:100%;padding-bottom:8px"
+"""Style of what may be long, so that it makes nothing else wide."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,4 +44,4 @@ class DisplayedText(str):
         return str(self)
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(self)}</pre>"
+        return f'<pre style="{SCROLLS}">{escape(self)}</pre>'

@@ -25,6 +25,8 @@ COLOURS = 8
 _NOMINAL = (("Vehicle", 2.0, 4.5), ("Pedestrian", 0.7, 0.7))
 """Width and length in metres drawn where the label has none, by class."""
 _OTHER = (0.8, 0.8)
+_FULL = 0.95
+"""Share of a picture's width that a name takes at most."""
 _AHEAD = 1.0
 """Metres ahead of a box around which no name should lie."""
 
@@ -128,7 +130,7 @@ def draw_text(roles: tuple[Role, ...], plane: Plane, bounds: Bounds, size: int) 
         roles: The roles.
         plane: Where the picture lies.
         bounds: What is drawn, in metres.
-        size: Height of the letters in centimetres.
+        size: Height of the letters in centimetres; names as long as the picture is wide have smaller ones.
     """
     # what names should not hide: centre, half the width and height, and how bad it would be
     taken: list[tuple[float, float, float, float, float]] = []
@@ -144,30 +146,35 @@ def draw_text(roles: tuple[Role, ...], plane: Plane, bounds: Bounds, size: int) 
     parts: list[str] = []
     for role in roles:
         x, y = plane.at(role.member.x, role.member.y)
-        wide, away = size * 0.34 * len(role.name), 55 * math.hypot(*box_of(role.member)[:2]) + size * 0.3
-        high = away + size / 2
+        seen = west < x < east and north < y < south
+        height = min(size, (east - west) / len(role.name) * _FULL / 0.68) if seen else size
+        wide, away = height * 0.34 * len(role.name), 55 * math.hypot(*box_of(role.member)[:2]) + height * 0.3
+        high = away + height / 2
         spots = [(x + away + wide, y), (x - away - wide, y), (x, y - high), (x, y + high)]
         spots += [(x + side * (0.7 * away + wide), y + up * high) for side in (1, -1) for up in (-1, 1)]
         spots += [(x, y - 2 * high), (x, y + 2 * high)]
+        if seen:
+            # moved to where all of it is in the picture
+            spots += [(min(max(a, west + wide + 1), east - wide - 1), b) for a, b in spots]
 
-        def crowded(spot: tuple[float, float], wide: float = wide) -> float:
-            outside = not (west + wide < spot[0] < east - wide and north + size < spot[1] < south - size)
+        def crowded(spot: tuple[float, float], wide: float = wide, height: float = height) -> float:
+            outside = not (west + wide < spot[0] < east - wide and north + height < spot[1] < south - height)
             return 99.0 * outside + sum(
                 bad
                 for a, b, broad, tall, bad in taken
-                if abs(spot[0] - a) < wide + broad and abs(spot[1] - b) < (size + tall) * 0.7
+                if abs(spot[0] - a) < wide + broad and abs(spot[1] - b) < (height + tall) * 0.7
             )
 
         left, top = min(spots, key=crowded)
-        taken.append((left, top, wide, 0.75 * size, 9.0))
+        taken.append((left, top, wide, 0.75 * height, 9.0))
         parts.append(
             element(
                 "text",
                 escape(role.name),
                 class_=f"name {role.colour}",
                 x=round(left),
-                y=round(top + size * 0.35),
-                font_size=size,
+                y=round(top + height * 0.35),
+                font_size=round(height),
                 text_anchor="middle",
             )
         )

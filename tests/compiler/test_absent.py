@@ -160,12 +160,10 @@ def labelled(number, town):
     return {"id": f"{town}{number}", "recording": town, "timestamp_us": number, "map": town, "ego": ego, "objects": []}
 
 
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory):
-    """Three frames on a map with lanes, two on one that has areas alone."""
-    folder = tmp_path_factory.mktemp("source")
+def three_and_two(folder, lacking, few):
+    """A dataset of three frames on a map with all there is, and two on one that has some kinds alone."""
     (folder / "maps").mkdir()
-    for town, kinds in (("lanes", KINDS), ("areas", ("drivable", "sidewalk"))):
+    for town, kinds in (("lanes", KINDS), (lacking, few)):
         features = [
             {"type": "Feature", "properties": {"id": name, "kind": kind, **more},
              "geometry": {"type": "Polygon", "coordinates": [[list(corner) for corner in box(*area).exterior.coords]]}}
@@ -173,13 +171,18 @@ def dataset(tmp_path_factory):
         ]  # fmt: skip
         text = json.dumps({"type": "FeatureCollection", "features": features})
         (folder / "maps" / f"{town}.geojson").write_text(text)
-    labels = [*(labelled(number, "lanes") for number in range(3)), *(labelled(number, "areas") for number in range(2))]
+    labels = [*(labelled(number, "lanes") for number in range(3)), *(labelled(number, lacking) for number in range(2))]
     (folder / "labels.jsonl").write_text("".join(json.dumps(label) + "\n" for label in labels))
     header = {"name": "d", "interchange": 1, "angle": "heading", "classes": "scenic"}
     (folder / "dataset.json").write_text(json.dumps(header))
-    target = tmp_path_factory.mktemp("datasets") / "d"
-    ingest(folder, target)
-    return open_dataset(target)
+    ingest(folder, folder / "d")
+    return open_dataset(folder / "d")
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    """Two frames are on a map that has areas alone."""
+    return three_and_two(tmp_path_factory.mktemp("source"), "areas", ("drivable", "sidewalk"))
 
 
 @pytest.mark.parametrize(
@@ -223,3 +226,22 @@ def test_commands_say_it_before_anything_else(dataset, run, tmp_path):
     assert done.exit_code == 2
     assert "error[map-lacks]: the map `areas` has no lane" in done.stderr
     assert run("explain", file, dataset.folder, "lanes0").exit_code == 0
+
+
+def test_a_map_without_the_place_where_a_class_must_be_is_told_where_that_is_enforced(run, tmp_path):
+    dataset = three_and_two(tmp_path, "walks", ("sidewalk",))
+    file = tmp_path / "p.scenic"
+    file.write_text(f"{HEAD}ego = new Car {HERE}\n")
+    waived = run("match", file, dataset.folder, "--format", "ids")
+    assert (waived.stdout.split(), waived.stderr) == (["lanes0", "lanes1", "lanes2", "walks0", "walks1"], "")
+    for more in ([], ["--summary"]):
+        done = run("match", file, dataset.folder, "--format", "ids", "--enforce", "containment", *more)
+        assert done.stdout.split() == ["lanes0", "lanes1", "lanes2"]
+        told = "warning[map-lacks]: 2 frames on map `walks` cannot match: the map `walks` has nothing for `road`"
+        assert done.stderr.count(told) == 1
+        assert "`--enforce containment` wants `ego` inside" in done.stderr
+        assert "<driving.scenic>:11:5" in done.stderr
+    done = run("explain", file, dataset.folder, "walks0", "--enforce", "containment")
+    assert (done.exit_code, done.stderr.startswith("error[map-lacks]: the map `walks` has nothing")) == (2, True)
+    collision = run("match", file, dataset.folder, "--format", "ids", "--enforce", "collision")
+    assert collision.stdout == waived.stdout

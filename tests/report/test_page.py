@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+import scenicq
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.program_files import read_program
@@ -178,20 +179,66 @@ def test_a_small_picture_leads_to_its_frame(opened):
     assert opened.run("return location.hash") == f"#{run}"
 
 
+CUT = """
+return [...document.querySelectorAll('td, th, code, .told, .recordings li > *, .which, h1, h3, summary')]
+  .filter(e => e.checkVisibility() && getComputedStyle(e).display !== 'inline')
+  .filter(e => {
+    if (e.scrollWidth > e.clientWidth + 1) return true;
+    const box = e.getBoundingClientRect();
+    return box.right > document.documentElement.clientWidth + 1 || box.left < -1;
+  })
+  .map(e => [e.tagName, e.className.baseVal ?? e.className, e.textContent.slice(0, 60)]);
+"""
+"""What cannot be seen whole."""
+
+
 @pytest.mark.parametrize("width", [1400, 390])
 def test_no_value_is_cut_off(opened, width):
     opened.resize(width, 800, phone=width < 500)
-    cut = """
-    return [...document.querySelectorAll('td, th, code, .told, .recordings li > *, .which, h1, h3, summary')]
-      .filter(e => e.checkVisibility() && getComputedStyle(e).display !== 'inline')
-      .filter(e => {
-        if (e.scrollWidth > e.clientWidth + 1) return true;
-        const box = e.getBoundingClientRect();
-        return box.right > document.documentElement.clientWidth + 1 || box.left < -1;
-      })
-      .map(e => [e.tagName, e.className.baseVal ?? e.className, e.textContent.slice(0, 60)]);
-    """
-    assert opened.run(cut) == []
+    assert opened.run(CUT) == []
+
+
+@pytest.fixture(scope="module")
+def long_names(tmp_path_factory, crossroads):
+    """A report and what a notebook shows of a program with long names, and with warnings longer still."""
+    folder = tmp_path_factory.mktemp("long")
+    program = folder / "long.scenic"
+    name = "neighbouring_vehicle_on_the_left"
+    program.write_text(
+        "model scenic.domains.driving.model\nego = new Car on road\n"
+        f"{name} = new Car on road, facing Range(0, 360) deg, with colourOfTheVehicle 'what nobody would write'\n"
+        f"require (distance from ego to {name}) < 30 and (distance from ego to {name}) > 3\n"
+    )
+    dataset = scenicq.open(crossroads)
+    matches = dataset.match(program, limit=12)
+    page = folder / "notebook.html"
+    text = f"{matches._repr_html_()}{matches.explain(matches[0].frame)._repr_html_()}"
+    page.write_text(f"<!doctype html><meta charset=utf-8><meta name=viewport content='width=device-width'>{text}")
+    return matches.report(folder / "pages"), page
+
+
+NAMES = """
+return [...document.querySelectorAll('svg text.name')].filter(e => e.checkVisibility()).map(e => {
+  const box = e.getBoundingClientRect(), frame = e.ownerSVGElement.getBoundingClientRect();
+  return [box.left - frame.left, frame.right - box.right, box.height];
+}).filter(([, , height]) => height);
+"""
+"""Pixels from names to the edges of their pictures, and their height, as far as the page is laid out."""
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_long_names_are_seen_whole(chromium, long_names, width):
+    report, notebook = long_names
+    chromium.resize(width, 800, phone=width < 500)
+    chromium.open(report)
+    assert chromium.run(CUT) == []
+    found = chromium.run(NAMES)
+    chromium.open(notebook)
+    assert chromium.run("return document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    shown = chromium.run(NAMES)
+    assert len(found) > len(shown) == 6
+    assert min(side for left, right, _ in (*found, *shown) for side in (left, right)) >= 0
+    assert min(height for _, _, height in shown) > 9
 
 
 @pytest.mark.parametrize(("width", "phone"), [(1280, False), (390, True), (320, True)])

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
+from scenicq.compiler.absent import check_enforced
 from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.temporal import Behaviors
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
@@ -150,6 +151,7 @@ class Query:
                 loader=sibling_loader(self.file or Path(self.source.name)),
                 model=self.options.model,
             )
+            check_enforced(scenario, self.options.match.enforce)
         except ScenarioError as error:
             raise about_dataset(error, self.dataset, map_name) from None
         return ready(scenario), network
