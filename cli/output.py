@@ -109,7 +109,7 @@ class ProgressBar:
         if not quiet and sys.stderr.isatty():
             from tqdm import tqdm  # noqa: PLC0415 - slow to load, and most runs have no terminal
 
-            self._bar = tqdm(total=total, unit=" frames", unit_scale=True, leave=False, file=sys.stderr)
+            self._bar = tqdm(total=total, unit=" frames", leave=False, file=sys.stderr)
 
     def advance(self, frames: int) -> None:
         """So many frames more are done."""

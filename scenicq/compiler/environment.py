@@ -96,6 +96,7 @@ _SAID = {
     "rightLane": "`X.laneSection.laneToRight` is the lane right of X's",
     "weather": "`param weather = 'rain'` compares what labels say of the weather",
     "time": "`param time = 12` compares what labels say of the time",
+    "self": "`self` stands in classes alone; `require` after the object asks of it by its name",
 }  # fmt: skip
 """How the driving model says what people say with another name."""
 

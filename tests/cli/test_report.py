@@ -1,5 +1,7 @@
 """Text for people: columns, counts, times and colours."""
 
+import io
+
 import pytest
 from click.testing import CliRunner
 from hypothesis import given
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 from scenicq.errors import Diagnostic, Source, Span
 from scenicq_cli.main import cli
+from scenicq_cli.output import ProgressBar
 from scenicq_cli.report import as_json, columns, count, moment
 
 
@@ -47,3 +50,25 @@ def test_colours_are_for_terminals_and_can_be_switched_off():
     assert CliRunner().invoke(cli, ["info", "nowhere"]).stderr.startswith("error[store-missing]")
     plain = CliRunner().invoke(cli, ["info", "nowhere"], color=True, env={"NO_COLOR": "1"})
     assert "\x1b" not in plain.stderr
+
+
+class Terminal(io.StringIO):
+    """What is written to a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def test_progress_counts_whole_frames(monkeypatch):
+    """From the first second on, and however many there are."""
+    sink = Terminal()
+    monkeypatch.setattr("sys.stderr", sink)
+    with ProgressBar(123_456, quiet=False) as bar:
+        bar.reach(1_234, 123_456)
+    assert "| 0/123456 [" in sink.getvalue()
+    assert "1.23k" not in sink.getvalue()
+    quiet = Terminal()
+    monkeypatch.setattr("sys.stderr", quiet)
+    with ProgressBar(10, quiet=True) as bar:
+        bar.advance(5)
+    assert quiet.getvalue() == ""

@@ -152,6 +152,7 @@ FIRST_DRAFTS = {
     "bike lane": "new Bicycle on bikeLane",
     "stop sign": "new StopSign",
     "parked": "other = new Car\nrequire other is parked",
+    "self": "other = new Car facing (angle from self to ego)",
 }
 
 

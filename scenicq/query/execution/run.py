@@ -143,14 +143,10 @@ class Query:
         network = self.dataset.network(map_name)
         try:
             scenario = compile_scenario(
-                self.source,
-                network,
-                version=self.options.version,
-                initial=self.options.initial,
-                behaviors=self.options.behaviors,
-                loader=sibling_loader(self.file or Path(self.source.name)),
+                self.source, network, version=self.options.version, initial=self.options.initial,
+                behaviors=self.options.behaviors, loader=sibling_loader(self.file or Path(self.source.name)),
                 model=self.options.model,
-            )
+            )  # fmt: skip
             check_enforced(scenario, self.options.match.enforce)
         except ScenarioError as error:
             raise about_dataset(error, self.dataset, map_name) from None
