@@ -147,7 +147,9 @@ def offset(item: Comparison) -> ClosedForm | None:
                 c, s = turned(angle(get))
                 px, py = px * c + py * s, py * c - px * s
                 turns.append((c, s))
-        a, b = x.known(get), y.known(get)
+        # hundreds of candidates come here: most offsets have no known part to work out
+        a = x.known(get) if x.parts else x.constant
+        b = y.known(get) if y.parts else y.constant
         u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
         holds, fails = _close(u - px, v - py, margin)
         if margin.kind == "box" and holds is not True and fails is not True:

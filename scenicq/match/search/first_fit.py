@@ -52,21 +52,19 @@ class LabelRow:
         number: Its number among the labels that were asked about.
         label: The label.
         candidates: Who may play whom.
+        seen: What is observed of its objects, by their numbers, as far as it was asked for.
     """
 
     number: int
     label: Label
     candidates: Candidates
-    _observed: dict[int, Mapping[str, Value]] | None = None
+    seen: dict[int, Mapping[str, Value]]
 
     def observed(self, number: int) -> Mapping[str, Value]:
         """What is observed of a label object; worked out when it is first asked for."""
-        known = self._observed
-        if known is None:
-            known = self._observed = {}
-        seen = known.get(number)
+        seen = self.seen.get(number)
         if seen is None:
-            seen = known[number] = observe(_label_object(self.label, number))
+            seen = self.seen[number] = observe(_label_object(self.label, number))
         return seen
 
 
@@ -239,9 +237,11 @@ class _Batch:
     def _get(self, number: int) -> Get:
         """The observed values of one label."""
         row, numbers, ranks = self.rows[number], self.numbers[number], self.fit.ranks
+        known = row.seen
 
         def get(index: int, name: str) -> Value:
-            return row.observed(numbers[ranks[index]])[name]
+            playing = numbers[ranks[index]]
+            return (known[playing] if playing in known else row.observed(playing))[name]
 
         return get
 

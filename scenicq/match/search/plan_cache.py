@@ -65,7 +65,7 @@ class PlanCache:
                 signature = signature_of(label, self.scenario.ego, roles, self.relevant)
                 fit = None if signature is None else self._first_fit(self.plan(signature))
                 if fit is not None:
-                    found.setdefault(fit, []).append(LabelRow(number, label, roles))
+                    found.setdefault(fit, []).append(LabelRow(number, label, roles, {}))
         return found
 
     def _first_fit(self, plan: MatchPlan) -> FirstFit | None:
