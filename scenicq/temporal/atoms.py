@@ -108,6 +108,16 @@ class AtomColumns:
         values = np.where(status == DEFINED, data, np.nan)
         return np.broadcast_to(values, n).copy(), np.broadcast_to(status == UNOBSERVED, n).copy()
 
+    def column(self, node: Node) -> Column | None:
+        """The values of an expanded expression; None where a field allows several directions.
+
+        Raises:
+            HiddenVariable: It hangs on a random variable without a value.
+        """
+        most: dict[int, int] = {}
+        found = self._evaluate(node, {}, most)
+        return None if most else found
+
     def observed(self, feature: Feature, sample: int) -> Value:
         """What is observed of a feature at a sample; None if nothing is."""
         column = self._feature(feature)

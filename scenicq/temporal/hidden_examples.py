@@ -1,20 +1,39 @@
 """Runs whose conditions hang on random variables in ways that no cells tell apart, such as a hidden point.
 
 The matcher gives one example of values with which the label at the start matches. With it every condition has a value
-at every sample, and the matcher is asked for others: values with which some of these turn out otherwise, many at once,
-then fewer. What no values turn is certain, however the variables come out. What some turn is assumed to hold and not to
-hold, one after the other from the first sample on, where the matcher has an example of all that is assumed, until the
-run is decided: so all that can become of it is found, each with values that make it so.
+at every sample. The matcher is asked for bounds of the numbers and points among them that do not change over time;
+where these tell what a condition is (`enclosures`), it is certain. Of the others the matcher is asked for values with
+which some turn out otherwise, many at once, then fewer. What no values turn is certain, however the variables come out.
+What some turn is assumed to hold and not to hold, one after the other from the first sample on, where the matcher has
+an example of all that is assumed, until the run is decided: so all that can become of it is found, each with values
+that make it so.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from scenicq.budget import look
+import numpy as np
+
+from scenicq.budget import limited, look
 from scenicq.forest.build import constant
-from scenicq.forest.nodes import Feature, Identity, Index, Logic, LogicOp, Node, Value
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import (
+    Compare,
+    CompareOp,
+    Constant,
+    Coordinate,
+    Feature,
+    Identity,
+    Index,
+    Logic,
+    LogicOp,
+    Node,
+    Value,
+)
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.walk import leaves, postorder, transform
 from scenicq.match.explanation import Finding
@@ -24,6 +43,7 @@ from scenicq.match.verdict import Match, NoMatch, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns
+from scenicq.temporal.enclosures import Bounds, certainly, unchanging
 from scenicq.temporal.runs import Run
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -32,8 +52,15 @@ __all__ = ["Example", "ExampleOutcome", "Examples", "Remembered", "examine_start
 Remembered = tuple[Label, Mapping[str, str]]
 """The label of a start, and its correspondence."""
 
-_MOST_ASKED = 64
+_MOST_ASKED = 128
 """Questions to the matcher for one start."""
+
+_REACHES = (1.0, 4.0, 16.0)
+"""How far beyond examples a number or a coordinate may be, tried in this order: in metres, radians, ..."""
+_CLOSE = 1 / 8
+"""The part of the way to the examples that bounds are away from them, where nearer ones are looked for."""
+_SHARE = 0.2
+"""Of the time for one start, that one question about bounds may take."""
 
 _Place = tuple[int, int]
 """The number of a condition and a sample."""
@@ -160,9 +187,8 @@ class Examples:
         if self._ask(None) is not True:
             return None
         base = self.found[0].truth
-        samples = range(self.first, len(self.columns.samples))
-        hanging = [(n, k) for n in self.conditions for k in samples if base[n][k] != UNKNOWN]
-        open_: set[_Place] = set()
+        hanging = self._hanging()
+        open_ = {(n, k) for n, k in hanging if any(each.truth[n][k] != base[n][k] for each in self.found)}
         stack = [hanging] if hanging else []
         while stack:
             look()
@@ -193,6 +219,67 @@ class Examples:
         for number, sample in open_:
             certain[number][sample] = UNKNOWN
         return certain
+
+    def _hanging(self) -> list[_Place]:
+        """Conditions at the samples where bounds of what does not change over time leave both values possible."""
+        nodes = unchanging(list(self.conditions.values()))
+        bounds: dict[int, Sequence[Bounds]] = {}
+        left = self._left(bounds)
+        for narrowed in (self._enclosed, self._tighter):
+            for node in nodes if left else ():
+                found = narrowed(_numbers_of(node), bounds.get(id(node)))
+                if found is not None:
+                    bounds[id(node)] = found
+            left = self._left(bounds)
+        return left
+
+    def _left(self, bounds: Mapping[int, Sequence[Bounds]]) -> list[_Place]:
+        """Where the first example says what a condition is, and bounds do not."""
+        found: list[_Place] = []
+        for number, each in self.conditions.items():
+            base = self.found[0].truth[number]
+            open_ = (base != UNKNOWN) & (base != certainly(self.columns, each, bounds))
+            found += [(number, place) for place in np.flatnonzero(open_).tolist() if place >= self.first]
+        return found
+
+    def _enclosed(self, parts: Sequence[Node], _: object) -> Sequence[Bounds] | None:
+        """Bounds of numbers near the examples, beyond which none of them is; None if none are found."""
+        for reach in _REACHES:
+            bounds = [(low - reach, high + reach) for low, high in map(self._span, parts)]
+            if not all(map(math.isfinite, itertools.chain(*bounds))):
+                return None
+            sides = [each for part, ends in zip(parts, bounds, strict=True) for each in _beyond(part, *ends)]
+            answer = self._ask_briefly(Logic(LogicOp.OR, tuple(sides)))
+            if answer is not True:
+                return None if answer is None else bounds
+        return None
+
+    def _tighter(self, parts: Sequence[Node], bounds: Sequence[Bounds] | None) -> Sequence[Bounds] | None:
+        """Bounds nearer to the examples, of which more are found."""
+        return bounds and [self._halved(*each) for each in zip(parts, bounds, strict=True)]
+
+    def _halved(self, part: Node, bounds: Bounds) -> Bounds:
+        ends = list(bounds)
+        for side in (0, 1):
+            close = abs(ends[side] - self._span(part)[side]) * _CLOSE
+            while abs(ends[side] - (inner := self._span(part)[side])) > close:
+                ends[side], outer = (ends[side] + inner) / 2, ends[side]
+                answer = self._ask_briefly(_beyond(part, *ends)[side])
+                if answer is not False:
+                    ends[side] = outer
+                if answer is None:
+                    break
+        return ends[0], ends[1]
+
+    def _ask_briefly(self, wanted: Node) -> bool | None:
+        with limited(self.match.timeout_s * _SHARE):
+            return self._ask(wanted)
+
+    def _span(self, part: Node) -> Bounds:
+        """The least and the greatest value that examples have of a number; nan where one has none."""
+        found = [self.columns.assigned(each.values).number(part) for each in self.found]
+        values = [math.nan if each is None else float(each[self.first]) for each in found]
+        return float(np.min(values)), float(np.max(values))
 
     def _ask(self, wanted: Node | None) -> bool | None:
         """Whether there are values for which a condition holds, which are kept; None if not known."""
@@ -234,3 +321,13 @@ class Examples:
 
         here = transform(self.conditions[number], observed)
         return here if holds else Logic(LogicOp.NOT, (here,))
+
+
+def _numbers_of(node: Node) -> list[Node]:
+    """A number, or both coordinates of a point."""
+    return [Coordinate(node, axis) for axis in (0, 1)] if kind_of(node) == "vector" else [node]
+
+
+def _beyond(number: Node, low: float, high: float) -> tuple[Node, Node]:
+    """That a number is below an end, and that it is above another."""
+    return Compare(CompareOp.LT, number, Constant(low)), Compare(CompareOp.GT, number, Constant(high))

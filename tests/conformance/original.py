@@ -54,11 +54,9 @@ class Original:
         copy = work / chart.name
         if not copy.exists():
             shutil.copy(chart, copy)  # Scenic writes its cache beside the map
-        command = [python, "-W", "ignore", HERE / script, copy, work]
+        self._command = [python, "-W", "ignore", HERE / script, copy, work]
         self._log = (work / "scenic.log").open("w", encoding="utf-8")
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True, encoding="utf-8"
-        )
+        self._process = self._started()
         self.map = work / "map.geojson"
 
     def draw(self, text: str, count: int, seed: int, seconds: float = 60.0) -> dict[str, Any]:
@@ -80,6 +78,8 @@ class Original:
     def simulate(self, program: dict[str, str], seed: int, seconds: float, steps: int) -> dict[str, Any]:
         """A trace of a program, by `simulate.py`, or the error that Scenic reports for it.
 
+        A process that was interrupted in a simulation simulates nothing any more: another takes its place.
+
         Args:
             program: Its `text`, or the path of its `file`.
             seed: Of the random numbers.
@@ -89,7 +89,11 @@ class Original:
         Raises:
             SystemExit: The process has ended.
         """
-        return self._ask({**program, "seed": seed, "seconds": seconds, "steps": steps})
+        answer = self._ask({**program, "seed": seed, "seconds": seconds, "steps": steps})
+        if answer.pop("interrupted", False):
+            self._end()
+            self._process = self._started()
+        return answer
 
     def replay(self, recordings: list[dict[str, Any]]) -> list[tuple[str, int]]:
         """How the scene simulated last fares on recorded states, by `simulate.py`.
@@ -133,7 +137,15 @@ class Original:
 
     def close(self) -> None:
         """End the process."""
+        self._end()
+        self._log.close()
+
+    def _started(self) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True, encoding="utf-8"
+        )
+
+    def _end(self) -> None:
         assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.wait()
-        self._log.close()

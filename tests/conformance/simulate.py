@@ -6,7 +6,8 @@ Usage: python simulate.py MAP.xodr OUT
 Writes OUT/map.geojson as `draw_scenes.py` does, then answers requests, one JSON object a line:
 
 - {"text" or "file", "seed", "seconds", "steps"} compiles and simulates a program. The answer is its trace: what is
-  known of the objects, their states at each step (x, y, heading, velocity), and how it ended; or an error.
+  known of the objects, their states at each step (x, y, heading, velocity), and how it ended; or an error, and whether
+  a simulation may have been interrupted, after which Scenic takes itself to be within one.
 - {"replay": [{"states", "time_step"}, ...]} has Scenic decide, for the scene simulated last, whether the program holds
   on given states: nothing acts, its behaviors are left out, and objects are where the states say. The answer has one
   pair for each: "terminated" by the program, "lasts" beyond the states, or "rejected", and the step at which.
@@ -105,7 +106,7 @@ class Simulations:
                         break
                     rejected += 1
         except OutOfPatienceError:
-            return {"error": f"no simulation in time; {rejected} were rejected"}
+            return {"error": f"no simulation in time; {rejected} were rejected", "interrupted": True}
         except Exception as error:  # whatever Scenic says of the program is its answer
             return {"error": f"{type(error).__name__}: {error}"}
         self._scene = scene

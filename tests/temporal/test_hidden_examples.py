@@ -8,9 +8,12 @@ import math
 import pytest
 
 from scenicq.errors import Source
+from scenicq.forest.nodes import Node, Norm
+from scenicq.forest.walk import postorder
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
+from scenicq.temporal import hidden_examples
 from scenicq.temporal.interval_options import IntervalOptions
 
 PROGRAM = """model scenic.domains.driving.model
@@ -124,3 +127,31 @@ def test_choices_that_share_a_place_have_values_of_their_own(crossroads):
         away = [math.dist((label.ego.x, label.ego.y), spot) for label in mine[: each.interval.count]]
         assert away[0] <= TOLERANCE
         assert away[-1] > 15 >= max(away[:-1])
+
+
+FOLLOWED = """model scenic.domains.driving.model
+lane = Uniform(*network.lanes)
+spot = new OrientedPoint on lane.centerline
+ego = new Car following roadDirection from spot for Range(-30, -5)
+other = new Car at spot
+terminate when (distance to spot) > 40
+"""
+
+
+def test_bounds_of_the_point_answer_for_samples_side_by_side(crossroads, monkeypatch):
+    """The matcher is asked for them, and hardly ever for one sample and its likes."""
+    asked: list[Node] = []
+    examine = hidden_examples.examine_start
+
+    def counted(scenario, match, solver, start, wanted):
+        if wanted is not None:
+            asked.append(wanted)
+        return examine(scenario, match, solver, start, wanted)
+
+    monkeypatch.setattr(hidden_examples, "examine_start", counted)
+    options = QueryOptions(solver="portable", every=True)
+    results = list(Query(open_dataset(crossroads), Source("program.scenic", FOLLOWED), options).results())
+    assert not [each for each in results if isinstance(each.verdict, Unknown)]
+    assert [each for each in results if isinstance(each.verdict, Match)]
+    of_samples = [each for each in asked if any(isinstance(node, Norm) for node in postorder((each,)))]
+    assert len(of_samples) < len(asked) / 10
