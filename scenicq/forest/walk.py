@@ -164,13 +164,15 @@ def postorder(roots: Iterable[Node]) -> Iterator[Node]:
         stack: list[tuple[Node, bool]] = [(root, False)]
         while stack:
             node, expanded = stack.pop()
-            if expanded:
-                if id(node) not in done:
-                    done.add(id(node))
-                    yield node
-            elif id(node) not in done:
+            if id(node) in done:
+                continue
+            below = () if expanded else children(node)
+            if below:
                 stack.append((node, True))
-                stack.extend((child, False) for child in reversed(children(node)))
+                stack.extend([(child, False) for child in reversed(below)])
+            else:
+                done.add(id(node))
+                yield node
 
 
 def transform(root: Node, step: Callable[[Node], Node], memo: dict[int, Node] | None = None) -> Node:

@@ -23,7 +23,7 @@ from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_o
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.heading_propagation import LimitError, bisected, directed, propagated
-from scenicq.match.fields.probing import probed
+from scenicq.match.fields.probing import MUCH, probed
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.problem.evaluation import holds
@@ -36,6 +36,8 @@ _MOST_OPTIONS = 16
 """Options of choices that are tried one by one."""
 _MOST_WAYS = 256
 """Ways of one part that are put to the linear program."""
+_MANY_CASES = 128
+"""Cases of one part after which a witness is looked for by more draws than at first."""
 _MOST_HALVES = 64
 """Ways of one part that are divided."""
 _CLOSE = 0.05
@@ -101,7 +103,7 @@ def _whole(items: Sequence[Item], tolerance: Tolerance) -> Outcome:
         left = [item for item in fixed if not isinstance(item[1], Constant)]
         if not left:
             return Satisfied(given)
-        found = _alone(_one_by_one(directed(BoxSet.start(ConstraintNetwork(left, tolerance), {}))), first, tolerance)
+        found = _alone(BoxSet.start(ConstraintNetwork(left, tolerance), {}), first, tolerance)
         if isinstance(found, Satisfied):
             return Satisfied({**given, **found.values})
         blamed = found if isinstance(found, Undecided) else blamed
@@ -120,25 +122,27 @@ def _deciding(roots: Sequence[Node]) -> list[Index]:
     return list(found.values()) if few else []
 
 
-def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment]:
-    """The ways of cases, as the cases are found."""
+def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:
+    """The ways of cases, as the cases are found; None where that takes long."""
     for cases in found:
+        if not cases.size:
+            yield None
         ways = (assignment_of(cases, number, None) for number in range(cases.size))
         yield from (way for way in ways if way is not None)
 
 
-def _alone(ways: Iterator[HeadingAssignment], first: Constraint, tolerance: Tolerance) -> Outcome:
+def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
     """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
     todo: deque[HeadingAssignment] = deque()
     doubt = Undecided(first, "nonlinear")
     try:
-        for number, way in enumerate(ways):
-            found = solved(way, tolerance)
+        for number, way in enumerate(_one_by_one(directed(start, _MANY_CASES))):
+            found = _tried(start, tolerance) if way is None else solved(way, tolerance)
             if isinstance(found, Satisfied):
                 return found
             if number == _MOST_WAYS:
                 return doubt
-            if isinstance(found, Undecided):
+            if isinstance(found, Undecided) and way is not None:
                 todo.append(way)
     except LimitError:
         return doubt
@@ -155,6 +159,12 @@ def _alone(ways: Iterator[HeadingAssignment], first: Constraint, tolerance: Tole
             if isinstance(found, Undecided):
                 todo.append(way)
     return doubt
+
+
+def _tried(start: BoxSet, tolerance: Tolerance) -> Satisfied | None:
+    """A witness of one part by more draws than at first."""
+    narrowed = start.narrowed()
+    return probed(narrowed, tolerance, MUCH) if narrowed.size else None
 
 
 def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAssignment] | None:
@@ -181,8 +191,7 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
     if len(given) < len(set(discrete)):
         return None
     network = ConstraintNetwork(conditioned(items, given), tolerance)
-    ways = _one_by_one(directed(BoxSet.around(network, near, _CLOSE)))
-    found = _alone(ways, items[0][0], tolerance)
+    found = _alone(BoxSet.around(network, near, _CLOSE), items[0][0], tolerance)
     return Satisfied({**given, **found.values}) if isinstance(found, Satisfied) else None
 
 

@@ -61,8 +61,12 @@ class LimitError(Exception):
     """There are more cases than `_MOST_CASES`, or nothing is left that bisecting would narrow."""
 
 
-def directed(start: BoxSet) -> Iterator[BoxSet]:
+def directed(start: BoxSet, soon: int = _MOST_CASES) -> Iterator[BoxSet]:
     """The cases in which every field has one direction and something is left, those found first at once.
+
+    Args:
+        start: One case or more.
+        soon: After how many cases an empty set says that it takes long.
 
     Raises:
         LimitError: There are too many cases.
@@ -70,6 +74,8 @@ def directed(start: BoxSet) -> Iterator[BoxSet]:
     todo, seen = [start], 0
     while todo:
         cases = todo.pop()
+        if seen <= soon < seen + cases.size:
+            yield cases.take(np.arange(0))
         seen += cases.size
         if seen > _MOST_CASES:
             raise LimitError

@@ -1,7 +1,8 @@
 """A witness by trial: values of the random variables drawn where narrowing leaves them, better ones near the best.
 
 Where a label matches, this mostly finds a witness long before all ways that fields may point have been gone through
-(cross-entropy method: what is drawn next spreads around the best of what was drawn before). It refutes nothing.
+(cross-entropy method: what is drawn next spreads around the best of what was drawn before). It refutes nothing. Where
+going through the ways takes long, it is worth more draws, in which roads that branch are tried anew (`Effort`).
 """
 
 from __future__ import annotations
@@ -39,17 +40,33 @@ from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.tolerance import SLACK, Margin, Tolerance
 
-__all__ = ["probed"]
+__all__ = ["LITTLE", "MUCH", "Effort", "probed"]
 
-_DRAWS = 96
-"""Values of each random variable that are tried at once."""
-_BEST = 8
-"""Of these, how many the next ones are drawn around."""
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much a trial is worth.
+
+    Attributes:
+        draws: Values of each random variable that are tried at once.
+        best: Of these, how many the next ones are drawn around.
+        idle: Rounds in a row without progress of which the last is the last of all.
+        anew: The share of draws that take any of several headings, whatever was best before.
+    """
+
+    draws: int
+    best: int
+    idle: int
+    anew: float
+
+
+LITTLE = Effort(96, 8, 2, 0.0)
+MUCH = Effort(512, 32, 3, 0.1)
 _ROUNDS = 12
 _CLOSER = 0.45
 """The share of the spread of one round that the next one has."""
 _PROGRESS = 0.7
-"""A round that leaves more than this share of what is missing, twice in a row, is the last."""
+"""A round that leaves more than this share of what is missing made no progress."""
 _METRES_A_RADIAN = 5.0
 """How much a wrong heading counts beside a wrong place."""
 _REPLAYED = 6
@@ -62,12 +79,13 @@ _MOST_PLACES = 4096
 _Numbers = NDArray[np.float64]
 
 
-def probed(start: BoxSet, tolerance: Tolerance) -> Satisfied | None:
+def probed(start: BoxSet, tolerance: Tolerance, effort: Effort = LITTLE) -> Satisfied | None:
     """A witness of a group with fields at hidden points, or None if none was found.
 
     Args:
         start: One case: where the random variables can be.
         tolerance: Per feature.
+        effort: How much it is worth.
     """
     items = list(start.network.items)
     spaces: dict[Identity, _Line | _Box] = {}
@@ -77,7 +95,7 @@ def probed(start: BoxSet, tolerance: Tolerance) -> Satisfied | None:
             return None
         spaces[identity] = space
     rng = np.random.default_rng(0)
-    draws = _Draws.anywhere(spaces, rng)
+    draws = _Draws.anywhere(spaces, rng, effort)
     before, idle, replayed = np.inf, 0, 0
     for number in range(1, _ROUNDS + 1):
         look()
@@ -94,10 +112,10 @@ def probed(start: BoxSet, tolerance: Tolerance) -> Satisfied | None:
                 return Satisfied(values)
         least = float(missing[order[0]])
         idle = idle + 1 if least > _PROGRESS * before else 0
-        if not np.isfinite(least) or idle == 2 or replayed == _REPLAYED:
+        if not np.isfinite(least) or idle == effort.idle or replayed == _REPLAYED:
             return None
         before = least
-        draws = draws.near(order[:_BEST], spaces, _CLOSER**number, rng)
+        draws = draws.near(order[: effort.best], spaces, _CLOSER**number)
     return None
 
 
@@ -166,41 +184,49 @@ class _Draws:
 
     Attributes:
         places: Of each random variable, in the coordinates of its space, (k, n).
+        rng: What they are drawn by.
+        effort: How much the trial is worth.
         picks: For each use of a field shares of one that tell which of several headings it has, (n,).
     """
 
     places: dict[Identity, _Numbers]
     rng: np.random.Generator
+    effort: Effort
     picks: dict[int, _Numbers] = field(default_factory=dict[int, _Numbers])
 
     @classmethod
-    def anywhere(cls, spaces: Mapping[Identity, _Line | _Box], rng: np.random.Generator) -> _Draws:
+    def anywhere(cls, spaces: Mapping[Identity, _Line | _Box], rng: np.random.Generator, effort: Effort) -> _Draws:
         """Evenly over all that there is."""
         wide = any(bool((each.high - each.low > _NARROW).any()) for each in spaces.values())
-        count = _DRAWS if wide else _FEW
+        count = effort.draws if wide else _FEW
         places = {
             identity: _rounded(each, each.low + rng.random((len(each.low), count)) * (each.high - each.low))
             for identity, each in spaces.items()
         }
-        return cls(places, rng)
+        return cls(places, rng, effort)
 
-    def near(
-        self, best: NDArray[np.intp], spaces: Mapping[Identity, _Line | _Box], spread: float, rng: np.random.Generator
-    ) -> _Draws:
+    def near(self, best: NDArray[np.intp], spaces: Mapping[Identity, _Line | _Box], spread: float) -> _Draws:
         """The best again, and others around them."""
-        mine = best[np.arange(_DRAWS) % len(best)]
+        count = self.effort.draws
+        mine = best[np.arange(count) % len(best)]
         places: dict[Identity, _Numbers] = {}
         for identity, each in spaces.items():
-            off = rng.standard_normal((len(each.low), _DRAWS)) * spread * (each.high - each.low)
+            off = self.rng.standard_normal((len(each.low), count)) * spread * (each.high - each.low)
             off[:, : len(best)] = 0.0
             moved = self.places[identity][:, mine] + off
             places[identity] = _rounded(each, np.clip(moved, each.low, each.high))
-        return _Draws(places, rng, {key: each[mine % len(each)] for key, each in self.picks.items()})
+        picks = {key: each[mine % len(each)] for key, each in self.picks.items()}
+        if self.effort.anew:
+            for each in picks.values():
+                anew = self.rng.random(count) < self.effort.anew
+                anew[: len(best)] = False
+                each[anew] = self.rng.random(int(anew.sum()))
+        return _Draws(places, self.rng, self.effort, picks)
 
     def pick(self, node: DirectionAt, counts: NDArray[np.intp]) -> NDArray[np.intp]:
         """Which of some headings each draw has at a use of a field."""
         if id(node) not in self.picks:
-            self.picks[id(node)] = self.rng.random(_DRAWS)
+            self.picks[id(node)] = self.rng.random(self.effort.draws)
         shares = self.picks[id(node)]
         return (shares[: counts.size] * counts).astype(np.intp) if counts.size > 1 else np.zeros(1, dtype=np.intp)
 

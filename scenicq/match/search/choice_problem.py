@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from scenicq.forest.nodes import (
     DiscreteRange,
     Identity,
     Index,
+    Leaf,
     Logic,
     LogicOp,
     Node,
@@ -154,7 +156,7 @@ class ChoiceProblem:
         lookups: list[Node] = []
         for variable, places in self.columns.items():
             if not isinstance(variable, Identity):
-                used = leaves(variable)
+                used = _used(variable)
                 above = [self.columns.get(leaf.identity, ()) for leaf in used if isinstance(leaf, Index)]
                 lookups.append(variable)
                 slots.append(frozenset(slot for each in (places, *above) for slot, _ in each))
@@ -168,3 +170,9 @@ class ChoiceProblem:
             )
             for joined in connected_components(others)
         ]
+
+
+@lru_cache(maxsize=1024)
+def _used(variable: Node) -> tuple[Leaf, ...]:
+    """The random variables of an expression that says which option is taken."""
+    return leaves(variable)

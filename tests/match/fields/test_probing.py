@@ -9,7 +9,8 @@ import pytest
 from hidden_roads import BEND, BENDS, ON_BEND
 from scenes import compiled, drawn, label_of
 
-from scenicq.match.fields import field_solver
+from scenicq.match.fields import field_solver, heading_propagation
+from scenicq.match.fields.probing import LITTLE, MUCH
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, Tolerance
@@ -26,8 +27,8 @@ def found(monkeypatch):
     """What trials gave."""
     answers = []
 
-    def noted(start, tolerance):
-        answers.append(probed(start, tolerance))
+    def noted(start, tolerance, effort=LITTLE):
+        answers.append(probed(start, tolerance, effort))
         return answers[-1]
 
     probed = field_solver.probed
@@ -95,6 +96,31 @@ def test_with_and_without_trials_the_verdict_is_the_same(name, monkeypatch):
         ]
     options = MatchOptions(tolerance=EXACT)
     trying = [type(Matcher(scenario, options).match(label)) for label in labels]
-    monkeypatch.setattr(field_solver, "probed", lambda start, tolerance: None)
+    monkeypatch.setattr(field_solver, "probed", lambda *_: None)
     assert trying == [type(Matcher(scenario, options).match(label)) for label in labels]
     assert {Match, NoMatch} <= set(trying)
+
+
+def test_where_ways_are_many_more_draws_find_what_few_have_missed(monkeypatch):
+    scenario = compiled(ON_BEND + AHEAD, BEND)
+    matcher = Matcher(scenario, MatchOptions())
+    probed, propagated = field_solver.probed, heading_propagation.propagated
+    efforts, cases = [], []
+    useful = [False, True]
+
+    def noted(start, tolerance, effort=LITTLE):
+        efforts.append(effort)
+        return probed(start, tolerance, effort) if effort is MUCH and useful[len(cases) - 1] else None
+
+    def counted(some):
+        cases[-1] += some.size
+        return propagated(some)
+
+    monkeypatch.setattr(field_solver, "probed", noted)
+    monkeypatch.setattr(heading_propagation, "propagated", counted)
+    label = label_of(scenario, drawn(scenario, 1), random.Random(1))
+    for _ in useful:
+        cases.append(0)
+        assert isinstance(matcher.match(label), Match)
+    assert efforts == [LITTLE, MUCH] * 2, "more draws are made once, and where cases were many"
+    assert 4 * cases[1] < cases[0], "a witness ends the search"
