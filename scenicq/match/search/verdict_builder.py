@@ -22,6 +22,8 @@ __all__ = ["Ended", "VerdictBuilder"]
 Ended = Literal["budget", "timeout"]
 """What may end a search early: its steps, or the clock."""
 
+_SHOWN = (float, tuple)
+"""Kinds of values that a witness has."""
 _UNDECIDED, _EXHAUSTED = 2_000_000, 1_000_000
 """Weights of verdicts that are unknown: above every depth that a search comes to."""
 
@@ -119,4 +121,4 @@ class VerdictBuilder:
 
 
 def _witness(keys: Sequence[str], values: Sequence[Value]) -> dict[str, WitnessValue]:
-    return {key: value for key, value in zip(keys, values, strict=True) if isinstance(value, float | tuple)}
+    return {key: value for key, value in zip(keys, values, strict=True) if isinstance(value, _SHOWN)}

@@ -176,8 +176,10 @@ class Decider:
         )
         asked = self._matched(compiled, left)
         proved = Match({}, {})
+        until = self.until
         for _, sure, frame, recording, time in rows:
-            check_deadline(self.until)
+            if until is not None:
+                check_deadline(until)
             yield [Result(frame, recording, time, proved)] if sure else next(asked)
 
     def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
@@ -226,15 +228,19 @@ class Decider:
         size = _FIRST_BATCH
         while batch := list(islice(left, size)):
             labels = [(each.label, each.among) for each in batch]
-            verdicts: Iterator[list[Verdict]]
             if self.all_matches:
-                verdicts = (_every_match(matcher, label, among) for label, among in labels)
+                for label, among in labels:
+                    check_deadline(self.until)
+                    yield [_result(label, verdict) for verdict in _every_match(matcher, label, among)]
             else:
-                verdicts = ([verdict] for verdict in matcher.match_all(labels))
-            for (label, _), found in zip(labels, verdicts, strict=True):
-                check_deadline(self.until)
-                yield [Result(label.frame, label.recording, label.timestamp_us, each, label.sensors) for each in found]
+                for (label, _), verdict in zip(labels, matcher.match_all(labels), strict=True):
+                    check_deadline(self.until)
+                    yield [_result(label, verdict)]
             size = _BATCH
+
+
+def _result(label: Label, verdict: Verdict) -> Result:
+    return Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors)
 
 
 def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> list[Verdict]:

@@ -40,10 +40,12 @@ class FramesAhead:
 
     def taken(self, frames: int) -> None:
         """Count frames whose results are taken."""
-        covered = min(frames, self._ahead)
-        self._ahead -= covered
-        if frames > covered:
-            self._show(frames - covered)
+        if self._ahead:
+            covered = min(frames, self._ahead)
+            self._ahead -= covered
+            frames -= covered
+        if frames and self._progress is not None:
+            self._progress(frames)
 
     def _show(self, frames: int) -> None:
         if self._progress is not None:

@@ -73,7 +73,7 @@ def merge_frames(
                 funnel.count(first.verdict)
                 progress(place + 1 - start)
                 start = place + 1
-                if every or isinstance(first.verdict, Match | Unknown):
+                if every or not isinstance(first.verdict, NoMatch):
                     yield first
                 yield from more
             if every:

@@ -186,6 +186,10 @@ class Funnel:
         """Count a verdict of the matcher."""
         self.frames += 1
         self.candidates += 1
+        if isinstance(verdict, Match):
+            self.with_roles += 1
+            self.matches += 1
+            return
         self.with_roles += not (isinstance(verdict, NoMatch) and verdict.cause.what.endswith(".class"))
         self._tally(verdict, self.excluded)
 

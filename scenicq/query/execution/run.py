@@ -366,7 +366,7 @@ class Query:
                 with closing(merge(there.plan, hands.decide(cut, ahead.told), self.funnel, ahead.taken)) as merged:
                     for result in merged:
                         yield result
-                        if isinstance(result.verdict, Match) and left is not None:
+                        if left is not None and isinstance(result.verdict, Match):
                             left -= 1
                             if left <= 0:
                                 return

@@ -370,7 +370,9 @@ def candidates(
     of_objects = ", ".join(f"a.{name}" for name in (*OBJECT_COLUMNS, *more))
     frames = _rows(connection, f"SELECT l.number, {of_frames} FROM {LABELS} l WHERE l.number IN {left} ORDER BY 1")
     mine = f"JOIN {LABELS} l ON s.frame = l.frame WHERE l.number IN {left} ORDER BY s.number"
-    sensors = _rows(connection, f"SELECT s.channel, s.path FROM {_SENSORS} s {mine}")
+    # datasets without sensor files are many
+    kept = mine if frames["sensor_count"].to_numpy().any() else "LIMIT 0"
+    sensors = _rows(connection, f"SELECT s.channel, s.path FROM {_SENSORS} s {kept}")
     if plan.roles is None:
         objects = _rows(connection, f"SELECT {of_objects.replace('a.', 's.')} FROM {OBJECTS} s {mine}")
         for label in _assembled(frames, objects, sensors):
