@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import assert_never, cast
 
@@ -157,8 +157,13 @@ def rebuild(node: Node, parts: tuple[Node, ...]) -> Node:
             assert_never(node)
 
 
-def postorder(roots: Iterable[Node]) -> Iterator[Node]:
-    """Every node under the roots once, children before parents, in the order of the roots."""
+def postorder(roots: Iterable[Node], *, beyond: Container[int] = ()) -> Iterator[Node]:
+    """Every node under the roots once, children before parents, in the order of the roots.
+
+    Args:
+        roots: The roots.
+        beyond: The ids of nodes that are left out, with what is only under them.
+    """
     done: set[int] = set()
     for root in roots:
         stack: list[tuple[Node, bool]] = [(root, False)]
@@ -168,7 +173,7 @@ def postorder(roots: Iterable[Node]) -> Iterator[Node]:
                 if id(node) not in done:
                     done.add(id(node))
                     yield node
-            elif id(node) not in done:
+            elif id(node) not in done and id(node) not in beyond:
                 stack.append((node, True))
                 stack.extend((child, False) for child in reversed(children(node)))
 
