@@ -41,6 +41,8 @@ COMPILING_S = 120.0
 """Seconds of processor time for compiling one program."""
 ASIDE = (20.0, 60.0)
 """Metres from every road and sidewalk at which no program puts anything."""
+ALONG = math.cos(math.radians(45.0))
+"""The least cosine, either way, of the angle between the directions of roads that overlap and go the same way."""
 
 
 @dataclass
@@ -117,8 +119,10 @@ class Town:
                 return point
 
     def is_along_road(self, x: float, y: float) -> bool:
-        """Whether a vehicle at a point can only go along one road."""
-        return not shapely.contains_xy(self._crossings, x, y)
+        """Whether a vehicle at a point can only go along one road: where roads overlap, any of them is allowed."""
+        first, *others = self.network.roadDirection.values(x, y) or (0.0,)
+        across = any(abs(math.cos(each - first)) < ALONG for each in others)
+        return not across and not shapely.contains_xy(self._crossings, x, y)
 
     def on_road(self, rng: random.Random) -> dict[str, Any]:
         """A car somewhere on a road, along it."""
