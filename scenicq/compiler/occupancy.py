@@ -297,6 +297,11 @@ class Ranked:
         """What messages call the field."""
         return self.options.name
 
+    @property
+    def reach(self) -> None:
+        """That nothing is there is an option, too: the field has a value everywhere."""
+        return None
+
     def values(self, x: float, y: float) -> tuple[float, ...]:
         """The angle that stands for the option at a point."""
         found = self.options.at(x, y)

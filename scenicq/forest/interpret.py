@@ -6,7 +6,7 @@ which operation a node is, once and exhaustively. `intervals` has the domain of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Protocol, TypeAlias, TypeVar, assert_never
 
 from scenicq.forest.nodes import (
@@ -128,9 +128,14 @@ class AbstractDomain(Protocol[V]):
         ...
 
 
-def steps_of(*roots: Node) -> Steps:
-    """The steps in which expressions are interpreted; what they share once."""
-    return tuple((node, children(node)) for node in postorder(roots))
+def steps_of(*roots: Node, known: Container[int] = ()) -> Steps:
+    """The steps in which expressions are interpreted; what they share once.
+
+    Args:
+        roots: The expressions.
+        known: The ids of nodes whose values will be given, which need no steps.
+    """
+    return tuple((node, children(node)) for node in postorder(roots, beyond=known))
 
 
 def interpret(steps: Steps, domain: AbstractDomain[V], given: Mapping[int, V] | None = None) -> dict[int, V]:

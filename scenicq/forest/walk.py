@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import assert_never, cast
 
@@ -157,14 +157,19 @@ def rebuild(node: Node, parts: tuple[Node, ...]) -> Node:
             assert_never(node)
 
 
-def postorder(roots: Iterable[Node]) -> Iterator[Node]:
-    """Every node under the roots once, children before parents, in the order of the roots."""
+def postorder(roots: Iterable[Node], *, beyond: Container[int] = ()) -> Iterator[Node]:
+    """Every node under the roots once, children before parents, in the order of the roots.
+
+    Args:
+        roots: The roots.
+        beyond: The ids of nodes that are left out, with what is only under them.
+    """
     done: set[int] = set()
     for root in roots:
         stack: list[tuple[Node, bool]] = [(root, False)]
         while stack:
             node, expanded = stack.pop()
-            if id(node) in done:
+            if id(node) in done or id(node) in beyond:
                 continue
             below = () if expanded else children(node)
             if below:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.geometry.cell_guards import Guard, narrowed
-from scenicq.geometry.shapes import Bounds
+from scenicq.geometry.shapes import Bounds, Shape
 
 __all__ = ["FieldCell", "VectorField"]
 
@@ -67,6 +67,11 @@ class VectorField(Protocol):
 
     def values_many(self, xy: NDArray[np.float64]) -> Sequence[tuple[float, ...]]:
         """`values` for points of shape (n, 2)."""
+        ...
+
+    @property
+    def reach(self) -> tuple[Sequence[Shape], float] | None:
+        """Areas, and how far around them in metres the field surely has a value; None where it has one everywhere."""
         ...
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:

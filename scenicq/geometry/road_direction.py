@@ -91,6 +91,11 @@ class RoadDirection:
         """Whether no lane has a direction."""
         return not any(len(_segments(lane.centerline)) for lane in self.lanes)
 
+    @property
+    def reach(self) -> tuple[Sequence[Shape], float]:
+        """The lanes that have a direction, and how far around them there is a heading, in metres."""
+        return [area for area, _ in self._directed], REACH
+
     def values(self, x: float, y: float) -> tuple[float, ...]:
         """The headings allowed at a point, in (-pi, pi]; none where the field is undefined."""
         segments, headings, starts = self._all

@@ -19,10 +19,10 @@ from scenicq.forest.column_domain import ColumnDomain
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, column_of, constant_column, truth_of
 from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.condition import expand
-from scenicq.forest.interpret import interpret, steps_of
+from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
 from scenicq.forest.nodes import DirectionAt, Feature, Identity, Leaf, Node, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import postorder
+from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.temporal.samples import FIXED, MOVING, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -49,6 +49,21 @@ class HiddenVariable(Exception):
         self.leaf = leaf
 
 
+@dataclass(frozen=True, slots=True)
+class _LookedUp:
+    """An expression of which some parts are known whatever the random variables are.
+
+    Attributes:
+        root: The expression.
+        steps: Those in which the rest is interpreted.
+        given: The values of these parts.
+    """
+
+    root: Node
+    steps: Steps
+    given: Mapping[int, Column]
+
+
 @dataclass(eq=False)
 class AtomColumns:
     """The conditions of a scenario over the samples of a binding.
@@ -65,10 +80,11 @@ class AtomColumns:
     assignment: Mapping[Identity, Value] = field(default_factory=dict["Identity", "Value"])
     start: NDArray[np.int64] | None = None
     _features: dict[tuple[int, str], Column | None] = field(default_factory=dict["tuple[int, str]", "Column | None"])
+    _looked_up: dict[int, _LookedUp] = field(default_factory=dict["int", "_LookedUp"])
 
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
-        """The same with values of random variables; what is observed is shared."""
-        return AtomColumns(self.scenario, self.samples, assignment, self.start, self._features)
+        """The same with values of random variables; what is observed, and the map's answers about it, are shared."""
+        return AtomColumns(self.scenario, self.samples, assignment, self.start, self._features, self._looked_up)
 
     def expanded(self, condition: Node) -> Node:
         """A condition with the program's own value of what no label observes and what does not change."""
@@ -157,8 +173,38 @@ class AtomColumns:
             most[id(node)] = int(counts.max())
             return np.full(1, chosen.get(id(node), 0))
 
+        domain = ColumnDomain(self._observed, self._assigned, pick)
         with np.errstate(all="ignore"):
-            return interpret(steps_of(root), ColumnDomain(self._observed, self._assigned, pick))[id(root)]
+            if not self.assignment:
+                return interpret(steps_of(root), domain)[id(root)]
+            if id(root) not in self._looked_up:
+                self._looked_up[id(root)] = self._look_up(root)
+            asked = self._looked_up[id(root)]
+            return interpret(asked.steps, domain, asked.given)[id(root)]
+
+    def _look_up(self, root: Node) -> _LookedUp:
+        """Ask the map about what is observed, once for all values of random variables."""
+        hidden: set[int] = set()
+        several: dict[int, int] = {}
+
+        def pick(node: DirectionAt, counts: NDArray[np.intp]) -> NDArray[np.intp]:
+            several[id(node)] = int(counts.max())
+            return np.zeros(1, np.intp)
+
+        known: dict[int, Column] = {}
+        domain = ColumnDomain(self._observed, self._assigned, pick)
+        given: dict[int, Column] = {}
+        for node in postorder((root,)):
+            below = children(node)
+            if is_leaf(node) or id(node) in several or any(id(each) in hidden for each in below):
+                hidden.add(id(node))
+                continue
+            known |= interpret([(node, below)], domain, known)
+            if id(node) in several:
+                hidden.add(id(node))
+            elif isinstance(node, OnMap):
+                given[id(node)] = known[id(node)]
+        return _LookedUp(root, steps_of(root, known=given), given)
 
     def _assigned(self, leaf: Leaf, _args: Sequence[Column]) -> Column:
         if leaf.identity not in self.assignment:

@@ -17,10 +17,11 @@ from scenicq.forest.interval_ends import ARRAYS
 from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Arithmetic, ArithmeticOp, DirectionAt, Feature, Index, Node
+from scenicq.forest.nodes import Feature, Index, Node
 from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.geometry.regions import SLACK
 from scenicq.temporal.atoms import AtomColumns
+from scenicq.temporal.definedness import is_total
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 from scenicq.temporal.truth import Truth as Truths
 
@@ -28,13 +29,6 @@ __all__ = ["Bounds", "certainly", "unchanging"]
 
 Bounds = tuple[float, float]
 """The least and the greatest value of a number."""
-
-_TOTAL = {
-    ArithmeticOp.ADD, ArithmeticOp.SUB, ArithmeticOp.MUL, ArithmeticOp.NEG, ArithmeticOp.ABS, ArithmeticOp.MIN,
-    ArithmeticOp.MAX, ArithmeticOp.SIN, ArithmeticOp.COS, ArithmeticOp.ATAN, ArithmeticOp.ATAN2, ArithmeticOp.FLOOR,
-    ArithmeticOp.CEIL, ArithmeticOp.WRAP,
-}  # fmt: skip
-"""Operations that have a value for all numbers."""
 
 
 def _hanging(conditions: Sequence[Node]) -> tuple[set[int], set[int]]:
@@ -100,14 +94,14 @@ def certainly(columns: AtomColumns, condition: Node, bounds: Mapping[int, Sequen
         if id(node) in bounds:
             parts = [Interval(low, high) for low, high in bounds[id(node)]]
             given[id(node)] = parts[0] if len(parts) == 1 else IntervalVector(*parts)
-            always_there = always_there and all(map(_is_total, postorder((node,))))
+            always_there = always_there and all(map(is_total, postorder((node,))))
             continue
         if id(node) not in hidden and (column := columns.column(node)) is not None:
             lacking |= column.status == UNDEFINED
             if (value := _interval(column)) is not None:
                 given[id(node)] = value
                 continue
-        always_there = always_there and _is_total(node)
+        always_there = always_there and is_total(node)
         stack.append((node, True))
         stack += [(child, False) for child in children(node)]
     with np.errstate(all="ignore"):
@@ -117,15 +111,6 @@ def certainly(columns: AtomColumns, condition: Node, bounds: Mapping[int, Sequen
     holds, fails = (np.broadcast_to(np.asarray(each, np.bool_), n) for each in found)
     known = np.where(holds & ~fails & ~lacking, TRUE, UNKNOWN) if always_there else np.full(n, UNKNOWN)
     return np.where(fails & ~holds, FALSE, known)
-
-
-def _is_total(node: Node) -> bool:
-    """Whether a node has a value whenever those below it have one."""
-    match node:
-        case Arithmetic():
-            return node.op in _TOTAL
-        case _:
-            return not isinstance(node, DirectionAt)
 
 
 def _interval(column: Column) -> IntervalValue[FloatOrArray]:

@@ -43,6 +43,7 @@ from scenicq.match.verdict import Match, NoMatch, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns
+from scenicq.temporal.definedness import untrue
 from scenicq.temporal.enclosures import Bounds, certainly, unchanging
 from scenicq.temporal.runs import Run
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -153,7 +154,11 @@ class Examples:
                 found.append(ExampleOutcome(run, examples[0]))
                 continue
             for truth in (FALSE, TRUE):
-                further = (*assumed, self._that(*place, holds=bool(truth == TRUE)))
+                that = self._that(*place, holds=bool(truth == TRUE))
+                if that is None:
+                    found.append(ExampleOutcome(run, examples[0]))
+                    continue
+                further = (*assumed, that)
                 fit = [each for each in examples if each.truth[place[0]][place[1]] == truth]
                 answer = bool(fit) or self._ask(Logic(LogicOp.AND, further) if assumed else further[0])
                 if answer and not fit:
@@ -200,8 +205,13 @@ class Examples:
             block = [each for each in block if each not in open_]
             if not block:
                 continue
-            otherwise = [self._that(n, k, holds=bool(base[n][k] != TRUE)) for n, k in block]
-            answer = self._ask(otherwise[0] if len(block) == 1 else Logic(LogicOp.OR, tuple(otherwise)))
+            otherwise = {(n, k): self._that(n, k, holds=bool(base[n][k] != TRUE)) for n, k in block}
+            open_ |= {place for place, that in otherwise.items() if that is None}
+            those = [that for that in otherwise.values() if that is not None]
+            block = [each for each in block if each not in open_]
+            if not block:
+                continue
+            answer = self._ask(those[0] if len(block) == 1 else Logic(LogicOp.OR, tuple(those)))
             if answer is False:
                 continue
             if answer is True:
@@ -312,15 +322,15 @@ class Examples:
         read = [each for each in nodes if isinstance(each, Feature) and each.current]
         return all(self.columns.observed(each, sample) is not None for each in read)
 
-    def _that(self, number: int, sample: int, *, holds: bool) -> Node:
-        """That a condition holds at a sample, or that it does not."""
+    def _that(self, number: int, sample: int, *, holds: bool) -> Node | None:
+        """That a condition holds at a sample, or that it does not; None if that cannot be said."""
 
         def observed(node: Node) -> Node:
             # what is read at the start is observed by the label
             return constant(self.columns.observed(node, sample)) if isinstance(node, Feature) and node.current else node
 
         here = transform(self.conditions[number], observed)
-        return here if holds else Logic(LogicOp.NOT, (here,))
+        return here if holds else untrue(here)
 
 
 def _numbers_of(node: Node) -> list[Node]:
