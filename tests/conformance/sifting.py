@@ -13,8 +13,9 @@ from comparing import compiled, label_of
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
-from scenicq.query.prefilter.executor import blocks, candidates, extents, run_prefilter
+from scenicq.query.prefilter.executor import blocks, extents, run_prefilter
 from scenicq.query.prefilter.plan import make_plan
+from scenicq.query.prefilter.survivors import candidates
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Recording
 from scenicq.store.writer import write_dataset

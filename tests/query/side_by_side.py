@@ -17,7 +17,8 @@ from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.block_matcher import CompiledMap, every_label
 from scenicq.query.execution.results import Result, record
 from scenicq.query.execution.run import Query
-from scenicq.query.prefilter.executor import Block, Candidate, blocks, candidates, extents, run_prefilter
+from scenicq.query.prefilter.executor import Block, blocks, extents, run_prefilter
+from scenicq.query.prefilter.survivors import Candidate, candidates
 from scenicq.smt import portable
 from scenicq.smt.answer import Answer
 from scenicq.smt.answer_cache import RememberingSolver

@@ -20,16 +20,9 @@ from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.decision import decided_frames
-from scenicq.query.prefilter.executor import (
-    Block,
-    Candidate,
-    CandidateRows,
-    candidate_rows,
-    candidates,
-    names,
-    run_prefilter,
-)
+from scenicq.query.prefilter.executor import Block, names, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
+from scenicq.query.prefilter.survivors import Candidate, CandidateRows, candidate_rows, candidates
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.temporal.interval_options import IntervalOptions

@@ -14,7 +14,8 @@ from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.recording_starts import DecidedStart, label_of, start_table, starts_of
 from scenicq.query.execution.results import IntervalSpan, Result
-from scenicq.query.prefilter.executor import Block, Candidate, CandidateRows
+from scenicq.query.prefilter.executor import Block
+from scenicq.query.prefilter.survivors import Candidate, CandidateRows
 from scenicq.store.classes import class_matches
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label

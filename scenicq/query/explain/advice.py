@@ -32,7 +32,8 @@ from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import MAP_LACKS, Query
 from scenicq.query.explain.nearest_miss import show_tolerance
 from scenicq.query.explain.prefilter_counts import spots
-from scenicq.query.prefilter.executor import candidates, hold, run_plan
+from scenicq.query.prefilter.executor import hold, run_plan
+from scenicq.query.prefilter.survivors import candidates
 from scenicq.store.classes import ancestors, is_class
 
 if TYPE_CHECKING:

@@ -26,10 +26,12 @@ from scenicq.query.prefilter.sufficient import sufficient_conditions
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.sql import sql_text
 
-__all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "Plan", "Stage", "Step", "make_plan"]
+__all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "SENSORS", "Plan", "Stage", "Step", "make_plan"]
 
 LABELS, OBJECTS, MEMBERSHIPS = "block_labels", "block_objects", "block_memberships"
 """The views that a plan reads: rows of a block of each table with their `number` in the file."""
+SENSORS = "block_sensors"
+"""The view of the sensor files of a block."""
 
 _MOST_PAIRS = 12
 """Pairs of roles whose objects are joined."""

@@ -11,7 +11,8 @@ from programs import HEADER
 from scenicq.errors import Source
 from scenicq.match.options import MatchOptions
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.prefilter.executor import Extent, blocks, candidates, hold, run_plan, run_prefilter
+from scenicq.query.prefilter.executor import Extent, blocks, hold, run_plan, run_prefilter
+from scenicq.query.prefilter.survivors import candidates
 from scenicq.store.dataset import Dataset
 
 
