@@ -92,23 +92,17 @@ class Matcher:
         return self._decided(labels, lookups, None, {})
 
     def matches(self, label: Label, *, among: Candidates | None = None) -> Iterator[Match]:
-        """Every correspondence by which a label matches, as `findings` has them."""
+        """Correspondences by which a label matches; of interchangeable objects, one order only."""
         found = (finding.verdict for finding in self.findings(label, among=among))
         return (verdict for verdict in found if isinstance(verdict, Match))
 
     def findings(self, label: Label, *, among: Candidates | None = None) -> Iterator[Finding]:
-        """Every correspondence by which a label matches, then what is undecided; without either what `examine` gives.
-
-        Of interchangeable objects, one order only. Undecided is, too, whether there are more than what the options
-        allow to be told, or than are found in the time for one label.
-        """
-        found = self._findings((label, among), MapLookups())
-        time_for_all = limited(self.options.timeout_s)
+        """The matches, then what is undecided, also whether there are more; without either what `examine` gives."""
+        found, time_for_all = self._findings((label, among), MapLookups()), limited(self.options.timeout_s)
         while True:
             with time_for_all:
-                finding = next(found, None)
-            if finding is None:
-                return
+                if (finding := next(found, None)) is None:
+                    return
             yield finding
 
     def examine(self, label: Label, given: Mapping[str, str] | None = None) -> Finding:
@@ -173,8 +167,8 @@ class Matcher:
                         match = self._verdicts.match(label, solution)
                         yield Finding(match, search, plan, solution.assignment, satisfied)
             except (Exhausted, TimeIsUp) as error:
-                enough = matched > self.options.correspondences
-                ended = "timeout" if isinstance(error, TimeIsUp) else "correspondences" if enough else "budget"
+                ended = "timeout" if isinstance(error, TimeIsUp) else "budget"
+                ended = "correspondences" if matched > self.options.correspondences else ended
             weight, verdict = self._verdicts.without_match(label, search, ended)
             rest.append((weight, Finding(verdict, search)))
             if ended == "correspondences":
