@@ -55,7 +55,10 @@ def leave_out(seconds: float) -> None:
 
 
 class limited:  # noqa: N801 - read as a statement
-    """Let what happens in the block take so long at most, or less where a block around it says so."""
+    """Let what happens in the block take so long at most, or less where a block around it says so.
+
+    Entered again, it has the time that is left.
+    """
 
     __slots__ = ("_seconds", "_token")
     _token: Token[_Limit]
@@ -76,6 +79,7 @@ class limited:  # noqa: N801 - read as a statement
 
     def __exit__(self, *_: object) -> None:
         """Go back to the clock of the block around."""
+        self._seconds = _LIMIT.get().until - time.thread_time()
         _LIMIT.reset(self._token)
 
 

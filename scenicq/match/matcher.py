@@ -92,21 +92,17 @@ class Matcher:
         return self._decided(labels, lookups, None, {})
 
     def matches(self, label: Label, *, among: Candidates | None = None) -> Iterator[Match]:
-        """Every correspondence by which a label matches; of interchangeable objects, one order only.
-
-        Stops early where the budget of the options is used up, or one takes too long to be found.
-        """
+        """Correspondences by which a label matches; of interchangeable objects, one order only."""
         found = (finding.verdict for finding in self.findings(label, among=among))
         return (verdict for verdict in found if isinstance(verdict, Match))
 
     def findings(self, label: Label, *, among: Candidates | None = None) -> Iterator[Finding]:
-        """The matches of `matches`, then what is undecided with each ego; without either the one `examine` gives."""
-        found = self._findings((label, among), MapLookups())
+        """The matches, then what is undecided, also whether there are more; without either what `examine` gives."""
+        found, time_for_all = self._findings((label, among), MapLookups()), limited(self.options.timeout_s)
         while True:
-            with limited(self.options.timeout_s):
-                finding = next(found, None)
-            if finding is None:
-                return
+            with time_for_all:
+                if (finding := next(found, None)) is None:
+                    return
             yield finding
 
     def examine(self, label: Label, given: Mapping[str, str] | None = None) -> Finding:
@@ -152,7 +148,7 @@ class Matcher:
         given: Mapping[str, str] | None = None,
     ) -> Iterator[Finding]:
         """Matches and what else is undecided, or else the one verdict that there is (algorithm 1)."""
-        (label, among), matched, rest = asked, False, list[tuple[int, Finding]]()
+        (label, among), matched, rest = asked, 0, list[tuple[int, Finding]]()
         for ego in egos(self.scenario, label, self.options):
             roles = find_candidates(self.scenario, label, ego, self.options, given or {}, among)
             if isinstance(roles, Cause):
@@ -164,14 +160,19 @@ class Matcher:
                 for signature, candidates in roles.signatures(self.plans.relevant):
                     plan = self.plans.plan(signature)
                     for solution in search.solutions(plan, candidates):
-                        matched = True
+                        matched += 1
+                        if matched > self.options.correspondences:
+                            raise Exhausted
                         satisfied = tuple(outcome for _, outcome in solution.outcomes)
                         match = self._verdicts.match(label, solution)
                         yield Finding(match, search, plan, solution.assignment, satisfied)
             except (Exhausted, TimeIsUp) as error:
-                ended = "budget" if isinstance(error, Exhausted) else "timeout"
+                ended = "timeout" if isinstance(error, TimeIsUp) else "budget"
+                ended = "correspondences" if matched > self.options.correspondences else ended
             weight, verdict = self._verdicts.without_match(label, search, ended)
             rest.append((weight, Finding(verdict, search)))
+            if ended == "correspondences":
+                break
         if not matched:
             # an unknown outweighs every no; among equals, what came furthest
             yield max(rest, key=lambda each: each[0], default=(0, Finding(self._verdicts.without_ego())))[1]

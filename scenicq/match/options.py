@@ -20,7 +20,7 @@ EXEMPT_PARAMS = frozenset(
 
 
 class Exhausted(Exception):
-    """The search took more steps than `MatchOptions.budget` allows."""
+    """The search took more steps than `MatchOptions.budget` allows, or found more than `correspondences`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +39,7 @@ class MatchOptions:
         precision: The solver's precision (δ).
         ignore_params: Global parameters that are not compared.
         budget: Steps of the correspondence search for one label.
+        correspondences: Of one label, that are told where all are asked for.
     """
 
     tolerance: Tolerance = field(default_factory=Tolerance)
@@ -52,3 +53,4 @@ class MatchOptions:
     precision: float = 1e-4
     ignore_params: frozenset[str] = field(default=EXEMPT_PARAMS)
     budget: int = 1_000_000
+    correspondences: int = 1000

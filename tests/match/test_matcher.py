@@ -169,6 +169,13 @@ def test_regions_of_one_name_do_not_make_twins():
             )
 
 
+def test_objects_in_areas_that_are_put_together_alike_are_interchangeable():
+    place = "spot = new OrientedPoint on Uniform(*network.lanes).centerline"
+    scenario = compiled(HEADER + f"ego = new Car\nfor i in range(8):\n    {place}\n    new Car at spot")
+    matcher = Matcher(scenario, MatchOptions(correspondences=20))
+    assert len(list(matcher.findings(frame(*(car(f"{n}", 1.75, 40.0 + 7 * n) for n in range(9)))))) == 9
+
+
 def test_objects_that_must_not_touch_are_still_interchangeable():
     scenario = compiled(HEADER + "ego = new Car\nfor i in range(9):\n    new Pedestrian")
     things = [LabelObject(f"{i}", "Pedestrian", "person", 9.5, 60.0 + 2 * max(i, 1), 0.0, 0.5, 0.5) for i in range(9)]

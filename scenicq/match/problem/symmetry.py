@@ -27,11 +27,13 @@ from scenicq.forest.nodes import (
     Node,
     Norm,
     Scale,
+    Value,
     VectorSum,
 )
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import And, Atom, Dynamics, Formula, Goto, MonitorStep, Or, Test, Wait, operands
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
+from scenicq.geometry.regions import DifferenceOf, IntersectionOf, UnionOf
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["GroupShape", "interchangeable", "shape_of"]
@@ -65,8 +67,7 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
         own: Hashable = None
         match node:
             case Constant():
-                # regions and fields hash by identity, which is what tells them apart
-                own = (type(node.value).__name__, node.value)
+                own = (type(node.value).__name__, _parts(node.value))
             case Feature():
                 own = (role(node.object), node.property)
             case Arithmetic() | Compare() | Logic():
@@ -180,7 +181,7 @@ class _Forms:
             own: Hashable = None
             match node:
                 case Constant():
-                    own = (type(node.value).__name__, node.value)
+                    own = (type(node.value).__name__, _parts(node.value))
                 case Feature():
                     own = (swap.get(node.object, node.object), node.property, node.current)
                 case Norm(vector=VectorSum(left, Scale(right, Constant(-1)))):
@@ -231,6 +232,17 @@ class _Forms:
             own = atoms[node.number] if isinstance(node, Atom) else None
             numbers[id(node)] = self._number((type(node).__name__, own, tuple(below)))
         return numbers[id(root)]
+
+
+def _parts(value: Value) -> Hashable:
+    """A value as what tells it apart: regions and fields are themselves, but what is put together anew is its parts."""
+    match value:
+        case UnionOf() | IntersectionOf():
+            return value.parts
+        case DifferenceOf():
+            return value.base, value.removed
+        case _:
+            return value
 
 
 def _is_difference(node: Node) -> bool:

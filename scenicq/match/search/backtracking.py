@@ -107,6 +107,7 @@ def find_assignments(
         yield dict(assignment)
         return
     names = {slot.name for slot in order}
+    waiting = _followers(order, twin_of)
     frames = [_Frame(order[0], iter(order[0].candidates))]
 
     def drop(slot: int) -> None:
@@ -128,6 +129,12 @@ def find_assignments(
             if twin is not None and twin in assignment and candidate <= assignment[twin]:
                 frame.blamed.add(twin)
                 continue
+            if slot in waiting:
+                # those that are interchangeable with it take later ones, of which there must be enough
+                later = [each for each in frame.slot.candidates if each > candidate]
+                if len(later) - sum(each in used for each in later) < waiting[slot]:
+                    frame.blamed |= {used[each] for each in later if each in used} & names
+                    continue
             look()
             budget -= 1
             if budget < 0:
@@ -174,6 +181,15 @@ def _jump(
         back = frames[-1]
         back.blamed |= failed.blamed - {back.slot.name}
         watch.jumped(failed.slot.name, back.slot.name)
+
+
+def _followers(order: Sequence[Slot], twins: Mapping[int, int]) -> Mapping[int, int]:
+    """For slots that others are interchangeable with, how many take later candidates than they do."""
+    found: dict[int, int] = {}
+    for slot in reversed(order):
+        if slot.name in twins:
+            found[twins[slot.name]] = found.get(slot.name, 0) + 1
+    return found
 
 
 def _order(slots: Sequence[Slot], twins: Mapping[int, int], links: Mapping[int, Collection[int]]) -> list[Slot]:

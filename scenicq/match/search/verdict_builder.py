@@ -19,8 +19,8 @@ from scenicq.store.labels import Label
 
 __all__ = ["Ended", "VerdictBuilder"]
 
-Ended = Literal["budget", "timeout"]
-"""What may end a search early: its steps, or the clock."""
+Ended = Literal["budget", "correspondences", "timeout"]
+"""What may end a search early: its steps, that enough is found, or the clock."""
 
 _SHOWN = (float, tuple)
 """Kinds of values that a witness has."""
@@ -76,8 +76,13 @@ class VerdictBuilder:
             reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
             return _UNDECIDED, Unknown(reason, self._cause(found), self.names(label, ego | dict(found.assignment)))
         if ended is not None:
-            limit = f"{self.options.budget:,} steps" if ended == "budget" else f"{self.options.timeout_s:g} s"
-            return _EXHAUSTED, Unknown(ended, Cause("correspondence search", f"more than {limit}"))
+            most = {
+                "budget": f"{self.options.budget:,} steps",
+                "correspondences": f"{self.options.correspondences:,} correspondences",
+                "timeout": f"{self.options.timeout_s:g} s",
+            }
+            reason = "timeout" if ended == "timeout" else "budget"
+            return _EXHAUSTED, Unknown(reason, Cause("correspondence search", f"more than {most[ended]}"))
         if failure is None:
             return 0, self.excluded(
                 label, search.problem.ego, Cause("correspondence", "no distinct label objects for all objects")

@@ -237,9 +237,8 @@ def _result(label: Label, verdict: Verdict) -> Result:
 
 
 def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> list[Verdict]:
-    """Every correspondence by which a label matches, or else why none does."""
-    matches: list[Verdict] = [*matcher.matches(label, among=among)]
-    return matches or [matcher.match(label, among=among)]
+    """Every correspondence by which a label matches and whether there may be more, or else why none does."""
+    return [finding.verdict for finding in matcher.findings(label, among=among)]
 
 
 def every_label(dataset: Dataset, block: Block, *, motion: bool = False) -> Iterator[Label]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
-from scenicq.query.execution.recording_starts import DecidedStart, label_of, start_table, starts_of
+from scenicq.query.execution.recording_starts import DecidedStart, few_findings, label_of, start_table, starts_of
 from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.prefilter.executor import Block
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows
@@ -132,11 +132,14 @@ class RecordingMatcher:
             found.failed.update(starts.failed)
         decided: list[DecidedStart] = []
         undecided: list[tuple[int, Unknown]] = []
+        known_starts: Counter[int] = Counter()
         read = left.read(labels + block.first_label) if len(labels) else iter(())
         for at, candidate, members, among, known in self._asked(block, left, labels, candidates, sure, read):
             matcher = self._search.rest if known else self.matcher
             label = candidate.label
-            findings = list(matcher.findings(label, among=among))
+            recording = int(block.recording_of[at])
+            findings = few_findings(matcher, label, known_starts[recording], among=among)
+            known_starts[recording] += sum(isinstance(each.verdict, Match) for each in findings)
             for each in findings:
                 if isinstance(each.verdict, NoMatch):
                     found.failed[each.verdict.cause.what] += 1

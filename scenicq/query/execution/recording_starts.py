@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,13 +12,18 @@ from numpy.typing import NDArray
 
 from scenicq.forest.scenario import Scenario
 from scenicq.match.explanation import Finding
-from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.match.matcher import Matcher
+from scenicq.match.problem.candidates import Candidates
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.store.labels import Label, LabelObject, Motion
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.starts import classes_of_twins
 from scenicq.temporal.stretches import StartTable
 
-__all__ = ["DecidedStart", "label_of", "start_table", "starts_of"]
+__all__ = ["DecidedStart", "few_findings", "label_of", "start_table", "starts_of"]
+
+_MOST_STARTS = 10_000
+"""Starts that the matcher may find in one recording: with all their tracks they are held until it is decided."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +41,23 @@ class DecidedStart:
     verdict: Match | Unknown
     label: Label
     correspondence: Mapping[str, str]
+
+
+def few_findings(matcher: Matcher, label: Label, starts: int, *, among: Candidates | None = None) -> list[Finding]:
+    """What the matcher finds in a label; unknown where the recording has more starts than can be held.
+
+    Args:
+        matcher: The matcher.
+        label: The label.
+        starts: Those that its recording has already.
+        among: What is known of who may play whom.
+    """
+    room = max(_MOST_STARTS - starts, 0)
+    findings = list(itertools.islice(matcher.findings(label, among=among), room + 1))
+    if len(findings) > room and isinstance(findings[room].verdict, Match):
+        cause = Cause("correspondence search", f"more than {_MOST_STARTS:,} starts in the recording")
+        findings[room] = Finding(Unknown("budget", cause))
+    return findings
 
 
 def starts_of(

@@ -16,7 +16,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.interval_frames import locate
 from scenicq.query.execution.recording_matcher import CUT_OFF
-from scenicq.query.execution.recording_starts import DecidedStart, start_table, starts_of
+from scenicq.query.execution.recording_starts import DecidedStart, few_findings, start_table, starts_of
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, columns_of, show_bands
@@ -175,7 +175,7 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
         for sample, label in enumerate(labels):
             if time_us is not None and label.timestamp_us != time_us:
                 continue
-            findings = list(matcher.findings(label))
+            findings = few_findings(matcher, label, len(starts))
             members = [
                 int(block.ego(np.array([sample]))[0]),
                 *range(*block.object_starts[sample : sample + 2].tolist()),

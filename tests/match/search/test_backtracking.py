@@ -155,3 +155,32 @@ def test_the_budget_ends_a_search_with_an_exception_never_with_nothing():
 def test_an_unknown_answer_rejects_nothing():
     slots = [Slot(0, (0,)), Slot(1, (1,))]
     assert list(find_assignments(slots, checker({}, doubtful={1}))) == [{0: 0, 1: 1}]
+
+
+@given(st.integers(1, 4), st.integers(0, 2), st.randoms(use_true_random=False))
+@settings(max_examples=150, deadline=None)
+def test_twins_among_others_that_compete_with_them(alike, others, rng):
+    domain = tuple(sorted(rng.sample(range(6), rng.randint(alike, 6))))
+    names = range(alike, alike + others)
+    slots = [Slot(name, domain) for name in range(alike)]
+    slots += [Slot(name, tuple(sorted(rng.sample(range(6), rng.randint(1, 6))))) for name in names]
+    forbidden = {}
+    for other in names:
+        pairs = {pair for pair in itertools.permutations(range(6), 2) if rng.random() < 0.3}
+        forbidden |= {(one, other): pairs for one in range(alike)}
+    twins = {name: name - 1 for name in range(1, alike)}
+    found = [
+        tuple(a[name] for name in range(alike + others))
+        for a in find_assignments(slots, checker(forbidden), twins=twins)
+    ]
+    every = {tuple(a[1] for a in sorted(each)) for each in brute_force(slots, forbidden, {})}
+    wanted = {each for each in every if list(each[:alike]) == sorted(each[:alike])}
+    assert len(found) == len(set(found))
+    assert set(found) == wanted
+
+
+def test_twins_leave_enough_later_candidates_for_each_other():
+    slots = [Slot(name, tuple(range(30))) for name in range(29)]
+    twins = {name: name - 1 for name in range(1, 28)}
+    found = list(find_assignments(slots, checker({}), twins=twins, budget=30_000))
+    assert len(found) == 30 * 29
