@@ -121,8 +121,8 @@ def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
                 "text",
                 told,
                 class_="metres",
-                x=round(x),
-                y=round(y),
+                x=math.floor(x),
+                y=math.floor(y),
                 font_size=size,
                 text_anchor="end" if upright else "middle",
             )

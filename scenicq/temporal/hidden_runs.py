@@ -43,12 +43,13 @@ class HiddenFound:
 
     Attributes:
         runs: The best that any values make of each start.
-        others: Matches that other values make of some starts, each with the number of the start among all and its end.
+        others: What other values make of some starts, or may make: the number of the start among all, the end, and
+            whether it matches.
         details: By the number of a start in its table and the last place of its run.
     """
 
     runs: Runs
-    others: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    others: list[tuple[int, int, int]] = field(default_factory=list[tuple[int, int, int]])
     details: dict[tuple[int, int], Detail] = field(default_factory=dict["tuple[int, int]", Detail])
 
 
@@ -104,7 +105,7 @@ class HiddenRuns:
             for start, each in zip(range(mine.start, mine.stop), outcomes, strict=True):
                 for run, detail in each:
                     found.details[numbers[start], places.start + run.end] = detail
-                found.others.extend((start, places.start + run.end) for run, _ in each[1:])
+                found.others.extend((start, places.start + run.end, run.truth) for run, _ in each[1:])
         return found
 
     def _of_binding(
@@ -184,12 +185,18 @@ class HiddenRuns:
             pass
         if outcomes and all(each.run.truth == FALSE for each in outcomes):
             return [(max((each.run for each in outcomes), key=lambda run: (run.cut_off, run.end)), ("", {}))]
+        none = Run(first, len(one.labels) - 1, int(UNKNOWN)), (unclear, dict[str, WitnessValue]())
+        undecided = [none] if outcomes is None else [
+            (each.run, none[1]) for each in outcomes if each.run.truth == UNKNOWN
+        ]  # fmt: skip
         # an example is a proof, whatever else there may be
         outcomes = [*(outcomes or ()), *(ExampleOutcome(decide(each.truth), each) for each in asked.found)]
         proven = [(each.run, ("", each.example.witness)) for each in outcomes if each.run.truth == TRUE]
         proven.sort(key=lambda each: -each[0].end)
-        none = Run(first, len(one.labels) - 1, int(UNKNOWN)), (unclear, dict[str, WitnessValue]())
-        return _one_each(proven, every=self.every) or [none]
+        told = _one_each(proven, every=self.every)
+        ends = {run.end for run, _ in told}
+        further = [each for each in undecided if each[0].end not in ends] if self.every else []
+        return [*told, *_one_each(further, every=True)] if told else [none]
 
     def _run(self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], known: Mapping[int, Truth]) -> Run:
         """The run of one start, given some conditions at each sample."""

@@ -239,7 +239,7 @@ def _found(stretches: Stretches, table: StartTable, found: HiddenFound) -> _Foun
         n = len(found.others)
         others = np.array(found.others, dtype=np.int64)
         which, ends = np.append(which, others[:, 0]), np.append(ends, others[:, 1])
-        truth, cut_off = np.append(truth, np.full(n, TRUE)), np.append(cut_off, np.zeros(n, np.bool_))
+        truth, cut_off = np.append(truth, others[:, 2]), np.append(cut_off, np.zeros(n, np.bool_))
         broken = np.append(broken, np.full(n, None, dtype=object))
     origins = stretches.numbers[which]
     truth = np.minimum(truth, np.where(table.sure[origins], TRUE, UNKNOWN))

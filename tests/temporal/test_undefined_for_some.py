@@ -15,7 +15,7 @@ from interval_definition import Sample, recording_of
 from scenicq.compiler.default_street import street
 from scenicq.errors import Source
 from scenicq.match.options import MatchOptions
-from scenicq.match.verdict import Match, NoMatch
+from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Recording
@@ -185,17 +185,20 @@ def dataset(tmp_path_factory, trace):
 
 
 def verdicts_of(dataset, text: str):
-    """What is told of the one start, by the number of its last sample."""
+    """What is told of the one start: the number of a last sample, and the verdict."""
     time = IntervalOptions(intervals="all")
     options = QueryOptions(solver="portable", every=True, match=MatchOptions(timeout_s=1.0), time=time)
     results = Query(dataset, Source("p.scenic", text), options).results()
-    return {each.interval.count - 1: each.verdict for each in results if each.interval is not None}
+    return [(each.interval.count - 1, each.verdict) for each in results if each.interval is not None]
 
 
 def check(dataset, trace, program: Program, told: Counter[str]) -> None:
     text = program.text()
     possible = {program.end_for(spot, trace) for spot in program.places} - {None}
-    for last, verdict in verdicts_of(dataset, text).items():
+    found = verdicts_of(dataset, text)
+    if not any(isinstance(verdict, Unknown) for _, verdict in found):
+        assert possible <= {last for last, verdict in found if isinstance(verdict, Match)}, text
+    for last, verdict in found:
         told[type(verdict).__name__] += 1
         assert not (isinstance(verdict, NoMatch) and possible), text
         if isinstance(verdict, Match) and PLACE in verdict.witness:
@@ -231,7 +234,7 @@ terminate when {condition}
 terminate when ego.position.x > 11.1
 require eventually ego.position.x > 7.1
 """
-    assert {type(each) for each in verdicts_of(dataset, text).values()} == {expected}
+    assert {type(each) for _, each in verdicts_of(dataset, text)} == {expected}
 
 
 @pytest.mark.parametrize("number", range(6))
@@ -240,9 +243,10 @@ def test_no_verdict_is_wrong_for_any_place_of_a_grid(dataset, trace, number):
 
 
 @pytest.mark.slow
-def test_hardly_anything_is_left_unknown(dataset, trace):
+def test_most_ends_are_decided(dataset, trace):
     told: Counter[str] = Counter()
     for number in range(6, 60):
         check(dataset, trace, random_program(random.Random(number)), told)
     assert min(told[kind] for kind in ("Match", "NoMatch", "proven")) > 4
-    assert told["Unknown"] < 12
+    # an end that is not proven and not excluded is told as unknown
+    assert told["Unknown"] < (told["Match"] + told["NoMatch"]) / 2
