@@ -103,18 +103,14 @@ def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
         aside, above = (_ASIDE, -round(size * 0.35)) if upright else (0, _ASIDE)
         told = f"{metres:.1f} m"
         wide = size * _LETTER * len(told) / 2
-        spots = [
-            (left + part * (right - left) - aside, top + part * (bottom - top) - above, wide if upright else 0.0)
-            for part in _PARTS
-        ]
+        before = wide if upright else 0.0  # the centre lies so far before where the text is anchored
+        spots = [(left + part * (right - left) - aside, top + part * (bottom - top) - above) for part in _PARTS]
 
-        def crowded(spot: tuple[float, float, float], wide: float = wide) -> int:
-            x, y, before = spot
-            return sum(
-                abs(x - before - across) < wide + half and abs(y - along) < size for across, along, half in taken
-            )
+        def crowded(spot: tuple[float, float], wide: float = wide, before: float = before) -> int:
+            x, y = spot[0] - before, spot[1]
+            return sum(abs(x - across) < wide + half and abs(y - along) < size for across, along, half in taken)
 
-        x, y, before = min(spots, key=crowded)
+        x, y = min(spots, key=crowded)
         taken.append((x - before, y, wide))
         parts.append(
             element(

@@ -185,23 +185,25 @@ class AtomColumns:
     def _look_up(self, root: Node) -> _LookedUp:
         """Ask the map about what is observed, once for all values of random variables."""
         hidden: set[int] = set()
-        several: dict[int, int] = {}
-
-        def pick(node: DirectionAt, counts: NDArray[np.intp]) -> NDArray[np.intp]:
-            several[id(node)] = int(counts.max())
-            return np.zeros(1, np.intp)
-
-        known: dict[int, Column] = {}
-        domain = ColumnDomain(self._observed, self._assigned, pick)
-        given: dict[int, Column] = {}
+        steps: list[tuple[Node, tuple[Node, ...]]] = []
         for node in postorder((root,)):
             below = children(node)
-            if is_leaf(node) or id(node) in several or any(id(each) in hidden for each in below):
+            if is_leaf(node) or any(id(each) in hidden for each in below):
                 hidden.add(id(node))
-                continue
-            known |= interpret([(node, below)], domain, known)
-            if id(node) in several:
-                hidden.add(id(node))
+            else:
+                steps.append((node, below))
+        several: set[int] = set()
+
+        def pick(node: DirectionAt, _: NDArray[np.intp]) -> NDArray[np.intp]:
+            several.add(id(node))
+            return np.zeros(1, np.intp)
+
+        known = interpret(steps, ColumnDomain(self._observed, self._assigned, pick))
+        given: dict[int, Column] = {}
+        for node, below in steps:
+            # each of several directions is tried
+            if id(node) in several or any(id(each) in several for each in below):
+                several.add(id(node))
             elif isinstance(node, OnMap):
                 given[id(node)] = known[id(node)]
         return _LookedUp(root, steps_of(root, known=given), given)

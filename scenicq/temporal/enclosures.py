@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from scenicq.forest.columns import DEFINED, UNDEFINED, Column
-from scenicq.forest.interpret import interpret
+from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.interval_ends import ARRAYS
 from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.intervals import IntervalDomain
@@ -80,14 +80,10 @@ def certainly(columns: AtomColumns, condition: Node, bounds: Mapping[int, Sequen
     lacking = np.zeros(n, np.bool_)
     # what has a value for some values of the variables only makes a condition false elsewhere
     always_there = True
-    steps: list[tuple[Node, tuple[Node, ...]]] = []
-    stack: list[tuple[Node, bool]] = [(condition, False)]
+    stack = [condition]
     seen: set[int] = set()
     while stack:
-        node, done = stack.pop()
-        if done:
-            steps.append((node, children(node)))
-            continue
+        node = stack.pop()
         if id(node) in seen:
             continue
         seen.add(id(node))
@@ -102,9 +98,9 @@ def certainly(columns: AtomColumns, condition: Node, bounds: Mapping[int, Sequen
                 given[id(node)] = value
                 continue
         always_there = always_there and is_total(node)
-        stack.append((node, True))
-        stack += [(child, False) for child in children(node)]
+        stack += children(node)
     with np.errstate(all="ignore"):
+        steps = steps_of(condition, known=given)
         found = interpret(steps, IntervalDomain(ARRAYS, slack=SLACK), given)[id(condition)]
     if not isinstance(found, Truth):
         return np.full(n, UNKNOWN)

@@ -7,7 +7,7 @@ with the same outcomes share one table, so that a lane, its centreline and its l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TypeAlias, cast
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.bounds import Box, scalar_bounds, vector_bounds
-from scenicq.forest.interpret import Steps, interpret
+from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.interval_ends import ARRAYS
 from scenicq.forest.interval_values import Interval
 from scenicq.forest.intervals import IntervalDomain
@@ -198,9 +198,8 @@ def _possible(index: Node, count: int) -> Sequence[int]:
     field = cast(VectorField, fields[0].field.value)
     _, headings = field.headings(np.concatenate([box[0] - SLACK, box[1] + SLACK])[None])
     with np.errstate(all="ignore"):
-        value = interpret(_steps_above(index, fields[0]), _DOMAIN, {id(fields[0]): Interval(headings, headings)})[
-            id(index)
-        ]
+        given = {id(fields[0]): Interval(headings, headings)}
+        value = interpret(steps_of(index, known=given), _DOMAIN, given)[id(index)]
     if not isinstance(value, Interval):
         return every
     low, high = np.ceil(value.low - SLACK), np.floor(value.high + SLACK)
@@ -213,24 +212,15 @@ def _place(point: Node) -> Box:
     return vector_bounds(point)
 
 
-def _steps_above(root: Node, known: Node) -> Steps:
-    """The steps in which an expression is interpreted where one of its nodes, and all below that, is known."""
-    return tuple(_down_to(root, lambda node: node is known))
-
-
 def above_choices(root: Node) -> Iterator[tuple[Node, tuple[Node, ...]]]:
     """An expression's nodes down to the outermost choices, with their children, which come before them."""
-    return _down_to(root, lambda node: isinstance(node, Select))
-
-
-def _down_to(root: Node, is_last: Callable[[Node], bool]) -> Iterator[tuple[Node, tuple[Node, ...]]]:
     done: set[int] = set()
     stack: list[tuple[Node, bool]] = [(root, False)]
     while stack:
         node, expanded = stack.pop()
         if id(node) in done:
             continue
-        below = () if is_last(node) else children(node)
+        below = () if isinstance(node, Select) else children(node)
         if expanded or not below:
             done.add(id(node))
             yield node, below
