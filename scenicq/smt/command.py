@@ -1,16 +1,18 @@
 """Any solver that reads SMT-LIB 2 from its standard input, as a command line such as `z3 -in` or `dreal --in`.
 
-Every problem gets a process of its own, in a process group of its own, which is killed with the timeout.
+Every problem gets a process of its own, in a process group of its own, which is killed with the timeout, on an
+interrupt and when this process ends, however it ends.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import shlex
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import IO, Self
@@ -29,6 +31,9 @@ __all__ = ["SmtlibSolver"]
 
 REPLY_BYTES = 4 * 2**20
 """Length of a reply at most."""
+
+_WATCH = 'read -r word || kill -s KILL -- "-$1"'
+"""A shell script that waits for a word of this process and kills a process group if none comes before its end."""
 
 
 class SmtlibSolver:
@@ -64,7 +69,7 @@ class SmtlibSolver:
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide a problem in a new process; see `Solver.check`."""
-        with self._spawn() as process:
+        with self._spawn() as process, _watched(process):
             text, expired = _converse(process, to_smtlib(problem, precision).encode(), timeout_s)
         if len(text) > REPLY_BYTES:
             return NoAnswer("garbage")
@@ -127,22 +132,41 @@ def _limit_memory(pid: int, memory_mb: int) -> None:
             resource.prlimit(pid, resource.RLIMIT_AS, (size, size))
 
 
+@contextlib.contextmanager
+def _watched(process: subprocess.Popen[bytes]) -> Generator[None]:
+    """Have the process group of a solver killed if this process is killed meanwhile, and kill it on an exception."""
+    if not hasattr(os, "killpg"):
+        yield
+        return
+    words = ["/bin/sh", "-c", _WATCH, "sh", str(process.pid)]
+    try:
+        with subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True) as watch:  # noqa: S603
+            yield
+            watch.communicate(b"ended\n")
+    finally:
+        end_group(process)
+
+
 def _converse(process: subprocess.Popen[bytes], script: bytes, timeout_s: float) -> tuple[bytes, bool]:
-    """Write a script and read the reply; whether time ran out. The process has ended afterwards."""
+    """Write a script and read the reply; whether time ran out. The process has ended then, also on an interrupt."""
     assert process.stdin is not None
     assert process.stdout is not None
     expired = threading.Event()
     timer = threading.Timer(timeout_s, lambda: (expired.set(), end_group(process)))
     timer.daemon = True
-    timer.start()
     writer = threading.Thread(target=_write, args=(process.stdin, script), daemon=True)
-    writer.start()
-    text = process.stdout.read(REPLY_BYTES + 1)
-    if len(text) > REPLY_BYTES:
+    try:
+        timer.start()
+        writer.start()
+        text = process.stdout.read(REPLY_BYTES + 1)
+        if len(text) > REPLY_BYTES:
+            end_group(process)
+        process.wait()
+    finally:
+        timer.cancel()
         end_group(process)
-    process.wait()
-    timer.cancel()
-    writer.join()
+        if writer.ident is not None:
+            writer.join()
     return text, expired.is_set()
 
 

@@ -202,14 +202,41 @@ def test_an_interrupted_match_without_a_file_says_what_can_be_resumed(command, c
     slow = ("--no-prefilter", "--method", "smt", "--solver", f"sh {solver}", "--timeout", "60", "--jobs", "1")
     words = [command, "match", str(scenarios / "04_two_lane_traffic.scenic"), str(crossroads), *slow]
     with subprocess.Popen(words, **PIPES) as process:
-        deadline = time.monotonic() + 60
-        while not begun.exists() and process.poll() is None and time.monotonic() < deadline:
-            time.sleep(0.01)
+        assert _soon(lambda: begun.exists() or process.poll() is not None)
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
         _, told = process.communicate(timeout=60)
     hint = "  = hint: with `-o FILE`, `--resume` keeps what is done until it stops"
     assert (process.returncode, told.splitlines()) == (130, ["interrupted", hint])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="process groups and a shell are needed")
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_no_solver_outlives_a_command_that_ends(command, crossroads, scenarios, tmp_path, number, jobs):
+    solver, beats = tmp_path / "solver.sh", tmp_path / "beats"
+    solver.write_text(f"while :; do echo >> {beats}; sleep 0.05; done\n")
+    slow = ("--no-prefilter", "--method", "smt", "--solver", f"sh {solver}", "--timeout", "60", "--jobs", jobs)
+    words = [command, "match", str(scenarios / "04_two_lane_traffic.scenic"), str(crossroads), *slow]
+    with subprocess.Popen(words, **PIPES) as process:
+        assert _soon(lambda: beats.exists() or process.poll() is not None)
+        assert process.poll() is None
+        process.send_signal(number)
+        process.communicate(timeout=60)
+    assert _soon(lambda: not _grows(beats))
+
+
+def _grows(file) -> bool:
+    before = file.stat().st_size
+    time.sleep(1)
+    return file.stat().st_size > before
+
+
+def _soon(happened) -> bool:
+    deadline = time.monotonic() + 60
+    while not (done := happened()) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return done
 
 
 @pytest.mark.parametrize("solver", ["nope", "nope -in", "'"])
