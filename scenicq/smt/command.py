@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 import threading
@@ -32,8 +33,9 @@ __all__ = ["SmtlibSolver"]
 REPLY_BYTES = 4 * 2**20
 """Length of a reply at most."""
 
-_WATCH = 'read -r word || kill -s KILL -- "-$1"'
-"""A shell script that waits for a word of this process and kills a process group if none comes before its end."""
+_LEASHED = """(read -r word < "/dev/fd/$1"; kill -s KILL -- "-$$") < /dev/null > /dev/null 2>&1 &
+shift; exec "$@\""""
+"""A shell script that becomes a command, whose process group is killed when the other end of a pipe is closed."""
 
 
 class SmtlibSolver:
@@ -59,8 +61,8 @@ class SmtlibSolver:
             raise SolverError(
                 Diagnostic("option-invalid", f"solver command `{command}` cannot be read: {error}")
             ) from None
-        with self._spawn() as process:
-            end_group(process)
+        if not self._words or shutil.which(self._words[0]) is None:
+            raise self._missing("it is no program that can be found and run")
 
     @property
     def name(self) -> str:
@@ -69,7 +71,7 @@ class SmtlibSolver:
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide a problem in a new process; see `Solver.check`."""
-        with self._spawn() as process, _watched(process):
+        with _leashed(self._words) as (words, leash), self._spawn(words, leash) as process:
             text, expired = _converse(process, to_smtlib(problem, precision).encode(), timeout_s)
         if len(text) > REPLY_BYTES:
             return NoAnswer("garbage")
@@ -102,25 +104,26 @@ class SmtlibSolver:
     ) -> None:
         """Do nothing."""
 
-    def _spawn(self) -> subprocess.Popen[bytes]:
+    def _spawn(self, words: Sequence[str], passed: Sequence[int] = ()) -> subprocess.Popen[bytes]:
         try:
             process = subprocess.Popen(  # noqa: S603 - the user chooses the command
-                self._words,
+                words,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,
+                pass_fds=passed,
             )
-        except (OSError, IndexError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "it is empty or holds a null character"
-            hint = "known names are auto, dreal and portable; anything else is a command that reads SMT-LIB 2"
-            diagnostic = Diagnostic(
-                "solver-missing", f"solver command `{self._command}` cannot be started: {reason}", hints=(hint,)
-            )
-            raise SolverError(diagnostic) from None
+        except (OSError, ValueError) as error:
+            raise self._missing(str(error)) from None
         if self._memory_mb is not None:
             _limit_memory(process.pid, self._memory_mb)
         return process
+
+    def _missing(self, reason: str) -> SolverError:
+        hint = "known names are auto, dreal and portable; anything else is a command that reads SMT-LIB 2"
+        message = f"solver command `{self._command}` cannot be started: {reason}"
+        return SolverError(Diagnostic("solver-missing", message, hints=(hint,)))
 
 
 def _limit_memory(pid: int, memory_mb: int) -> None:
@@ -133,18 +136,20 @@ def _limit_memory(pid: int, memory_mb: int) -> None:
 
 
 @contextlib.contextmanager
-def _watched(process: subprocess.Popen[bytes]) -> Generator[None]:
-    """Have the process group of a solver killed if this process is killed meanwhile, and kill it on an exception."""
+def _leashed(words: Sequence[str]) -> Generator[tuple[Sequence[str], tuple[int, ...]]]:
+    """A command that is killed with its process group when the block or this process ends, however it ends.
+
+    The words to run in place of the command's, and the descriptors to pass.
+    """
     if not hasattr(os, "killpg"):
-        yield
+        yield words, ()
         return
-    words = ["/bin/sh", "-c", _WATCH, "sh", str(process.pid)]
+    theirs, ours = os.pipe()
     try:
-        with subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True) as watch:  # noqa: S603
-            yield
-            watch.communicate(b"ended\n")
+        yield ["/bin/sh", "-c", _LEASHED, "sh", str(theirs), *words], (theirs,)
     finally:
-        end_group(process)
+        os.close(ours)
+        os.close(theirs)
 
 
 def _converse(process: subprocess.Popen[bytes], script: bytes, timeout_s: float) -> tuple[bytes, bool]:
