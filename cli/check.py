@@ -30,7 +30,7 @@ from .cache import user_cache
 from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
-from .programs import SCENARIO, read_scenario
+from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import LINTED_MAPS
 from .report import as_json, count, show
 
@@ -108,12 +108,14 @@ class _Asked:
         dataset: Whose labels tell what is compared, if any.
         real: Whether the maps are real ones, rather than a street that stands in.
         strict: Whether warnings of what cannot be meant are errors.
+        model: The world model of a program that imports none.
     """
 
     options: MatchOptions
     dataset: Dataset | None
     real: bool
     strict: bool
+    model: str | None
 
 
 def _found(
@@ -132,7 +134,7 @@ def _found(
         try:
             loader = sibling_loader(Path(source.name))
             scenario = compile_scenario(
-                source, network, version=version, initial=initial, behaviors="ignore", loader=loader
+                source, network, version=version, initial=initial, behaviors="ignore", loader=loader, model=asked.model
             )
         except ScenarioError as error:
             if asked.dataset is not None:
@@ -167,8 +169,9 @@ def _found(
     "  scenicq check crossing.scenic dataset\n"
     "  scenicq check crossing.scenic --map town.geojson --format json",
 )
-@click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path(), required=False)
+@click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
+@click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
+@PROGRAM_TEXT
 @click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
@@ -185,7 +188,7 @@ def _found(
     help="json gives the diagnostics as a list.",
 )
 @click.pass_context
-def check(ctx: click.Context, scenario: Path, dataset: str | None, *, map_file: Path | None,
+def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None, map_file: Path | None,
           scenic: str | None, initial: bool, forest: bool, groups: bool, classes: Literal["fine", "coarse"],
           strict: bool, format_: str) -> None:  # fmt: skip
     """Say whether a scenario is sound, and how it is read.
@@ -200,10 +203,10 @@ def check(ctx: click.Context, scenario: Path, dataset: str | None, *, map_file: 
     details: Details = [show_forest] * forest + [_groups] * groups
     try:
         version, warnings = read_version(scenic), list[Diagnostic]()
-        source = read_scenario(scenario)
-        networks = networks_of(dataset, map_file, source, version, warnings)
-        opened = None if dataset is None else open_checked(dataset)
-        asked = _Asked(MatchOptions(classes=classes), opened, opened is not None or map_file is not None, strict)
+        source, (target,), model = given_program(ctx, program, (scenario, dataset))
+        networks = networks_of(target, map_file, source, version, warnings)
+        opened = None if target is None else open_checked(target)
+        asked = _Asked(MatchOptions(classes=classes), opened, opened is not None or map_file is not None, strict, model)
         lines, diagnostics = _found(source, networks, version, initial, details, asked)
         diagnostics += warnings
     except ScenicqError as error:

@@ -23,7 +23,7 @@ from .main import NOTHING
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
-from .programs import SCENARIO, read_scenario
+from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import plain
 
@@ -60,29 +60,32 @@ def _recording(query: Query, named: str) -> tuple[str, int | float | None] | Non
     "  scenicq explain cut_in.scenic dataset scene-0061@1532402928147847\n"
     "  scenicq explain cut_in.scenic dataset scene-0061@3.5s",
 )
-@click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path())
-@click.argument("frame")
+@click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
+@click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
+@click.argument("frame", metavar="FRAME", required=False)
+@PROGRAM_TEXT
 @click.option("--smt2", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write the formula of each group as SMT-LIB 2 into a folder.")  # fmt: skip
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where the frame does not match.")
 @click.pass_context
 def explain(
-    ctx: click.Context, scenario: Path, dataset: str, frame: str, *, smt2: Path | None, exit_zero: bool, **given: Any
-) -> None:
+    ctx: click.Context, scenario: str | None, dataset: str | None, frame: str | None, *, program: str | None,
+    smt2: Path | None, exit_zero: bool, **given: Any
+) -> None:  # fmt: skip
     """Say why a frame or recording matches, or what keeps it from it and what would do.
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
-    query = Query(open_checked(dataset), read_scenario(scenario), query_options({**given, **ONE_FRAME}))
-    if query.is_over_time() and (named := _recording(query, frame)) is not None:
+    source, (target, named), model = given_program(ctx, program, (scenario, dataset, frame), 2)
+    query = Query(open_checked(str(target)), source, query_options({**given, **ONE_FRAME, "model": model}))
+    if query.is_over_time() and (recording := _recording(query, str(named))) is not None:
         with LazySolver(query.options.solver) as solver:
-            told = explain_recording(query, solver, *named)
+            told = explain_recording(query, solver, *recording)
         click.echo(plain(told.text()))
         if not told.matches and not exit_zero:
             ctx.exit(NOTHING)
         return
-    label = query.dataset.label(frame)
+    label = query.dataset.label(str(named))
     show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)

@@ -36,7 +36,7 @@ from .options import DEFAULTS, TOPICS, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
-from .programs import SCENARIO, given_program
+from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import show
 from .sources import SENSORS
@@ -62,7 +62,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.command(
     cls=Manual,
     arguments={
-        "SCENARIO": f"{SCENARIO} Not with -e.",
+        "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
     },
     exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
@@ -74,10 +74,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
     "  scenicq match -e 'ego = new Car; new Pedestrian ahead of ego by Range(0, 20)' dataset --tolerance position=2\n"
     "  seq 16 | xargs -P 4 -I{} scenicq match crossing.scenic dataset --shard {}/16 -o pieces --exit-zero"
 )
-@click.argument("scenario", metavar="SCENARIO", type=click.Path(path_type=Path), required=False)
+@click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
-@click.option("-e", "--program", metavar="TEXT", help="The program itself, in place of SCENARIO; `;` separates "
-              "statements, and the driving world model is there unless it imports another.")
+@PROGRAM_TEXT
 @click.option("--tolerance", metavar="LIST",
               help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
               "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
@@ -154,7 +153,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
-def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, program: str | None, format_: str | None,
+def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None, format_: str | None,
           output: Path | None, export: tuple[str, Path] | None, near: int | None, deadline: float | None,
           report: Path | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None,
           explain: bool, advised: bool, rank: bool, sample: int | None, diverse: bool, exit_zero: bool, summary: bool,
@@ -172,13 +171,13 @@ def match(ctx: click.Context, scenario: Path | None, dataset: str | None, *, pro
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
     together = {**ctx.params, "output": file, "advise": advised}
     check_combination(ctx, together)
-    source, target, model = given_program(ctx, program, scenario, dataset)
+    source, (target,), model = given_program(ctx, program, (scenario, dataset), 1)
     options = query_options({**given, "model": model})
     if chosen == "ids" and not (report or export or rank or sample or shard or engine or resume or options.all_matches):
         options = replace(options, proofs=False)
     if deadline is not None:
         options = replace(options, until=time.time() + deadline)
-    query = Query(open_checked(target), source, options)
+    query = Query(open_checked(str(target)), source, options)
     check_over_time(ctx, together, query.is_over_time)
     if explain:
         show_plan(query)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -11,10 +12,19 @@ from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.query.execution.option_texts import DRIVING
 from scenicq.query.execution.program_files import read_program
 
-__all__ = ["SCENARIO", "given_program", "read_scenario"]
+__all__ = ["PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
 
-SCENARIO = "A Scenic program, as a file; `-` is standard input."
+SCENARIO = "A Scenic program, as a file; `-` is standard input. Not with -e."
 """What the help says of the argument."""
+
+PROGRAM_TEXT = click.option(
+    "-e",
+    "--program",
+    metavar="TEXT",
+    help="The program itself, in place of SCENARIO; `;` separates statements, and the driving world model is there "
+    "unless it imports another.",
+)
+"""The option for a program in place of the argument; see `given_program`."""
 
 
 def read_scenario(path: Path) -> Source:
@@ -33,28 +43,30 @@ def read_scenario(path: Path) -> Source:
 
 
 def given_program(
-    ctx: click.Context, text: str | None, first: Path | None, second: str | None
-) -> tuple[Source, str, str | None]:
-    """The program and the dataset of a command whose program may be an option.
+    ctx: click.Context, text: str | None, words: Sequence[str | None], needed: int = 0
+) -> tuple[Source, list[str | None], str | None]:
+    """The program and the other arguments of a command whose program may be an option.
 
     Args:
         ctx: Of the command, for its usage.
         text: The program itself, where it is given.
-        first: The program, or the dataset where the program is an option.
-        second: The dataset, where the program is no option.
+        words: The arguments in the order of the command's: the program, unless it is an option, and the others.
+        needed: How many of the others must be there.
 
     Returns:
-        The program, the dataset, and the world model of a program that names none.
+        The program, the other arguments, and the world model of a program that names none.
 
     Raises:
         click.UsageError: An argument is missing or too many.
         DataError: As `read_scenario`.
     """
-    if text is not None and second is not None:
-        raise click.UsageError(f"-e gives the program: `{first}` and `{second}` cannot both be the dataset", ctx)
-    if first is None or (text is None and second is None):
-        missing = "SCENARIO" if first is None and text is None else "DATASET"
-        raise click.UsageError(f"Missing argument '{missing}'.", ctx)
+    names = [each.make_metavar(ctx) for each in ctx.command.params if isinstance(each, click.Argument)]
+    if text is not None and words[-1] is not None:
+        raise click.UsageError(f"-e gives the program: `{words[0]}` is one argument too many", ctx)
+    there = words if text is None else [text, *words[:-1]]
+    for name, word in zip(names[: needed + 1], there, strict=False):
+        if word is None:
+            raise click.UsageError(f"Missing argument '{name}'.", ctx)
     if text is not None:
-        return Source("<program>", text), str(first), DRIVING
-    return read_scenario(first), str(second), None
+        return Source("<program>", text), [*there[1:]], DRIVING
+    return read_scenario(Path(str(there[0]))), [*there[1:]], None

@@ -13,7 +13,7 @@ from scenicq.query.execution.program_files import sibling_loader
 
 from .check import networks_of, read_version
 from .manual import Manual
-from .programs import SCENARIO, read_scenario
+from .programs import PROGRAM_TEXT, SCENARIO, given_program
 
 __all__ = ["sample"]
 
@@ -28,8 +28,9 @@ __all__ = ["sample"]
     "  scenicq sample crossing.scenic -n 5 --seed 0\n"
     "  scenicq sample crossing.scenic dataset -n 100 -o scenes",
 )
-@click.argument("scenario", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path(), required=False)
+@click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
+@click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
+@PROGRAM_TEXT
 @click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
 @click.option("-n", "--number", metavar="N", type=click.IntRange(1), default=1, help="Scenes to draw.")
 @click.option("--seed", metavar="N", type=int, default=0, help="The same seed gives the same scenes.")
@@ -50,7 +51,9 @@ __all__ = ["sample"]
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
               help="Write an interchange folder with labels and map, to be ingested.")  # fmt: skip
-def sample(scenario: Path, dataset: str | None, *, map_file: Path | None, number: int, seed: int,
+@click.pass_context
+def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None,
+           map_file: Path | None, number: int, seed: int,
            waive: str, timeout: float, scenic: str | None, initial: bool, output: Path | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
 
@@ -58,13 +61,15 @@ def sample(scenario: Path, dataset: str | None, *, map_file: Path | None, number
     the first map of the dataset, the map that is given, the one that the program names with `param map =
     localPath('FILE')`, or else a small built-in street. One line of JSON a scene.
     """
-    source = read_scenario(scenario)
+    source, (target,), model = given_program(ctx, program, (scenario, dataset))
     version = read_version(scenic)
-    network = next(networks_of(dataset, map_file, source, version))
-    compiled = compile_scenario(source, network, version=version, initial=initial, loader=sibling_loader(scenario))
+    network = next(networks_of(target, map_file, source, version))
+    compiled = compile_scenario(
+        source, network, version=version, initial=initial, loader=sibling_loader(Path(source.name)), model=model
+    )
     labels = sample_labels(compiled, number, seed, read_built_ins(waive), timeout_s=timeout)
     if output is not None:
-        write_sample(labels, network, scenario.stem, output)
+        write_sample(labels, network, Path(source.name.strip("<>")).stem, output)
         return
     for label in labels:
         click.echo(sample_record(label))

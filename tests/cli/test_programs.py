@@ -48,6 +48,25 @@ def test_a_program_on_the_command_line_has_the_driving_model(run, crossroads, tm
     assert frames
 
 
+def test_every_command_takes_a_program_on_the_command_line(run, crossroads, tmp_path):
+    file, frame = tmp_path / "same.scenic", "03-busy-intersection/09"
+    text = f"model scenic.domains.driving.model; {PEDESTRIAN}"
+    file.write_text(text)
+    for command, *others in (
+        ("match", crossroads, "--format", "ids"),
+        ("check",),
+        ("check", crossroads),
+        ("explain", crossroads, frame, "--exit-zero"),
+        ("sample", "-n", "2"),
+        ("sample", crossroads, "-n", "2"),
+    ):
+        expected, found = run(command, file, *others), run(command, "-e", text, *others)
+        assert (found.exit_code, found.stderr) == (expected.exit_code, expected.stderr), command
+        assert found.stdout.replace("<program>", str(file)).split() == expected.stdout.split(), command
+        modelled = run(command, "-e", PEDESTRIAN, *others)
+        assert (modelled.exit_code, modelled.stderr) == (expected.exit_code, expected.stderr), command
+
+
 def test_what_cannot_be_meant_is_told_whole_of_a_program_that_is_no_file(run, crossroads, tmp_path):
     """No other command can be given it, so that none is advised."""
     text = "ego = new Car; new Pedestrian ahead of ego by Range(9, 5)"
@@ -85,13 +104,20 @@ def test_shards_and_resumed_runs_take_it_too(run, crossroads, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-e", "ego = new Car", "one", "two"], "cannot both be the dataset"),
-        (["-e", "ego = new Car"], "Missing argument 'DATASET'"),
-        (["only.scenic"], "Missing argument 'DATASET'"),
-        ([], "Missing argument 'SCENARIO'"),
+        (["match", "-e", "ego = new Car", "one", "two"], "`one` is one argument too many"),
+        (["match", "-e", "ego = new Car"], "Missing argument 'DATASET'"),
+        (["match", "only.scenic"], "Missing argument 'DATASET'"),
+        (["match"], "Missing argument 'SCENARIO'"),
+        (["check", "-e", "ego = new Car", "one", "two"], "`one` is one argument too many"),
+        (["check"], "Missing argument 'SCENARIO'"),
+        (["sample"], "Missing argument 'SCENARIO'"),
+        (["explain", "-e", "ego = new Car", "one", "two", "three"], "`one` is one argument too many"),
+        (["explain", "-e", "ego = new Car", "one"], "Missing argument 'FRAME'"),
+        (["explain", "one.scenic", "two"], "Missing argument 'FRAME'"),
+        (["explain", "one.scenic"], "Missing argument 'DATASET'"),
     ],
 )
 def test_missing_and_superfluous_arguments_are_told(run, arguments, message):
-    found = run("match", *arguments)
+    found = run(*arguments)
     assert found.exit_code == 2
     assert message in found.stderr
