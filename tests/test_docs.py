@@ -6,6 +6,9 @@ from pathlib import Path
 import click
 import pytest
 
+from scenicq.match.options import MatchOptions
+from scenicq.query.execution import recording_starts
+from scenicq.syntax.parser import MAX_CHARACTERS
 from scenicq_cli.main import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
@@ -78,6 +81,18 @@ def test_help_fits_a_page_and_has_every_section():
         assert named == {
             p.make_metavar(click.Context(command)).strip("[]") for p in command.params if isinstance(p, click.Argument)
         }, name
+
+
+@pytest.mark.parametrize(
+    ("sentence", "limit"),
+    [
+        ("Of one frame {:,} correspondences are told", MatchOptions().correspondences),
+        ("an interval may begin in {:,} ways a recording", recording_starts._MOST_STARTS),
+        ("it has {:,} characters", MAX_CHARACTERS),
+    ],
+)
+def test_limits_are_those_that_the_readme_names(sentence, limit):
+    assert sentence.format(limit) in " ".join(README.split())
 
 
 def test_every_make_target_is_explained():
