@@ -137,7 +137,8 @@ def offset(item: Comparison) -> ClosedForm | None:
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         px, py = cast(XY, get(index, name))
-        margin, turns = options.tolerance.of(index, name), list[XY]()
+        margin = options.tolerance.of(index, name)
+        turns: list[XY] = []
         # into the frame of the offset
         for shift, angle in steps:
             if shift is not None:

@@ -151,6 +151,8 @@ class Form:
 
 def spread(form: Form, value: float) -> dict[Identity, Value]:
     """Values of a form's variables for which its random part has a value between its ends; of a column, columns."""
+    if not form.terms:
+        return {}
     if len(form.terms) == 1:
         ((identity, (factor, low, high)),) = form.terms.items()
         return {identity: clipped(value / factor, low, high)}

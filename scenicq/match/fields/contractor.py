@@ -1,8 +1,7 @@
 """Many cases of one group at once: which way each field points in each, and where the random numbers can then be.
 
 A case is a column. What a label observes bounds the roots of the expressions, and the bounds of what is random follow,
-whatever the expressions are made of; sums in which a random number occurs many times are solved for it as a whole. The
-bounds are never too narrow: a case of which nothing is left has no solution.
+whatever the expressions are made of. The bounds are never too narrow: a case of which nothing is left has no solution.
 """
 
 from __future__ import annotations
@@ -41,7 +40,6 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import conjuncts, is_leaf
 from scenicq.match.fields.constraint_network import ConstraintNetwork
-from scenicq.match.fields.interval_affine import IntervalAffine, cut_ranges, interval_affine_of
 from scenicq.match.fields.interval_domain import (
     Enclosure,
     angle_of,
@@ -88,7 +86,6 @@ class BoxSet:
     asked: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
     _bounds: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
     _turns: dict[int, tuple[Enclosure, Enclosure]] = field(default_factory=dict[int, "tuple[Enclosure, Enclosure]"])
-    _forms: dict[int, IntervalAffine] = field(default_factory=dict[int, IntervalAffine])
 
     @classmethod
     def start(cls, network: ConstraintNetwork, ranges: Mapping[Identity, Sequence[FloatInterval]]) -> BoxSet:
@@ -175,13 +172,6 @@ class BoxSet:
 
     def _downward(self) -> None:
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            self._forms = {}
-            for node in self.network.nodes:
-                self._forms[id(node)] = interval_affine_of(node, self._forms, self._bounds, self._turns)
-            for item in self.network.items:
-                root = item[1]
-                if isinstance(item[0], Comparison) and id(root) in self._bounds:
-                    cut_ranges(self._forms[id(root)], self._bounds[id(root)], self.ranges)
             for node in reversed(self.network.nodes):
                 self._backward(node)
 

@@ -4,7 +4,7 @@ An interval is an array (2, n) of lower and upper ends, a box an array (2, 2, n)
 take either where that makes sense, and never return too little.
 
 For cases of one correspondence, in which everything is random: all arrays have one length and are inverted as well
-(`contractor`, `interval_affine`). For candidates of roles, where most values are known numbers that must stay exact and
+(`contractor`). For candidates of roles, where most values are known numbers that must stay exact and
 arrays of different axes broadcast, see `forest/intervals`.
 """
 
@@ -27,7 +27,6 @@ __all__ = [
     "lengths",
     "negative",
     "nothing_left",
-    "projected",
     "rotate",
     "subtract",
     "times",
@@ -156,10 +155,3 @@ def turns_near(a: Enclosure, within: Enclosure) -> Enclosure:
     last = np.floor((safe[1] - a[0]) / math.tau + ROUNDING)
     found = np.where(last < first, [[np.inf], [-np.inf]], a + math.tau * np.stack([first, last]))
     return np.where(vague, within, found)
-
-
-def projected(box: Enclosure, along: NDArray[np.float64]) -> Enclosure:
-    """The extent of boxes along directions (2, n)."""
-    ends = np.stack([along, along], axis=1)
-    found = times(box, ends)
-    return found[0] + found[1]

@@ -143,8 +143,6 @@ def reach_position(
     points = {identity for identity, _ in variables if isinstance(leaves[identity], PointIn)}
     scalars = [variable for variable in variables if variable[0] not in points]
     limits = [ends(leaves[identity]) for identity, _ in scalars]
-    if not points:
-        limits = _cut(form, scalars, limits, observed, margin)
     bounded = [pair for pair in limits if pair is not None and all(map(math.isfinite, pair)) and pair[0] <= pair[1]]
     if len(points) > 1 or len(bounded) != len(limits) or len(bounded) > _MOST_CORNERS:
         return _OPEN
@@ -159,27 +157,6 @@ def reach_position(
         return _NO
     target = shapely.shortest_line(hull, shape).coords[0]
     return Reach(True, _solve(form, scalars, bounded, target))
-
-
-def _cut(
-    form: AffineVector,
-    scalars: list[VariableAxis],
-    limits: list[tuple[float, float] | None],
-    observed: tuple[float, float],
-    margin: Margin,
-) -> list[tuple[float, float] | None]:
-    """The limits, a single infinite one cut to where it can lead to the observed position."""
-    free = [number for number, pair in enumerate(limits) if pair is not None and not all(map(math.isfinite, pair))]
-    if len(free) != 1 or None in limits:
-        return limits
-    reach = math.hypot(form[0].constant - observed[0], form[1].constant - observed[1]) + margin.reach + 1.0
-    steps = [math.hypot(*(part.terms.get(variable, 0.0) for part in form)) for variable in scalars]
-    for number, pair in enumerate(limits):
-        if number not in free and pair is not None:
-            reach += steps[number] * max(map(abs, pair))
-    size = reach / steps[free[0]]
-    low, high = cast("tuple[float, float]", limits[free[0]])
-    return [*limits[: free[0]], (max(low, -size), min(high, size)), *limits[free[0] + 1 :]]
 
 
 def _offset(form: AffineVector, variables: list[VariableAxis], values: tuple[float, ...]) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
+from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
@@ -93,14 +94,14 @@ class FirstFit:
         plan: The plan.
         order: The ego, then the other objects in program order.
         ranks: Where in the order each object is.
-        due: For each of them, the groups that can be decided once it has a candidate.
+        due: For each of them, the groups that can be decided once it has a candidate, and their closed forms.
         most_decisions: After how many decisions a label is given up.
     """
 
     plan: MatchPlan
     order: tuple[int, ...]
     ranks: Mapping[int, int]
-    due: tuple[tuple[GroupPlan, ...], ...]
+    due: tuple[tuple[tuple[GroupPlan, ClosedForm], ...], ...]
     most_decisions: int
 
     def fill(self, rows: Sequence[LabelRow], options: MatchOptions, lookups: MapLookups) -> Iterator[FilledBatch]:
@@ -119,8 +120,8 @@ class FirstFit:
             look()
             batch = todo.pop()
             depth = len(batch.numbers[0])
-            for group in self.due[depth - 1]:
-                holds, fails = batch.decide(group, options, lookups)
+            for group, form in self.due[depth - 1]:
+                holds, fails = batch.decide(group, form, options, lookups)
                 if holds is True:
                     continue
                 if fails is not False:
@@ -157,11 +158,13 @@ class _Batch:
     decisions: int = 0
     columns: Columns | None = None
 
-    def decide(self, group: GroupPlan, options: MatchOptions, lookups: MapLookups) -> tuple[RowTruth, RowTruth]:
+    def decide(
+        self, group: GroupPlan, form: ClosedForm, options: MatchOptions, lookups: MapLookups
+    ) -> tuple[RowTruth, RowTruth]:
         """For which labels a group surely holds, and for which it surely fails; keeps the witness."""
-        form, size = group.closed_form, len(self.rows)
+        size = len(self.rows)
         self.decisions += 1
-        if form is None or self.decisions > self.fit.most_decisions:
+        if self.decisions > self.fit.most_decisions:
             return False, False
         if size == 1:
             holds, fails, self.values[group] = form.evaluate_one(self._get(0), options, lookups)
@@ -310,13 +313,14 @@ def _listed(values: FloatColumn | Sequence[T] | T, size: int) -> list[T]:
 
 def first_fit_of(plan: MatchPlan, scenario: Scenario) -> FirstFit | None:
     """The plan made ready; None if some group has no closed form, or there are too many."""
-    if any(group.closed_form is None for group in plan.groups):
+    forms = [(group, group.closed_form) for group in plan.groups if group.closed_form is not None]
+    if len(forms) < len(plan.groups):
         return None
     order = (scenario.ego, *(each.index for each in scenario.objects if each.index != scenario.ego))
     ranks = {index: rank for rank, index in enumerate(order)}
-    due: list[list[GroupPlan]] = [[] for _ in order]
-    for group in sorted(plan.groups, key=lambda each: len(each.roles)):
-        due[max((ranks[index] for index in group.roles), default=0)].append(group)
+    due: list[list[tuple[GroupPlan, ClosedForm]]] = [[] for _ in order]
+    for group, form in sorted(forms, key=lambda each: len(each[0].roles)):
+        due[max((ranks[index] for index in group.roles), default=0)].append((group, form))
     most = _MOST_DECISIONS + _MORE_DECISIONS * (len(order) - 1)
     return FirstFit(plan, order, ranks, tuple(map(tuple, due)), most)
 

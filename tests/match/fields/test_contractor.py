@@ -97,7 +97,7 @@ INVERTED = {
     "turned": (Coordinate(Rotate(VectorOf(B, A), number(math.pi / 2)), 0), 4.0, (-4.0, -4.0)),
     "scaled": (Coordinate(Scale(VectorOf(A, B), number(-2)), 0), 4.0, (-2.0, -2.0)),
     "a factor": (Coordinate(Scale(Constant((2.0, 1.0)), A), 0), 4.0, (2.0, 2.0)),
-    "twice": (op("+", A, A), 8.0, (4.0, 4.0)),
+    "twice, each by itself": (op("+", A, A), 8.0, (-1.0, 9.0)),
     "twice, less once": (op("-", op("*", A, number(3)), A), 8.0, (4.0, 4.0)),
     "negative and scaled": (op("-", B, op("*", op("neg", A), number(2))), 10.0, (3.75, 4.0)),
     "many times in a vector": (

@@ -52,8 +52,6 @@ def test_enclosures_hold_what_they_enclose():
         s, c = np.sin(turn), np.cos(turn)
         turned = np.stack([point[0] * c - point[1] * s, point[0] * s + point[1] * c])
         assert holds(interval_domain.rotate(box, interval_domain.turning(angle)), turned)
-        along = np.stack([c, s])
-        assert holds(interval_domain.projected(box, along), (point * along).sum(axis=0))
         headings = interval_domain.angle_of(box)
         known = np.isfinite(headings[0])
         headings = headings[:, known]
