@@ -63,7 +63,7 @@ class CompiledMap:
         cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool, proofs: bool = True
     ) -> CompiledMap:
         """With its prefilter, which without proofs says what surely matches, too, or with one that excludes nothing."""
-        empty = Plan(network.name, (), (), None)
+        empty = Plan(network.name, (), "", (), None)
         plan = make_plan(scenario, network, options, deciding=not proofs) if prefilter else empty
         motion = any(_MOTION & names for names in relevant_properties(scenario, options))
         return cls(scenario, network, plan, motion)
@@ -168,12 +168,12 @@ class Decider:
             candidates(self.connection, compiled.plan, motion=compiled.motion, among=open_) if len(open_) else iter(())
         )
         asked = self._matched(compiled, left)
-        proved = Match({}, {})
+        proved, none = Match({}, {}), dict[str, str]()
         until = self.until
         for _, sure, frame, recording, time in rows:
             if until is not None:
                 check_deadline(until)
-            yield [Result(frame, recording, time, proved)] if sure else next(asked)
+            yield [Result(frame, recording, time, proved, none)] if sure else next(asked)
 
     def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""

@@ -70,3 +70,33 @@ def test_blocks_cover_every_frame_once(dataset):
     assert len(blocks(where, "street", least=100)) <= 6
     assert {block.part for block in blocks(where, "street", ("a", "recording"))} == {0}
     assert blocks(where, "elsewhere") == []
+
+
+class Watched:
+    """A connection that notes what it is asked."""
+
+    def __init__(self, connection):
+        self.connection, self.asked = connection, []
+
+    def execute(self, sql):
+        self.asked.append(sql)
+        return self.connection.execute(sql)
+
+    def __getattr__(self, name):
+        return getattr(self.connection, name)
+
+
+def test_of_frames_whose_columns_exclude_them_nothing_else_is_asked(dataset):
+    text = "ego = new Car on road, facing 90 deg relative to roadDirection\nnew Car ahead of ego by 5"
+    query = Query(dataset, Source("test.scenic", HEADER + text))
+    (plan,) = query.plans()
+    (whole,) = query.blocks(plan.map)
+    with closing(dataset.connect(views=False)) as connection:
+        missed = run_prefilter(dataset, connection, plan, whole)
+        out = missed >= 0
+        assert out.any()
+        for row in (int(out.argmax()), int(out.argmin())):
+            watched = Watched(connection)
+            alone = run_prefilter(dataset, watched, plan, replace(whole, first=row, end=row + 1))
+            assert alone.tolist() == [missed[row]]
+            assert (len(watched.asked) == 1) is bool(out[row])
