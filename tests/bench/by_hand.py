@@ -26,14 +26,12 @@ from scenicq.errors import Source
 from scenicq.garbage import seldom_collected
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match
-from scenicq.query.execution.results import record
+from scenicq.query.execution.result_lines import json_line
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "bench-results"
-_line = json.JSONEncoder(ensure_ascii=False).encode
-"""A proof as the command writes it."""
 ROUNDS = 3
 MOST_IDS, MOST_WITNESSES = 3.0, 10.0
 """How many times the processor time of the hand-written SQL a query may take: without and with proofs written out."""
@@ -63,7 +61,7 @@ def ours(dataset: Dataset, text: str, options: MatchOptions, *, witnesses: bool)
         if isinstance(result.verdict, Match):
             found.add(result.frame)
             if witnesses:
-                _line(record(result))
+                json_line(result)  # as the command writes it
     return time.process_time() - started, found
 
 
