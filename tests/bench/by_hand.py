@@ -1,8 +1,8 @@
 """Queries beside the same questions written by hand in SQL, over the same Parquet files.
 
-`python tests/bench/by_hand.py [--frames N] [--stores DIR]`. The questions are those of `sample_data/scenarios` that SQL
-can say over the columns of a store, a needle, and ten in the manner of programs that others have published
-(`hand_sql.py`). Both run in one process, in turns, when everything is loaded and
+`python tests/bench/by_hand.py [--frames N] [--stores DIR] [--only TEXT]`. The questions are those of
+`sample_data/scenarios` that SQL can say over the columns of a store, a needle, and ten in the manner of programs that
+others have published (`hand_sql.py`). Both run in one process, in turns, when everything is loaded and
 compiled: what is compared is the processor time beyond the start. The frames that both find must be the same. The
 numbers go to bench-results/.
 """
@@ -70,6 +70,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--frames", type=int, default=100_000)
     parser.add_argument("--stores", type=Path)
+    parser.add_argument("--only", default="", help="questions with this in their names")
     given = parser.parse_args()
     # as in the process of the command
     seldom_collected()
@@ -82,6 +83,8 @@ def main() -> None:
         dataset = open_dataset(store, check=False)
         print("  question                      matches  by hand s  ids s  ratio  with proofs s  ratio")
         for name, question in QUESTIONS.items():
+            if given.only not in name:
+                continue
             text, options, sql = question.program, question.options, question.sql
             hand, ids, proofs = math.inf, math.inf, 0.0
             for number in range(ROUNDS):
