@@ -31,6 +31,7 @@ __all__ = [
     "blocks",
     "extents",
     "hold",
+    "join_first",
     "names",
     "run_plan",
     "run_prefilter",
@@ -148,6 +149,24 @@ def blocks(
         ends = [each.first + (each.end - each.first) * n // count for n in range(count + 1)]
         cut += [Block(map_name, each.part, low, high, recordings) for low, high in pairwise(ends)]
     return cut
+
+
+def join_first(waiting: list[Block], most: int) -> Block:
+    """Take the first of some blocks, with those that follow it in its part as far as all have so many frames at most.
+
+    Args:
+        waiting: Blocks in the order of the store, from which those are taken.
+        most: How many frames.
+    """
+    first = waiting.pop(0)
+    while waiting:
+        following = waiting[0]
+        alike = replace(following, first=first.first, end=first.end, runs=first.runs) == first
+        if not alike or following.first != first.end or following.end - first.first > min(most, _MOST_FRAMES):
+            break
+        first = replace(first, end=following.end, runs=(*first.runs, *following.runs))
+        waiting.pop(0)
+    return first
 
 
 def whole_recordings(dataset: Dataset, connection: duckdb.DuckDBPyConnection, cut: Iterable[Block]) -> list[Block]:
