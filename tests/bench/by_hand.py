@@ -33,6 +33,8 @@ from scenicq.store.dataset import Dataset, open_dataset
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "bench-results"
 ROUNDS = 3
+LONG_S = 10.0
+"""What takes longer is measured once."""
 MOST_IDS, MOST_WITNESSES = 3.0, 10.0
 """How many times the processor time of the hand-written SQL a query may take: without and with proofs written out."""
 
@@ -86,14 +88,14 @@ def main() -> None:
             if given.only not in name:
                 continue
             text, options, sql = question.program, question.options, question.sql
-            hand, ids, proofs = math.inf, math.inf, 0.0
+            hand, ids, proofs = math.inf, math.inf, math.inf
             for number in range(ROUNDS):
                 used, expected = by_hand(dataset, sql)
                 hand = min(hand, used)
                 used, found = ours(dataset, text, options, witnesses=False)
                 ids = min(ids, used)
-                if not number:  # may take long
-                    proofs = ours(dataset, text, options, witnesses=True)[0]
+                if not number or proofs < LONG_S:
+                    proofs = min(proofs, ours(dataset, text, options, witnesses=True)[0])
                 if found != expected:
                     odd = sorted(found ^ expected)
                     sys.exit(f"{name}: {len(found)} frames here, {len(expected)} by hand; {odd[:3]}")
