@@ -7,24 +7,23 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, BinaryIO, Protocol
 
+from scenicq.query.execution.result_lines import json_line, json_text
 from scenicq.query.execution.result_origin import ORIGIN
 from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
+from scenicq.query.execution.results import Result, record
 from scenicq.store.frame_names import ShortNames
 
 from .report import CONTROL as _CONTROL
 from .report import plain
 from .table import Table, TextStream
 
-__all__ = ["FORMATS", "Writer", "make_writer", "safe_cell"]
+__all__ = ["FORMATS", "Writer", "make_writer", "result_writer", "safe_cell"]
 
 FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 """Names of the formats."""
-
-_json = json.JSONEncoder(ensure_ascii=False).encode
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """What makes a spreadsheet take a cell for a formula."""
@@ -74,17 +73,31 @@ class _Lines:
     def write(self, record: Mapping[str, Any]) -> None:
         line = self._line(record)
         if line is not None:
-            self._text.write(line + "\n")
-            self._text.flush()
+            self._put(line)
+
+    def _put(self, line: str) -> None:
+        self._text.write(line + "\n")
+        self._text.flush()
 
     def finish(self) -> None:
         self._text.flush()
 
 
+class _JsonLines(_Lines):
+    """One line of JSON a result."""
+
+    def __init__(self, text: TextStream) -> None:
+        super().__init__(text, lambda record: _escaped(json_text(record)))
+
+    def write_result(self, result: Result, more: Mapping[str, str]) -> None:
+        """Write a result of which nobody has the record."""
+        self._put(_escaped(json_line(result, more)))
+
+
 def _flat(record: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     """A row of plain cells; nested values and truth values become JSON text."""
     cells = {name: record.get(name, {}) for name in names}
-    return {name: _json(cell) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()}
+    return {name: json_text(cell) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()}
 
 
 def _name(record: Mapping[str, Any]) -> str | None:
@@ -94,9 +107,9 @@ def _name(record: Mapping[str, Any]) -> str | None:
     return plain(name).replace("\n", "\\n")
 
 
-def _escaped(record: Mapping[str, Any]) -> str:
+def _escaped(text: str) -> str:
     """JSON in which nothing moves a cursor or turns text round; what it says is the same."""
-    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", _json(record))
+    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def safe_cell(value: Any) -> Any:
@@ -180,4 +193,17 @@ def make_writer(
         case "ids":
             return _Lines(text, _name)
         case _:
-            return _Lines(text, _escaped)
+            return _JsonLines(text)
+
+
+def result_writer(writer: Writer, origin: str) -> Callable[[Result], None]:
+    """What writes results of a dataset.
+
+    Args:
+        writer: The writer of a format.
+        origin: The dataset.
+    """
+    more = {ORIGIN: origin}
+    if isinstance(writer, _JsonLines):
+        return lambda result: writer.write_result(result, more)
+    return lambda result: writer.write(record(result) | more)

@@ -26,6 +26,6 @@ def show_plan(query: Query) -> None:
         click.echo(f"map {plan.map}: {left[0]:,} frames, {left[-1]:,} left for the matcher")
         lines = columns([("estimated", "left", "after", "place"), *rows], right=frozenset({0, 1}))
         click.echo("\n".join([*lines, ""]))
-        for statement in [*(statement for stage in plan.stages for statement in stage.statements), *plan.decision]:
+        for statement in plan.statements:
             click.echo(f"  {statement};")
         click.echo()

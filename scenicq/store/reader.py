@@ -150,7 +150,8 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
 
     Args:
         frames: `LABEL_COLUMNS` and `EGO_COLUMNS` of each label; its counts say how many rows of the others are its own.
-        objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS` and `OUT_OF_PLANE`, too.
+        objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS` and `OUT_OF_PLANE`, too, and may lack
+            columns of what nobody looks at.
         sensors: Channels and paths, label by label; it may have `CAMERA_COLUMNS`.
     """
     others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], objects, "")
@@ -158,12 +159,12 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
     channels, paths, cameras = _values(sensors, "channel"), _values(sensors, "path"), cameras_of(sensors)
     seeing = any(camera is not None for camera in cameras)
     first = first_sensor = 0
+    known: dict[str, Camera] = {}
     columns = [_values(frames, name) for name in LABEL_COLUMNS[:-2]]
     for ego, frame, recording, time, map_name, params, count, sensor_count in zip(egos, *columns, strict=True):
         stop, end = first + count, first_sensor + sensor_count
         names = channels[first_sensor:end]
         files = dict(zip(names, paths[first_sensor:end], strict=True))
-        known: dict[str, Camera] = {}
         if seeing:
             pairs = zip(names, cameras[first_sensor:end], strict=True)
             known = {name: camera for name, camera in pairs if camera is not None}
@@ -199,9 +200,14 @@ def _objects(columns: list[list[Any]], table: ArrowTable, prefix: str) -> list[L
 
 
 def _values(table: ArrowTable, name: str) -> list[Any]:
-    """A column as Python values: null becomes None, JSON what it says; equal JSON texts share one value."""
-    column: Any = table[name]
+    """A column as Python values: null becomes None, JSON what it says; equal JSON texts share one value.
+
+    Of a column that was not read all is null.
+    """
     is_json = name.endswith(("attributes", "params"))
+    if name not in table.column_names:
+        return [{} if is_json else None] * len(table)
+    column: Any = table[name]
     if column.null_count == len(column):
         return [{} if is_json else None] * len(column)
     if is_json and not pa.types.is_dictionary(column.type):

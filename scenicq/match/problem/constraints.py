@@ -24,17 +24,23 @@ _ALWAYS = ("position", "heading")
 
 
 def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[frozenset[str], ...]:
-    """For each object, the properties for which it matters whether a label observes them."""
-    used: dict[int, set[str]] = {owner.index: {"position", "heading"} for owner in scenario.objects}
-    roots = [given.value for owner in scenario.objects for given in owner.properties.values()]
-    roots += [requirement.condition for requirement in scenario.requirements]
-    roots += [given.value for given in scenario.params.values()]
-    for index, name in features(*roots):
-        used[index].add(name)
+    """For each object, the properties for which it matters whether a label observes them.
+
+    They are those that are compared, and those that what is compared or required is computed of.
+    """
+    used: dict[int, set[str]] = {owner.index: set[str]() for owner in scenario.objects}
+    conditions = [requirement.condition for requirement in scenario.requirements]
+    todo = list(features(*conditions, *(given.value for given in scenario.params.values())))
     for owner in scenario.objects:
-        used[owner.index].update(name for name, given in owner.properties.items() if given.explicit)
-        if BuiltIn.COLLISION in options.enforce:
-            used[owner.index].update(("width", "length"))
+        named = [*_ALWAYS, *(name for name, given in owner.properties.items() if given.explicit)]
+        sizes = ("width", "length") if BuiltIn.COLLISION in options.enforce else ()
+        todo += [(owner.index, name) for name in (*named, *sizes)]
+    while todo:
+        index, name = todo.pop()
+        if name not in used[index]:
+            used[index].add(name)
+            given = scenario.objects[index].properties.get(name)
+            todo += features(given.value) if given is not None else ()
     return tuple(frozenset(used[owner.index]) for owner in scenario.objects)
 
 

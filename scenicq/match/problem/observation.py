@@ -9,9 +9,9 @@ from functools import lru_cache
 from scenicq.forest.nodes import Value
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["observe", "observe_params", "observed_names"]
+__all__ = ["IN_COLUMNS", "observe", "observe_params", "observed_names"]
 
-_IN_COLUMNS = frozenset({
+IN_COLUMNS = frozenset({
     "position", "heading", "width", "length", "height", "velocity", "speed", "acceleration", "angularSpeed",
 })  # fmt: skip
 """What a label says in columns alone: an attribute of such a name is none of these."""
@@ -41,7 +41,7 @@ def observe(label_object: LabelObject) -> Mapping[str, Value]:
         if motion.yaw_rate is not None:
             seen["angularSpeed"] = motion.yaw_rate
     for name, value in label_object.attributes.items():
-        if name not in _IN_COLUMNS:
+        if name not in IN_COLUMNS:
             seen[name] = value if isinstance(value, str | bool) else float(value)
     return seen
 
@@ -68,7 +68,7 @@ def _names(present: tuple[bool, ...], attributes: tuple[str, ...]) -> frozenset[
     parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"), ("acceleration",))
     named = zip((*parts, ("angularSpeed",)), present, strict=False)
     measured = ("position", *(name for names, there in named if there for name in names))
-    return frozenset(measured).union(name for name in attributes if name not in _IN_COLUMNS)
+    return frozenset(measured).union(name for name in attributes if name not in IN_COLUMNS)
 
 
 def observe_params(label: Label) -> Mapping[str, Value]:

@@ -151,7 +151,7 @@ class _Batch:
 
     fit: FirstFit
     rows: Sequence[LabelRow]
-    numbers: Sequence[tuple[int, ...]]
+    numbers: list[tuple[int, ...]]
     values: dict[GroupPlan, Mapping[Identity, Values]] = field(
         default_factory=dict["GroupPlan", "Mapping[Identity, Values]"]
     )
@@ -170,7 +170,8 @@ class _Batch:
             holds, fails, self.values[group] = form.evaluate_one(self._get(0), options, lookups)
             return holds, fails
         if self.columns is None:
-            self.columns = Columns(size, self._column)
+            # not a method of this batch: a cycle would keep its labels until the collector comes
+            self.columns = Columns(size, functools.partial(_column, self.fit.ranks, self.rows, self.numbers))
         holds, fails, self.values[group] = form.evaluate_many(self._get, self.columns, options, lookups)
         return _alike(_listed(holds, size)), _alike(_listed(fails, size))
 
@@ -193,8 +194,8 @@ class _Batch:
             _with_first_free(taken, row.candidates[index]) for row, taken in zip(self.rows, self.numbers, strict=True)
         ]
         if all(numbers):
-            # the columns of the roles before stay what they are
-            self.numbers = numbers
+            # in place: the columns of the roles before stay what they are, and those of the next are made of it
+            self.numbers[:] = numbers
             return [self]
         found = self.where(_alike([not each for each in numbers])).with_next_candidate()
         if any(numbers):
@@ -248,16 +249,27 @@ class _Batch:
 
         return get
 
-    def _column(self, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
-        """The values of a property of the label objects that play an object."""
-        rank = self.fit.ranks[index]
-        playing = [(row, numbers[rank]) for row, numbers in zip(self.rows, self.numbers, strict=True)]
-        if name not in _SCALARS and name != "position":
-            return _numeric([row.observed(number)[name] for row, number in playing])
-        objects = [_label_object(row.label, number) for row, number in playing]
-        if name == "position":
-            return np.array([each.x for each in objects]), np.array([each.y for each in objects])
-        return np.array([getattr(each, name) for each in objects], dtype=np.float64)
+
+def _column(
+    ranks: Mapping[int, int], rows: Sequence[LabelRow], numbers: Sequence[tuple[int, ...]], index: int, name: str
+) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
+    """The values of a property of the label objects that play an object.
+
+    Args:
+        ranks: Where in the order of roles each object is.
+        rows: The labels.
+        numbers: Of each, who plays the first objects of that order.
+        index: The object.
+        name: The property.
+    """
+    rank = ranks[index]
+    playing = [(row, mine[rank]) for row, mine in zip(rows, numbers, strict=True)]
+    if name not in _SCALARS and name != "position":
+        return _numeric([row.observed(number)[name] for row, number in playing])
+    objects = [_label_object(row.label, number) for row, number in playing]
+    if name == "position":
+        return np.array([each.x for each in objects]), np.array([each.y for each in objects])
+    return np.array([getattr(each, name) for each in objects], dtype=np.float64)
 
 
 def _numeric(values: Sequence[Value]) -> FloatColumn | tuple[FloatColumn, FloatColumn]:

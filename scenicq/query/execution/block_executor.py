@@ -13,7 +13,7 @@ from scenicq.match.verdict import Cause, Unknown
 from scenicq.processes import Lost, Work, Workers, as_many_as_pay
 from scenicq.query.execution.block_matcher import Decided, Decider, every_label
 from scenicq.query.execution.results import Result
-from scenicq.query.prefilter.executor import Block
+from scenicq.query.prefilter.executor import Block, join_first
 from scenicq.store.dataset import Dataset
 
 __all__ = ["BlockExecutor"]
@@ -69,15 +69,18 @@ class BlockExecutor:
             told: Called with what other processes tell of the blocks that they decide.
         """
         alone = self.jobs <= 1 or not (self._asked or self._started)
-        done, began = 0, time.monotonic()
-        while alone and done < len(blocks):
-            yield self._decider.decide(blocks[done])
-            done += 1
-            left_s = (time.monotonic() - began) / done * (len(blocks) - done)
+        waiting, done, began = list(blocks), 0, time.monotonic()
+        frames = sum(block.end - block.first for block in blocks)
+        while alone and waiting:
+            # each costs something: what was cut for several processes is put together again as long as it goes fast
+            block = join_first(waiting, 2 * done)
+            yield self._decider.decide(block)
+            done += block.end - block.first
+            left_s = (time.monotonic() - began) / done * (frames - done)
             alone = self.jobs <= 1 or left_s < _PAYS_S
-        if done < len(blocks):
+        if waiting:
             self._started = True
-            yield from self._elsewhere(blocks[done:], told)
+            yield from self._elsewhere(waiting, told)
 
     def _elsewhere(
         self, blocks: Iterable[Block], told: Callable[[Any], None] | None = None, tries: int = _TRIES

@@ -51,22 +51,24 @@ class CompiledMap:
         network: The map.
         plan: The prefilter.
         motion: Whether the scenario reads observed motion.
+        observed: The properties of label objects that matter; None for all.
     """
 
     scenario: Scenario
     network: Network
     plan: Plan
     motion: bool = True
+    observed: frozenset[str] | None = None
 
     @classmethod
     def of(
         cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool, proofs: bool = True
     ) -> CompiledMap:
         """With its prefilter, which without proofs says what surely matches, too, or with one that excludes nothing."""
-        empty = Plan(network.name, (), (), None)
+        empty = Plan(network.name, (), "", (), None)
         plan = make_plan(scenario, network, options, deciding=not proofs) if prefilter else empty
-        motion = any(_MOTION & names for names in relevant_properties(scenario, options))
-        return cls(scenario, network, plan, motion)
+        observed = frozenset[str]().union(*relevant_properties(scenario, options))
+        return cls(scenario, network, plan, not _MOTION.isdisjoint(observed), observed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,23 +159,24 @@ class Decider:
             return Decided(missed, [], named)
         if compiled.plan.decision and not self.all_matches:
             return Decided(missed, self._partly_decided(compiled), named)
-        left = candidates(connection, compiled.plan, motion=compiled.motion)
-        return Decided(missed, self._matched(compiled, left), named)
+        return Decided(missed, self._matched(compiled, self._left(compiled)), named)
 
     def _partly_decided(self, compiled: CompiledMap) -> Iterator[list[Result]]:
         """The results of the frames that the prefilter has left, where SQL says that some surely match."""
         rows = decided_frames(self.connection, compiled.plan.decision, LABELS, compiled.plan.left)
         open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
-        left = (
-            candidates(self.connection, compiled.plan, motion=compiled.motion, among=open_) if len(open_) else iter(())
-        )
-        asked = self._matched(compiled, left)
-        proved = Match({}, {})
+        asked = self._matched(compiled, self._left(compiled, open_) if len(open_) else iter(()))
+        proved, none = Match({}, {}), dict[str, str]()
         until = self.until
         for _, sure, frame, recording, time in rows:
             if until is not None:
                 check_deadline(until)
-            yield [Result(frame, recording, time, proved)] if sure else next(asked)
+            yield [Result(frame, recording, time, proved, none)] if sure else next(asked)
+
+    def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
+        """The labels that the prefilter has left, with as much of each as the matcher looks at."""
+        motion, observed = compiled.motion, compiled.observed
+        return candidates(self.connection, compiled.plan, motion=motion, observed=observed, among=among)
 
     def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
@@ -220,14 +223,14 @@ class Decider:
         matcher = self._matcher(compiled)
         size = _FIRST_BATCH
         while batch := list(islice(left, size)):
-            labels = [(each.label, each.among) for each in batch]
             if self.all_matches:
-                for label, among in labels:
+                for label, among in batch:
                     check_deadline(self.until)
                     yield [_result(label, verdict) for verdict in _every_match(matcher, label, among)]
             else:
-                for (label, _), verdict in zip(labels, matcher.match_all(labels), strict=True):
-                    check_deadline(self.until)
+                for (label, _), verdict in zip(batch, matcher.match_all(batch), strict=True):
+                    if self.until is not None:
+                        check_deadline(self.until)
                     yield [_result(label, verdict)]
             size = _BATCH
 

@@ -3,19 +3,22 @@
 A block is a run of frames in one part of the store, so memory depends on the size of a part, never on the dataset's.
 """
 
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, islice, pairwise
+from itertools import chain, groupby, islice, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
-from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, SENSORS, Plan
+from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, PASSED, SENSORS, Plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.sql import sql_text
 
@@ -28,14 +31,15 @@ __all__ = [
     "blocks",
     "extents",
     "hold",
+    "join_first",
     "names",
     "run_plan",
     "run_prefilter",
     "whole_recordings",
 ]
 
-_FEWEST_FRAMES, _MOST_FRAMES = 2048, 40_000
-"""Frames of a block."""
+_FEWEST_FRAMES, _MOST_FRAMES = 2048, 120_000
+"""Frames of a block; those with many objects are fewer, as a part has a bounded number of objects."""
 _MOST_NAMED = 512
 """Frames of a block whose memberships are looked up by name: of them, statistics skip what lies elsewhere."""
 
@@ -147,6 +151,24 @@ def blocks(
     return cut
 
 
+def join_first(waiting: list[Block], most: int) -> Block:
+    """Take the first of some blocks, with those that follow it in its part as far as all have so many frames at most.
+
+    Args:
+        waiting: Blocks in the order of the store, from which those are taken.
+        most: How many frames.
+    """
+    first = waiting.pop(0)
+    while waiting:
+        following = waiting[0]
+        alike = replace(following, first=first.first, end=first.end, runs=first.runs) == first
+        if not alike or following.first != first.end or following.end - first.first > min(most, _MOST_FRAMES):
+            break
+        first = replace(first, end=following.end, runs=(*first.runs, *following.runs))
+        waiting.pop(0)
+    return first
+
+
 def whole_recordings(dataset: Dataset, connection: duckdb.DuckDBPyConnection, cut: Iterable[Block]) -> list[Block]:
     """The blocks cut anew where a recording ends, each about as large as before.
 
@@ -254,9 +276,7 @@ def run_prefilter(
     Returns:
         For each frame in order the number of the step that excludes it, -1 for candidates.
     """
-    views = _rows_of(dataset, connection, block)
-    _open(connection, islice(views, 1))
-    return run_plan(connection, plan, views)
+    return run_plan(connection, plan, _rows_of(dataset, connection, block))
 
 
 def run_plan(
@@ -267,22 +287,28 @@ def run_plan(
     Args:
         connection: The connection.
         plan: The plan.
-        views: Those besides the labels', which are made where the columns of the frames alone do not exclude all.
+        views: Those that the connection does not have yet, the labels' first. They are made where the columns of the
+            frames alone do not exclude all: in many blocks these do, and then one query is all that is asked.
     """
-    numbers, missed = np.empty(0, np.int64), np.empty(0, np.int16)
+    views = iter(views)
+    asked = list(islice(views, 1))
+    rows = "".join(f"WITH {view} AS ({sql}) " for view, sql in asked)
+    found: Any = connection.execute(rows + plan.columns).fetchnumpy()
+    order = np.argsort(found["f"])
+    numbers, missed = found["f"][order], found["missed"][order].astype(np.int16)
+    left = numbers[missed < 0]
+    if not len(left):
+        return missed
+    connection.register(PASSED, pa.table({"f": left}))
+    _open(connection, chain(asked, views))
     for place, stage in enumerate(plan.stages):
         for statement in stage.statements:
             connection.execute(statement)
-        found: Any = connection.execute(f"SELECT f, coalesce(missed, -1) AS missed FROM {stage.table}").fetchnumpy()
-        if not place:
-            order = np.argsort(found["f"])
-            numbers, missed = found["f"][order], found["missed"][order].astype(np.int16)
-        else:
+        if place:
+            found = connection.execute(f"SELECT f, coalesce(missed, -1) AS missed FROM {stage.table}").fetchnumpy()
             missed[np.searchsorted(numbers, found["f"])] = found["missed"]
-        if not (missed < 0).any():
-            break
-        if not place:
-            _open(connection, views)
+            if not (missed < 0).any():
+                break
     return missed
 
 

@@ -26,12 +26,14 @@ from scenicq.query.prefilter.sufficient import sufficient_conditions
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.sql import sql_text
 
-__all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "SENSORS", "Plan", "Stage", "Step", "make_plan"]
+__all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "PASSED", "SENSORS", "Plan", "Stage", "Step", "make_plan"]
 
 LABELS, OBJECTS, MEMBERSHIPS = "block_labels", "block_objects", "block_memberships"
 """The views that a plan reads: rows of a block of each table with their `number` in the file."""
 SENSORS = "block_sensors"
 """The view of the sensor files of a block."""
+PASSED = "passed"
+"""The table of the numbers `f` of the frames that their own columns leave."""
 
 _MOST_PAIRS = 12
 """Pairs of roles whose objects are joined."""
@@ -75,7 +77,9 @@ class Plan:
     Attributes:
         map: The map.
         steps: Conditions in the order in which they are blamed.
-        stages: How they are decided.
+        columns: A query for the number `f` of each frame and the step `missed` that its columns alone say it misses, -1
+            for none. Those that miss none are `PASSED`, and all else is about them.
+        stages: How the other steps are decided.
         roles: The objects for which the table `roles` then has a column `r0`, `r1` ...: whether the object in row `row`
             may play them; none where there is nobody but the ego. None if every object of a frame must be looked at.
         decision: SQL that makes the table `decided` of frames that surely match, of those that all stages have left;
@@ -84,6 +88,7 @@ class Plan:
 
     map: str
     steps: tuple[Step, ...]
+    columns: str
     stages: tuple[Stage, ...]
     roles: tuple[int, ...] | None
     decision: tuple[str, ...] = ()
@@ -94,9 +99,15 @@ class Plan:
         return f"(SELECT f FROM {self.stages[-1].table} WHERE missed IS NULL)"
 
     @property
-    def sql(self) -> str:
+    def statements(self) -> list[str]:
         """All statements, for people."""
-        return ";\n".join([*(statement for stage in self.stages for statement in stage.statements), *self.decision])
+        staged = [statement for stage in self.stages for statement in stage.statements]
+        return [self.columns, *staged, *self.decision] if staged else []
+
+    @property
+    def sql(self) -> str:
+        """All statements as one text."""
+        return ";\n".join(self.statements)
 
 
 @dataclass(slots=True)
@@ -120,6 +131,7 @@ class _Draft:
     """A plan on the way."""
 
     steps: list[Step] = field(default_factory=list[Step])
+    columns: str = ""
     stages: list[Stage] = field(default_factory=list[Stage])
 
     def step(self, what: str, span: Span | None, detail: str = "") -> int:
@@ -207,6 +219,7 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
     return Plan(
         network.name,
         tuple(draft.steps),
+        draft.columns,
         tuple(draft.stages),
         played if own_ego and not options.exact else None,
         () if proofs is None else decision(proofs, played, flags, options, tables=(LABELS, OBJECTS), left=left),
@@ -236,7 +249,11 @@ def _frames(
         for each in (*params, *own)
         if not each.region
     ]
-    query = f"SELECT {EGO}.number AS f, {EGO}.frame{kept}, {_case(blamed)} AS missed FROM {LABELS} {EGO}"
+    draft.columns = f"SELECT {EGO}.number AS f, coalesce({_case(blamed)}, -1) AS missed FROM {LABELS} {EGO}"
+    query = (
+        f"SELECT {EGO}.number AS f, {EGO}.frame{kept}, {_case(())} AS missed FROM {LABELS} {EGO} "
+        f"WHERE {EGO}.number IN (SELECT f FROM {PASSED})"
+    )
     draft.stages.append(Stage("stage0", (new_table("stage0", query),)))
 
 
@@ -313,7 +330,7 @@ def _regions(
         new_table(
             "flags",
             f"SELECT q.f, m.object, {', '.join(flags)} FROM {MEMBERSHIPS} m JOIN ({' UNION ALL '.join(asked)}) q "
-            f"ON m.frame = q.frame AND m.object = q.object WHERE {' OR '.join((*mine, *others))} "
+            f"ON m.frame = q.frame AND m.object = q.object WHERE {' OR '.join(dict.fromkeys((*mine, *others)))} "
             "GROUP BY q.f, m.object",
         )
     ]

@@ -6,17 +6,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from scenicq.match.problem.observation import IN_COLUMNS
 from scenicq.query.prefilter.plan import LABELS, OBJECTS, SENSORS, Plan
 from scenicq.store.labels import Label
-from scenicq.store.reader import EGO_COLUMNS, LABEL_COLUMNS, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
+from scenicq.store.reader import LABEL_COLUMNS, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
 from scenicq.store.schema import ArrowTable
 
 if TYPE_CHECKING:
@@ -28,9 +29,8 @@ _BATCH = 1024
 """Labels in memory."""
 
 
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """A label that may match.
+class Candidate(NamedTuple):
+    """A label that may match, as the matcher is asked about it.
 
     Attributes:
         label: The label, possibly with those objects alone that may play a role.
@@ -74,6 +74,7 @@ def candidates(
     plan: Plan,
     *,
     motion: bool = False,
+    observed: Collection[str] | None = None,
     among: NDArray[np.int64] | None = None,
 ) -> Iterator[Candidate]:
     """The labels that are left of the block on which the prefilter was run last, in order.
@@ -82,15 +83,16 @@ def candidates(
         connection: The one that `run_prefilter` was given last.
         plan: The plan.
         motion: Whether what is computed of motion is read, too.
+        observed: Of label objects only class, position and these properties are read; None for all that is known.
         among: Rows of `labels`: only these; None for all.
     """
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
     if among is not None:
         connection.register("wanted", pa.table({"f": among}))
         left = f"{left[:-1]} AND f IN (SELECT f FROM wanted))"
-    more = MOTION_COLUMNS if motion else []
-    of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *EGO_COLUMNS, *(f"ego_{name}" for name in more)))
-    of_objects = ", ".join(f"a.{name}" for name in (*OBJECT_COLUMNS, *more))
+    chosen = [*_columns(observed), *(MOTION_COLUMNS if motion else [])]
+    of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *(f"ego_{name}" for name in chosen[1:])))
+    of_objects = ", ".join(f"a.{name}" for name in chosen)
     frames = _rows(connection, f"SELECT l.number, {of_frames} FROM {LABELS} l WHERE l.number IN {left} ORDER BY 1")
     mine = f"JOIN {LABELS} l ON s.frame = l.frame WHERE l.number IN {left} ORDER BY s.number"
     # datasets without sensor files are many
@@ -117,6 +119,18 @@ def candidates(
     ]
     for place, label in enumerate(_assembled(frames, objects, sensors)):
         yield Candidate(label, {index: tuple(mine[cuts[place] : cuts[place + 1]]) for index, mine, cuts in may})
+
+
+def _columns(observed: Collection[str] | None) -> list[str]:
+    """The columns of objects that say what they are, where, and which of some properties they have; the id is first."""
+    if observed is None:
+        return OBJECT_COLUMNS
+    wanted = {"id", "class", "x", "y", *observed}
+    if not wanted.isdisjoint(("velocity", "speed")):
+        wanted.update(("vx", "vy"))
+    if not IN_COLUMNS.issuperset(observed):
+        wanted.add("attributes")
+    return [name for name in OBJECT_COLUMNS if name in wanted]
 
 
 def _numbered(chosen: NDArray[np.bool_], ends: NDArray[np.int64]) -> tuple[list[int], list[int]]:

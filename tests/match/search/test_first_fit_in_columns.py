@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import random
 from dataclasses import replace
@@ -13,10 +14,12 @@ from hypothesis import strategies as st
 from programs import HEADER, PROGRAMS
 from scenes import STREET, compiled, drawn, label_of
 
+from scenicq.garbage import without_collector
 from scenicq.match.decide.range_forms import clipped, turned
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import candidates_of
+from scenicq.match.search.first_fit import LabelRow
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match
 from scenicq.smt.solver import open_solver
@@ -118,6 +121,17 @@ def test_what_surely_matches_is_not_decided_one_by_one(name, monkeypatch):
     found = list(matcher.match_all(asked))
     assert not alone
     assert all(isinstance(verdict, Match) for verdict in found)
+
+
+@pytest.mark.parametrize("name", ["ahead", "rows", "offset"])
+def test_labels_are_let_go_without_the_collector(name, solver):
+    scenario = compiled(HEADER + CASES[name], STREET)
+    matcher = Matcher(scenario, MatchOptions(), solver)
+    asked = with_candidates(matcher.scenario, MatchOptions(), labels(scenario, range(4)))
+    gc.collect()
+    with without_collector():
+        assert list(matcher.match_all(asked))
+        assert not [each for each in gc.get_objects() if isinstance(each, LabelRow)]
 
 
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=64)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from scenicq.query.prefilter.executor import Block
+from scenicq.query.prefilter.executor import Block, join_first
 
 
 def pieces(block):
@@ -31,3 +31,37 @@ def test_recordings_stay_whole(count):
     for half in whole.halves() if count > 1 else ():
         assert (half.first, half.end) == (half.runs[0][0], half.runs[-1][1])
         assert abs(len(half.runs) - count / 2) < 1
+
+
+def joined(blocks, most):
+    waiting, found = list(blocks), []
+    while waiting:
+        found.append(join_first(waiting, most))
+    return found
+
+
+def test_blocks_are_put_together_again_as_far_as_they_may_be_large():
+    whole = Block("town", 1, 7, 47)
+    cut = [Block("town", 1, first, first + 10) for first in range(7, 47, 10)]
+    assert joined(cut, 100) == [whole]
+    assert [(each.first, each.end) for each in joined(cut, 25)] == [(7, 27), (27, 47)]
+    assert joined(cut, 0) == joined(cut, 19) == cut
+
+
+def test_blocks_with_runs_keep_them():
+    whole = Block("town", 0, 0, 9, None, ((0, 4), (4, 7), (7, 9)))
+    assert joined(pieces(whole), 9) == [whole]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        Block("town", 1, 10, 20),
+        Block("street", 0, 10, 20),
+        Block("town", 0, 12, 20),
+        Block("town", 0, 10, 20, ("a", "b")),
+    ],
+)
+def test_blocks_that_do_not_follow_each_other_stay_apart(other):
+    cut = [Block("town", 0, 0, 10), other]
+    assert joined(cut, 1000) == cut

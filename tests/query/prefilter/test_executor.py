@@ -10,6 +10,7 @@ from programs import HEADER
 
 from scenicq.errors import Source
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.observation import observe
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.prefilter.executor import Extent, blocks, hold, run_plan, run_prefilter
 from scenicq.query.prefilter.survivors import candidates
@@ -70,3 +71,56 @@ def test_blocks_cover_every_frame_once(dataset):
     assert len(blocks(where, "street", least=100)) <= 6
     assert {block.part for block in blocks(where, "street", ("a", "recording"))} == {0}
     assert blocks(where, "elsewhere") == []
+
+
+def test_what_matters_of_label_objects_is_read(dataset):
+    text = "ego = new Car on road\nother = new Car ahead of ego by Range(4, 10)"
+    (plan,) = Query(dataset, Source("test.scenic", HEADER + text)).plans()
+    (block,) = Query(dataset, Source("test.scenic", HEADER + text)).blocks(plan.map)
+    with closing(dataset.connect()) as connection:
+        run_prefilter(dataset, connection, plan, block)
+        whole = list(candidates(connection, plan, motion=True))
+        for observed in ({"heading"}, {"heading", "width", "speed"}, {"heading", "viewAngle"}):
+            for one, other in zip(whole, candidates(connection, plan, motion=True, observed=observed), strict=True):
+                assert (one.label.frame, one.label.sensors) == (other.label.frame, other.label.sensors)
+                assert one.among == other.among
+                for here, there in zip(
+                    (one.label.ego, *one.label.objects), (other.label.ego, *other.label.objects), strict=True
+                ):
+                    assert (here.id, here.category, here.x, here.y) == (there.id, there.category, there.x, there.y)
+                    known, read = observe(here), observe(there)
+                    assert {name: known[name] for name in observed & known.keys()} == {
+                        name: read[name] for name in observed & read.keys()
+                    }
+                    assert "length" not in read
+        assert any("length" in observe(each) for candidate in whole for each in candidate.label.objects)
+
+
+class Watched:
+    """A connection that notes what it is asked."""
+
+    def __init__(self, connection):
+        self.connection, self.asked = connection, []
+
+    def execute(self, sql):
+        self.asked.append(sql)
+        return self.connection.execute(sql)
+
+    def __getattr__(self, name):
+        return getattr(self.connection, name)
+
+
+def test_of_frames_whose_columns_exclude_them_nothing_else_is_asked(dataset):
+    text = "ego = new Car on road, facing 90 deg relative to roadDirection\nnew Car ahead of ego by 5"
+    query = Query(dataset, Source("test.scenic", HEADER + text))
+    (plan,) = query.plans()
+    (whole,) = query.blocks(plan.map)
+    with closing(dataset.connect(views=False)) as connection:
+        missed = run_prefilter(dataset, connection, plan, whole)
+        out = missed >= 0
+        assert out.any()
+        for row in (int(out.argmax()), int(out.argmin())):
+            watched = Watched(connection)
+            alone = run_prefilter(dataset, watched, plan, replace(whole, first=row, end=row + 1))
+            assert alone.tolist() == [missed[row]]
+            assert (len(watched.asked) == 1) is bool(out[row])
