@@ -38,7 +38,7 @@ def interval_affine_of(
     node: Node,
     forms: Mapping[int, IntervalAffine],
     bounds: Mapping[int, Enclosure],
-    turns: Mapping[int, tuple[Enclosure, Enclosure]],
+    turns: Mapping[int, Enclosure],
 ) -> IntervalAffine:
     """The form of a node.
 
