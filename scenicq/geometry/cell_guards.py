@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scenicq.geometry import shapes
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["Guard", "Nearer", "Off", "Within", "narrowed", "segment_distances"]
+__all__ = ["Guard", "HalfPlane", "Nearer", "Off", "Within", "half_planes", "narrowed", "segment_distances"]
 
 _ROUNDING = 1e-7
 """Metres that a comparison of distances may be off before it excludes a point."""
@@ -59,6 +59,9 @@ class Within:
 
 Guard: TypeAlias = Nearer | Off | Within
 
+HalfPlane: TypeAlias = tuple[float, float, float]
+"""Of a, b and c the points with a x + b y <= c, in metres."""
+
 
 def segment_distances(xy: NDArray[np.float64], segments: Segments) -> NDArray[np.float64]:
     """Distances from points (..., 2) to segments (..., 4), broadcast together."""
@@ -93,6 +96,41 @@ def narrowed(guards: Sequence[Guard], bounds: Bounds) -> tuple[Guard, ...] | Non
         if found is not True:
             left.append(found)
     return tuple(left)
+
+
+def half_planes(guards: Sequence[Guard], bounds: Bounds) -> list[HalfPlane]:
+    """Half planes that hold every point of a box that satisfies all guards; the smaller the box, the closer.
+
+    A distance to a segment is convex, so nowhere less than its tangent plane, and of what it exceeds that by the most
+    is found at a corner. Guards in which a point may be near to any of several segments are passed over.
+    """
+    west, south, east, north = bounds
+    places = np.array([(west, south), (east, south), (east, north), (west, north)])
+    middle = places.mean(axis=0)
+    found: list[HalfPlane] = []
+    for guard in guards:
+        if isinstance(guard, Off) or len(guard.own) > 1:
+            continue
+        (own,), (slope,) = _tangents(middle, guard.own)
+        rivals = guard.rivals if isinstance(guard, Nearer) else np.empty((0, 4))
+        away, slopes = _tangents(middle, rivals)
+        over = segment_distances(places[:, None], rivals) - away - (places - middle) @ slopes.T
+        limits = away - own + over.max(axis=0, initial=0.0)
+        normals = slope - slopes
+        if isinstance(guard, Within):
+            limits, normals = np.array([guard.reach - own]), slope[None]
+        limits = limits + normals @ middle + _ROUNDING
+        found += zip(*normals.T.tolist(), limits.tolist(), strict=True)
+    return found
+
+
+def _tangents(xy: NDArray[np.float64], segments: Segments) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Distances (n,) from a point to segments (n, 4), and the slopes (n, 2) of planes that touch them from below."""
+    start, along = segments[:, :2], segments[:, 2:] - segments[:, :2]
+    share = ((xy - start) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), _LEAST)
+    off = xy - start - np.clip(share, 0.0, 1.0)[:, None] * along
+    away = np.hypot(off[:, 0], off[:, 1])
+    return away, off / np.maximum(away, _LEAST)[:, None]
 
 
 def _box(bounds: Bounds) -> Shape:

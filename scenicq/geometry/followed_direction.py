@@ -82,12 +82,13 @@ class FollowedDirection(RoadDirection):
         west, south, east, north = np.floor(boxes / _TILE).T
         large = (east - west + 1) * (north - south + 1) > _MOST_TILES
         off = large.copy()
-        small = np.nonzero(~large)[0]
+        small, left = np.nonzero(~large)[0], ~large
         # most boxes lie within one road or one intersection
         whole = shapes.boxes(boxes[small])
         held, within = shapes.tree_pairs(self._paved_tree, whole)
         inside = shapes.covers_many(self._paved[within], whole[held])
-        todo = np.setdiff1d(small, small[held[inside]])
+        left[small[held[inside]]] = False
+        todo = np.nonzero(left)[0]
         if len(todo):
             rest = boxes[todo]
             free, _ = shapes.tree_pairs_within(self._free_tree(rest), shapes.boxes(rest), 0.0)

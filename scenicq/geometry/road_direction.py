@@ -124,12 +124,10 @@ class RoadDirection:
 
     def headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Pairs (box, heading) that hold every heading somewhere in each of some boxes, see `VectorField`."""
-        found: list[tuple[NDArray[np.intp], NDArray[np.float64]]] = []
+        found = [(np.empty(0, dtype=np.intp), np.empty(0))]
         for start in range(0, len(boxes), _CHUNK):
             owner, heading = self._headings(boxes[start : start + _CHUNK])
             found.append((owner + start, heading))
-        if not found:
-            return np.empty(0, dtype=np.intp), np.empty(0)
         return np.concatenate([owner for owner, _ in found]), np.concatenate([heading for _, heading in found])
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
@@ -233,7 +231,8 @@ class RoadDirection:
         chosen = gap <= best[pair] + 2 * radius[box[pair]] + _TIE
         distinct, number = self._distinct
         # as one whole number a pair is found once much sooner than as two fractions
-        found = np.unique(box[pair[chosen]] * len(distinct) + number[segment[chosen]])
+        found = np.sort(box[pair[chosen]] * len(distinct) + number[segment[chosen]])
+        found = found[np.diff(found, prepend=-1) != 0]
         return found // max(1, len(distinct)), distinct[found % max(1, len(distinct))]
 
     def _lanes_within(self, xy: Coordinates, reach: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

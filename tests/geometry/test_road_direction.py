@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon, box
 
 from scenicq.geometry.angles import distance
+from scenicq.geometry.cell_guards import Nearer, Within, half_planes, narrowed
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.road_direction import DirectedLane, RoadDirection, along_lines
 
@@ -109,6 +110,32 @@ def test_guards_say_which_points_of_a_cell_are_meant(field: RoadDirection, seed:
             sure = [part.heading for cell in holding if (part := cell.part(box)) is not None and part.exact]
             for heading in meant if half == 0.0 else sure:
                 assert any(distance(heading, value) < 1e-9 for value in values), (x, y, half, heading)
+
+
+@settings(max_examples=20, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@given(fields(), st.integers(0, 2**32))
+def test_half_planes_hold_what_guards_mean(field: RoadDirection, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    guarded = [cell for cell in field.cells((-16.0, -16.0, 16.0, 16.0)) if cell.guards]
+    for cell in [guarded[number] for number in rng.integers(0, len(guarded), 10)] if guarded else []:
+        x, y = rng.uniform(cell.polygon.min(axis=0), cell.polygon.max(axis=0)).tolist()
+        half = 10 ** rng.uniform(-3, 0)
+        bounds = (x - half, y - half, x + half, y + half)
+        if (part := cell.part(bounds)) is None:
+            continue
+        for a, b, c in half_planes(part.guards, bounds):
+            for px, py in rng.uniform(bounds[:2], bounds[2:], (30, 2)).tolist():
+                assert a * px + b * py <= c or narrowed(part.guards, (px, py, px, py)) is None
+
+
+def test_half_planes_are_as_close_as_a_border_is_straight() -> None:
+    # the border between a line and a point 5 m beside it is x = 2.5 + y ** 2 / 10
+    guard = Nearer(np.array([(0.0, -9.0, 0.0, 9.0)]), np.array([(5.0, 0.0, 5.0, 0.0)]))
+    for half in (0.1, 0.01):
+        ((a, b, c),) = half_planes([guard], (2.5 - half, -half, 2.5 + half, half))
+        assert (a, b) == pytest.approx((2.0, 0.0))
+        assert half**2 / 10 <= c / a - 2.5 <= half**2 / 4
+    assert half_planes([guard, Within(guard.rivals, 3.0)], (1.9, -0.1, 2.1, 0.1))[1] == pytest.approx((-1.0, 0.0, -2.0))
 
 
 def test_a_bend_ties_on_its_outer_side_only() -> None:

@@ -18,6 +18,7 @@ from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn, Value
+from scenicq.geometry.cell_guards import half_planes
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds
@@ -53,7 +54,7 @@ class HeadingAssignment:
         limits: Where the number can be that it shares with other parts.
         middles: A value for each random variable, should nothing be said of it.
         exact: Whether it has no solution where its linear program has none.
-        sharp: Whether the fields do point so everywhere in the cells.
+        vague: The points of fields, no heading pinned, of which cells cover places where the field points otherwise.
     """
 
     case: BoxSet
@@ -65,7 +66,7 @@ class HeadingAssignment:
     limits: FloatInterval
     middles: Mapping[Identity, Value]
     exact: bool
-    sharp: bool
+    vague: list[Node]
 
 
 def solved(
@@ -165,20 +166,22 @@ def assignment_of(cases: BoxSet, number: int, shared: Identity | None) -> Headin
         (c, condition(node, {}, None, pinned) if isinstance(seen, tuple) else node, seen) for c, node, seen in items
     ]
     places: list[Node] = []
-    sharp = True
+    vague: list[Node] = []
     for node, box, near in pointing:
-        place = condition(condition(node.point, {}, given, memo), {}, None, pinned)
+        point = condition(node.point, {}, given, memo)
+        place = condition(point, {}, None, pinned)
         form = affine_vector(place)
         places.append(place)
         cells.append([[]] if form is None else [_within(form, cell, box) for cell in near])
-        sharp = sharp and form is not None and all(cell.exact for cell in near)
+        if form is None or not all(cell.exact for cell in near):
+            vague.append(point)
     limits = (-math.inf, math.inf)
     if shared in network.leaves:
         low, high = cases.ranges[shared][:, number].tolist()
         limits = (low, high)
     middles = {identity: _middle(leaf, cases, number) for identity, leaf in network.leaves.items()}
     case = cases.take(np.array([number]))
-    return HeadingAssignment(case, straight, places, cells, given, headings, limits, middles, exact, sharp)
+    return HeadingAssignment(case, straight, places, cells, given, headings, limits, middles, exact, vague)
 
 
 def _is_affine(node: Node, seen: Value) -> bool:
@@ -229,7 +232,9 @@ def _cells_in(field: VectorField, heading: float, box: Bounds) -> list[FieldCell
 
 def _within(place: AffineVector, cell: FieldCell, box: Bounds) -> list[Row]:
     """What holds of a place in a cell and a box."""
-    return [*polygon_rows(place, cell.polygon), Row(place[0], box[0], box[2]), Row(place[1], box[1], box[3])]
+    x, y = place
+    borders = [Row(x.times(a).plus(y, b), -math.inf, c) for a, b, c in half_planes(cell.guards, box)]
+    return [*polygon_rows(place, cell.polygon), Row(x, box[0], box[2]), Row(y, box[1], box[3]), *borders]
 
 
 def _middle(leaf: Leaf, cases: BoxSet, number: int) -> Value:

@@ -85,7 +85,7 @@ class BoxSet:
     chosen: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
     asked: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
     _bounds: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
-    _turns: dict[int, tuple[Enclosure, Enclosure]] = field(default_factory=dict[int, "tuple[Enclosure, Enclosure]"])
+    _turns: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
 
     @classmethod
     def start(cls, network: ConstraintNetwork, ranges: Mapping[Identity, Sequence[FloatInterval]]) -> BoxSet:
@@ -122,7 +122,7 @@ class BoxSet:
             {key: value[..., cases] for key, value in self.chosen.items()},
             {key: value[cases] for key, value in self.asked.items()},
             {key: value[..., cases] for key, value in self._bounds.items()},
-            {key: (sine[:, cases], cosine[:, cases]) for key, (sine, cosine) in self._turns.items()},
+            {key: value[..., cases] for key, value in self._turns.items()},
         )
 
     def place(self, node: DirectionAt) -> Enclosure:
@@ -141,10 +141,10 @@ class BoxSet:
         """The cases that a mask (n,) names."""
         return self if wanted.all() else self.take(np.nonzero(wanted)[0])
 
-    def narrowed(self) -> BoxSet:
-        """The cases of which something is left, over narrower ranges."""
+    def narrowed(self, passes: int = _PASSES) -> BoxSet:
+        """The cases of which something is left, over narrower ranges, after so many passes at most."""
         branches = self
-        for _ in range(_PASSES):
+        for _ in range(passes):
             # most cases that are none miss what the label observes from the start
             branches._upward()
             branches = branches.those(~branches._lost())
@@ -323,7 +323,7 @@ class BoxSet:
                     self._meet(node.factor, divide(own[axis], vector[axis]))
             case Rotate():
                 sine, cosine = self._turns[id(node)]
-                self._meet(node.vector, rotate(own, (negative(sine), cosine)))
+                self._meet(node.vector, rotate(own, np.stack([negative(sine), cosine])))
                 angle = self._scalar(node.angle)
                 if (angle[0] != angle[1]).any():
                     turn = subtract(angle_of(own), angle_of(self._vector(node.vector)))

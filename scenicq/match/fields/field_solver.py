@@ -149,7 +149,7 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
     for _ in range(_MOST_HALVES):
         if not todo:
             return Refuted(first)
-        less = None if todo[0].sharp else _divided(todo.popleft(), None)
+        less = _divided(todo.popleft(), None) if todo[0].vague else None
         if less is None:
             break
         for way in less:
@@ -168,10 +168,9 @@ def _tried(start: BoxSet, tolerance: Tolerance) -> Satisfied | None:
 
 
 def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAssignment] | None:
-    """What is left of a way in cells that cover too much over either half of its widest range."""
-    case = way.case
+    """What is left of a way in cells that cover too much over either half of the widest range that matters there."""
     try:
-        halves = [propagated(half) for half in bisected(case, tuple(case.network.leaves.values()))]
+        halves = [propagated(half) for half in bisected(way.case, leaves(*way.vague))]
     except LimitError:
         return None
     return _ways([half for half in halves if half.size], shared)
@@ -222,4 +221,4 @@ def _within(found: Sequence[BoxSet], shared: Identity, limits: Sequence[FloatInt
 def _ways(found: Sequence[BoxSet], shared: Identity | None) -> list[HeadingAssignment]:
     """The cases as constraints, those first in which a linear program tells all."""
     ways = [assignment_of(cases, number, shared) for cases in found for number in range(cases.size)]
-    return sorted((way for way in ways if way is not None), key=lambda way: not way.sharp)
+    return sorted((way for way in ways if way is not None), key=lambda way: bool(way.vague))

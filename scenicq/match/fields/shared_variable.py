@@ -134,7 +134,7 @@ def _sharper(
         less = replace(stretch, low=ends[0], high=ends[1], tight=True)
         if not less.holds(value) or ends[1] - ends[0] < stretch.high - stretch.low - _FINEST:
             return [less], way.exact
-    ways = None if way.sharp else divided(way)
+    ways = divided(way) if way.vague else None
     if ways is not None:
         return [_Stretch(each, *each.limits) for each in ways], True
     if stretch.high - stretch.low <= _FINEST:

@@ -106,3 +106,26 @@ def test_the_cell_across_the_border_counts_where_the_tolerance_reaches_it(offset
     for heading, near in ((left, offset <= 0.01), (right, offset >= -0.01)):
         verdict = matcher.match(label(xs[number] + offset, 1.0, heading, ahead=0.0))
         assert isinstance(verdict, Match if near else NoMatch), (offset, heading, verdict)
+
+
+@pytest.mark.parametrize("offset", [-0.02, -0.0101, -0.0099, 0.0, 0.0099, 0.0101, 0.02])
+def test_a_curved_border_is_told_without_a_solver_however_close(offset):
+    # between a line and a point the border is a parabola, which no cell follows: here at (3.125, -2) across (0.8, 0.6)
+    lines = [[(0.0, -9.0), (0.0, 0.0)], [(4.0, 1.0), (20.0, 1.0)]]
+    area = box(-9, -9, 20, 9)
+    road = Network(
+        "gap",
+        [
+            MapFeature("road", "road", area, {"forward": "group"}),
+            MapFeature("group", "lane_group", area, {"road": "road"}),
+            MapFeature("lane", "lane", area, {"road": "road", "group": "group", "centerline": lines}),
+        ],
+    )
+    program = (
+        "model scenic.domains.driving.model\nspot = new OrientedPoint on network.laneRegion, facing roadDirection\n"
+    )
+    scenario = compiled(program + "ego = new Car at spot offset by (0, 0), facing spot.heading", road)
+    matcher = Matcher(scenario, MatchOptions(tolerance=Tolerance(position=0.01, heading=1e-3)))
+    for heading, near in ((0.0, offset <= 0.01), (-math.pi / 2, offset >= -0.01)):
+        verdict = matcher.match(label(3.125 + 0.8 * offset, -2.0 + 0.6 * offset, heading, ahead=0.0))
+        assert isinstance(verdict, Match if near else NoMatch), (offset, heading, verdict)
