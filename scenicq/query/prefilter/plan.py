@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from scenicq.errors import Span
 from scenicq.forest.scenario import Scenario, ScenarioObject
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
@@ -21,12 +20,13 @@ from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO, NecessaryCondition, conditions
 from scenicq.query.prefilter.decision import columns_of, decision, new_table
 from scenicq.query.prefilter.params import param_conditions
+from scenicq.query.prefilter.plan_draft import Draft, Stage, Step, blamed_step
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.query.prefilter.sufficient import sufficient_conditions
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.sql import sql_text
 
-__all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "PASSED", "SENSORS", "Plan", "Stage", "Step", "make_plan"]
+__all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "PASSED", "SENSORS", "Plan", "make_plan"]
 
 LABELS, OBJECTS, MEMBERSHIPS = "block_labels", "block_objects", "block_memberships"
 """The views that a plan reads: rows of a block of each table with their `number` in the file."""
@@ -39,35 +39,6 @@ _MOST_PAIRS = 12
 """Pairs of roles whose objects are joined."""
 _MOST_COUNTED = 6
 """Roles whose pairs must find two objects."""
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """A necessary condition of a frame.
-
-    Attributes:
-        what: What it is about, in the words of the program.
-        detail: What a frame that misses it lacks.
-        span: Where the program says it.
-    """
-
-    what: str
-    detail: str
-    span: Span | None
-
-
-@dataclass(frozen=True, slots=True)
-class Stage:
-    """SQL that decides some steps for the frames that the stages before have left.
-
-    Attributes:
-        table: The table that it makes: `f`, the number of each frame left, and `missed`, the number of the first step
-            missed or null.
-        statements: To be run in order.
-    """
-
-    table: str
-    statements: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,41 +97,6 @@ class _Role:
         return len(self.plain) + 1
 
 
-@dataclass(slots=True)
-class _Draft:
-    """A plan on the way."""
-
-    steps: list[Step] = field(default_factory=list[Step])
-    columns: str = ""
-    stages: list[Stage] = field(default_factory=list[Stage])
-
-    def step(self, what: str, span: Span | None, detail: str = "") -> int:
-        """Number of a new step."""
-        self.steps.append(Step(what, detail, span))
-        return len(self.steps) - 1
-
-    @property
-    def last(self) -> str:
-        """The table of the last stage."""
-        return self.stages[-1].table
-
-    def stage(self, statements: Sequence[str], blamed: Sequence[tuple[str, int]], joined: str = "") -> None:
-        """Add a stage: what a frame `s` must not be, with the number of the step that it then misses."""
-        table = f"stage{len(self.stages)}"
-        final = (
-            f"CREATE OR REPLACE TEMP TABLE {table} AS SELECT s.f, {_case(blamed)} AS missed "
-            f"FROM {self.last} s {joined} WHERE s.missed IS NULL"
-        )
-        self.stages.append(Stage(table, (*statements, final)))
-
-
-def _case(blamed: Sequence[tuple[str, int]]) -> str:
-    """The number of the first condition that holds, null if none does."""
-    if not blamed:
-        return "NULL::SMALLINT"
-    return f"(CASE {' '.join(f'WHEN {sql} THEN {step}' for sql, step in blamed)} END)::SMALLINT"
-
-
 def _level(conditions_: Sequence[str], first: int = 0) -> str:
     """How many conditions hold before the first that does not."""
     if not conditions_:
@@ -202,7 +138,7 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
             key = (classes, *(each.sql or each.region for each in (*plain, *placed)))
             roles.append(_Role(owner, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
     pairs = _pairs(found)
-    draft = _Draft()
+    draft = Draft()
     _frames(draft, [each for each in found if not each.objects], param_conditions(scenario, options), roles, pairs)
     if roles:
         _objects(draft, roles, pairs, options)
@@ -235,7 +171,7 @@ def _pairs(found: Sequence[NecessaryCondition]) -> dict[tuple[int, ...], list[Ne
 
 
 def _frames(
-    draft: _Draft,
+    draft: Draft,
     own: Sequence[NecessaryCondition],
     params: Sequence[NecessaryCondition],
     roles: Sequence[_Role],
@@ -249,9 +185,9 @@ def _frames(
         for each in (*params, *own)
         if not each.region
     ]
-    draft.columns = f"SELECT {EGO}.number AS f, coalesce({_case(blamed)}, -1) AS missed FROM {LABELS} {EGO}"
+    draft.columns = f"SELECT {EGO}.number AS f, coalesce({blamed_step(blamed)}, -1) AS missed FROM {LABELS} {EGO}"
     query = (
-        f"SELECT {EGO}.number AS f, {EGO}.frame{kept}, {_case(())} AS missed FROM {LABELS} {EGO} "
+        f"SELECT {EGO}.number AS f, {EGO}.frame{kept}, {blamed_step(())} AS missed FROM {LABELS} {EGO} "
         f"WHERE {EGO}.number IN (SELECT f FROM {PASSED})"
     )
     draft.stages.append(Stage("stage0", (new_table("stage0", query),)))
@@ -264,7 +200,7 @@ def _reached(role: _Role, classes: Sequence[str]) -> str:
 
 
 def _objects(
-    draft: _Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[NecessaryCondition]], options: MatchOptions
+    draft: Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[NecessaryCondition]], options: MatchOptions
 ) -> None:
     """One pass over the objects: how far each comes in each role."""
     own_ego = options.ego == "label"
@@ -303,7 +239,7 @@ def _objects(
 
 
 def _regions(
-    draft: _Draft, own: Sequence[NecessaryCondition], roles: Sequence[_Role], wanted: Mapping[str, str]
+    draft: Draft, own: Sequence[NecessaryCondition], roles: Sequence[_Role], wanted: Mapping[str, str]
 ) -> str:  # fmt: skip
     """What memberships of regions decide; returns the table of objects and how far they come.
 
@@ -362,7 +298,7 @@ def _regions(
 
 
 def _distinct(
-    draft: _Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[NecessaryCondition]]
+    draft: Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[NecessaryCondition]]
 ) -> None:
     """Who is left for each role, and whether there are enough of them for any two and for all."""
     tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
@@ -390,7 +326,7 @@ def _distinct(
     draft.stage([table], blamed, tally)
 
 
-def _pair(draft: _Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[NecessaryCondition]) -> None:
+def _pair(draft: Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[NecessaryCondition]) -> None:
     """Two roles whose objects conditions tie together: whoever has no partner is out of the role."""
     one, other = (next(place for place, role in enumerate(roles) if role.owner.index == index) for index in objects)
     ego = f" JOIN stage0 {EGO} ON {EGO}.f = a.f" if columns_of(EGO, [each.sql for each in tied]) else ""
