@@ -7,18 +7,15 @@ these the directions are known, so that the rest is a linear program with one ma
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from typing import cast
 
 import numpy as np
 
 from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.groups import Constraint
-from scenicq.forest.nodes import Constant, DirectionAt, DiscreteRange, Identity, Index, Node, Select, Value
-from scenicq.forest.walk import leaves, postorder
+from scenicq.forest.nodes import DiscreteRange, Identity, Index, Value
+from scenicq.forest.walk import leaves
 from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_of, solved
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
@@ -26,14 +23,11 @@ from scenicq.match.fields.heading_propagation import LimitError, bisected, direc
 from scenicq.match.fields.probing import MUCH, probed
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.problem.conditioned import Item, conditioned
-from scenicq.match.problem.evaluation import holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["decide_directions", "repaired"]
 
-_MOST_OPTIONS = 16
-"""Options of choices that are tried one by one."""
 _MOST_WAYS = 256
 """Ways of one part that are put to the linear program."""
 _MANY_CASES = 128
@@ -52,15 +46,15 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
         shared: The random number that all of them share, if there are several parts.
         tolerance: Per feature.
     """
+    first = parts[0][0][0]
     start = BoxSet.start(ConstraintNetwork([item for part in parts for item in part], tolerance), {}).narrowed()
     if not start.size and len(parts) == 1:
-        return Refuted(parts[0][0][0])
+        return Refuted(first)
     witness = probed(start, tolerance) if start.size else None
     if witness is not None:
         return witness
     if shared is None or len(parts) == 1:
-        return _whole(parts[0], tolerance)
-    first = parts[0][0][0]
+        return _alone(start, first, tolerance)
     networks = [ConstraintNetwork(part, tolerance) for part in parts]
     chosen: list[list[BoxSet]] = []
     limits: list[FloatInterval] = []
@@ -83,43 +77,8 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     choices = [id(node) for network in networks for node in network.choices]
     if isinstance(found, Undecided) and len(set(choices)) < len(choices):
         # fields that several parts ask for at one point have one direction there
-        return _whole([item for part in parts for item in part], tolerance)
+        return _alone(start, first, tolerance)
     return found
-
-
-def _whole(items: Sequence[Item], tolerance: Tolerance) -> Outcome:
-    """Decide constraints that are one part: for each option of what decides which fields are asked at all."""
-    first = items[0][0]
-    blamed: Outcome = Refuted(first)
-    deciding = _deciding([node for _, node, _ in items])
-    for options in itertools.product(*(range(len(leaf.weights)) for leaf in deciding)):
-        given: dict[Identity, Value] = {
-            leaf.identity: float(option) for leaf, option in zip(deciding, options, strict=True)
-        }
-        fixed = conditioned(items, given) if given else items
-        known = [item for item in fixed if isinstance(item[1], Constant)]
-        if not all(holds(c, cast(Constant, node).value, seen, tolerance) for c, node, seen in known):
-            continue
-        left = [item for item in fixed if not isinstance(item[1], Constant)]
-        if not left:
-            return Satisfied(given)
-        found = _alone(BoxSet.start(ConstraintNetwork(left, tolerance), {}), first, tolerance)
-        if isinstance(found, Satisfied):
-            return Satisfied({**given, **found.values})
-        blamed = found if isinstance(found, Undecided) else blamed
-    return blamed
-
-
-def _deciding(roots: Sequence[Node]) -> list[Index]:
-    """The choices between expressions with fields, if they have few outcomes together."""
-    found: dict[Identity, Index] = {}
-    for node in postorder(roots):
-        if not isinstance(node, Select) or not isinstance(node.index, Index):
-            continue
-        if any(isinstance(below, DirectionAt) for below in postorder(node.options)):
-            found[node.index.identity] = node.index
-    few = math.prod(len(leaf.weights) for leaf in found.values()) <= _MOST_OPTIONS
-    return list(found.values()) if few else []
 
 
 def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:

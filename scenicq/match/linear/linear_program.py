@@ -101,7 +101,7 @@ def _solve(
     rows: list[Row], variables: list[VariableAxis], least: tuple[VariableAxis, float] | None = None
 ) -> Mapping[VariableAxis, float] | None:
     """A solution, the one in which a variable times a factor is least if one is given."""
-    highs: Any = import_module("highspy")  # 0.3 s, and most runs never get here
+    highs: Any = import_module("highspy")  # most runs never get here
     column = {variable: number for number, variable in enumerate(variables)}
     strict = any(row.strict for row in rows)
     margin = len(variables)
