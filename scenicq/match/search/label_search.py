@@ -6,7 +6,6 @@ the search then finds correspondences that satisfy the groups about several obje
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
@@ -26,8 +25,8 @@ from scenicq.match.search.backtracking import Consistency, Reporter, find_assign
 from scenicq.match.search.group_cache import Asker, GroupCache, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
-_FEW = 64
-"""Decisions in closed form that cost less than arrays; steps of a search that cost hardly anything."""
+_FEW_STEPS = 64
+"""Steps of a search that cost hardly anything."""
 _FEW_SLOTS = 8
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -180,7 +179,7 @@ class LabelSearch:
     ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
         """Candidates that pass the groups about them and the ego alone, and those for which some are undecided."""
         left = wanted
-        if self.options.method == "auto" and not _easy(plan, wanted):
+        if self.options.method == "auto":
             left, failed = arc_consistent(plan, wanted, self.problem, self.scenario.ego, self.options.tolerance)
             if failed is not None:
                 self._explain_thinning(*failed, wanted, ego)
@@ -240,7 +239,7 @@ class LabelSearch:
         given: list[dict[int, int]] = []
         if len(slots) <= _FEW_SLOTS:
             try:
-                for assignment in self._search(plan, slots, ego, accept_unknown=False, budget=_FEW):
+                for assignment in self._search(plan, slots, ego, accept_unknown=False, budget=_FEW_STEPS):
                     given.append(assignment)
                     yield assignment
                 return
@@ -346,19 +345,6 @@ class LabelSearch:
             return self.ask([self.items(each.group, assignment) for each in plan.groups])
         except CannotEvaluate as error:
             return Undecided(plan.groups[0].group.constraints[0], f"unsupported: {error}")
-
-
-def _easy(plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> bool:
-    """Whether all pairs of candidates are decided faster than they are thinned out.
-
-    Conditions on known values alone are left to the thinning, which tells what no candidate satisfies.
-    """
-    pairs = 0
-    for group in plan.groups:
-        if group.closed_form is None or not group.group.variables:
-            return False
-        pairs += math.prod(len(candidates[index]) for index in group.roles)
-    return pairs <= _FEW
 
 
 def _without(slots: list[Slot], undecided: set[tuple[int, int]]) -> list[Slot]:

@@ -8,7 +8,6 @@ ever joined two by two, and only those that are left. A frame that misses a step
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -37,8 +36,6 @@ PASSED = "passed"
 
 _MOST_PAIRS = 12
 """Pairs of roles whose objects are joined."""
-_MOST_COUNTED = 6
-"""Roles whose pairs must find two objects."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,7 +297,7 @@ def _regions(
 def _distinct(
     draft: Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[NecessaryCondition]]
 ) -> None:
-    """Who is left for each role, and whether there are enough of them for any two and for all."""
+    """Who is left for each role, and whether there are enough of them for all."""
     tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
     kept = "".join(f", {name}" for name in sorted({*columns_of("a", tied), *columns_of("b", tied)}))
     flags = [f"{role.column} = {role.full + len(role.placed)}" for role in roles]
@@ -310,19 +307,13 @@ def _distinct(
         f"SELECT f, row{kept}, {chosen} FROM {source} "
         f"WHERE ({' OR '.join(dict.fromkeys(flags))}) AND f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)",
     )
-    together: list[tuple[int, ...]] = [tuple(range(len(roles)))]
-    if 2 < len(roles) <= _MOST_COUNTED:
-        together = [*itertools.combinations(range(len(roles)), 2), *together]
-    counts = [
-        f"count(*) FILTER ({' OR '.join(f'r{place}' for place in places)}) AS n{number_}"
-        for number_, places in enumerate(together)
-    ]
     blamed: list[tuple[str, int]] = []
     tally = ""
     if len(roles) > 1:
         step = draft.step("correspondence", roles[-1].owner.span, "no distinct label objects for all objects")
-        blamed = [(f"coalesce(n{place}, 0) < {len(places)}", step) for place, places in enumerate(together)]
-        tally = f"LEFT JOIN (SELECT f, {', '.join(counts)} FROM roles GROUP BY f) t ON t.f = s.f"
+        blamed = [(f"coalesce(n, 0) < {len(roles)}", step)]
+        anybody = " OR ".join(f"r{place}" for place in range(len(roles)))
+        tally = f"LEFT JOIN (SELECT f, count(*) FILTER ({anybody}) AS n FROM roles GROUP BY f) t ON t.f = s.f"
     draft.stage([table], blamed, tally)
 
 

@@ -12,8 +12,8 @@ from scenicq.store.sql import sql_text
 
 __all__ = ["RegionNames", "near_region"]
 
-_FEW_IDS, _MOST_IDS = 4, 2000
-"""Regions named one by one in a condition: as a list, and at most."""
+_MOST_IDS = 2000
+"""Regions named one by one in a condition at most."""
 
 
 class RegionNames:
@@ -86,4 +86,4 @@ def _chosen(area: PolygonSet, names: RegionNames) -> str | None:
         return None
     ids = ", ".join(sql_text(names.elements[name]) for name in area.ids)
     # a subquery is hashed, a list is gone through for every row
-    return f"region IN (SELECT unnest([{ids}]))" if len(area.ids) > _FEW_IDS else f"region IN ({ids})"
+    return f"region IN (SELECT unnest([{ids}]))"
