@@ -39,8 +39,6 @@ _WORTH = 0.8
 """A share of the range of headings, or of the place of a point, above which nothing is gained by looking again."""
 _POINT = 1.5e-9
 """Radians that the headings of one direction may be apart, being rounded."""
-_FEW = 4
-"""Headings that are tried one by one."""
 _GAP = 0.1
 """Radians between two headings that are not of one bend."""
 _PIECES = 4
@@ -55,8 +53,6 @@ _LONG = 1.0
 """Width of a range of numbers that is divided before directions are, where these are many."""
 _PARTS = 8
 """Parts into which it is divided at once, at most."""
-_BEND = 0.5
-"""Radians that the headings of one bend may be apart, or else it is told first which road is meant."""
 
 
 class LimitError(Exception):
@@ -222,12 +218,9 @@ def _parted(cases: BoxSet) -> list[BoxSet] | None:
     if not vague:
         return None
     sizes = {id(node): float(_extent(cases, node).max()) for node in vague}
-    if min(sizes.values()) > _FAR:
-        return bisected(cases, leaves(min(vague, key=lambda node: sizes[id(node)])))
-    # first which road is meant, where least of the map comes into question, then where on the bend
-    near = [node for node in vague if sizes[id(node)] <= _FAR]
-    turns = {id(node): float(np.ptp(cases.chosen[id(node)], axis=0).max()) for node in near}
-    node = min(near, key=lambda node: sizes[id(node)] if turns[id(node)] >= _BEND else _FAR - turns[id(node)])
+    node = min(vague, key=lambda node: sizes[id(node)])  # where least of the map comes into question
+    if sizes[id(node)] > _FAR:
+        return bisected(cases, leaves(node))
     owner, ranges = _pieces(cases, node)
     if len(owner) > 2 * cases.size:
         # over less of the way that random numbers allow there are fewer directions
@@ -271,14 +264,13 @@ def _pieces(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray
     if not isinstance(cast(Constant, node.field).value, Ranked):
         # a number of an option is near no other; headings are parted at gaps, or where there is none, evenly
         wide = first | (gap > _GAP)
-        counts = np.bincount(owner[apart], minlength=cases.size)
         ranges = np.bincount(owner[wide], minlength=cases.size)
         low, high = np.full(cases.size, np.inf), np.full(cases.size, -np.inf)
         np.minimum.at(low, owner, heading)
         np.maximum.at(high, owner, heading)
         bins = np.floor((heading - low[owner]) * (_PIECES / (high - low + SAME)[owner]))
         even = np.diff(bins, prepend=-1.0) != 0
-        apart &= first | (counts <= _FEW)[owner] | np.where((ranges > 1)[owner], wide, even)
+        apart &= first | np.where((ranges > 1)[owner], wide, even)
     starts = np.nonzero(apart)[0]
     ends = np.append(starts[1:], len(heading))[: len(starts)] - 1
     return owner[starts], np.stack([heading[starts], heading[ends]])
