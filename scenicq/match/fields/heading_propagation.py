@@ -39,8 +39,6 @@ _WORTH = 0.8
 """A share of the range of headings, or of the place of a point, above which nothing is gained by looking again."""
 _POINT = 1.5e-9
 """Radians that the headings of one direction may be apart, being rounded."""
-_GAP = 0.1
-"""Radians between two headings that are not of one bend."""
 _PIECES = 4
 """Ranges into which the headings of a bend are parted."""
 _SOME = 64
@@ -262,15 +260,13 @@ def _pieces(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray
     gap[first] = np.inf
     apart = gap > _POINT
     if not isinstance(cast(Constant, node.field).value, Ranked):
-        # a number of an option is near no other; headings are parted at gaps, or where there is none, evenly
-        wide = first | (gap > _GAP)
-        ranges = np.bincount(owner[wide], minlength=cases.size)
+        # a number of an option is near no other; headings are parted evenly
         low, high = np.full(cases.size, np.inf), np.full(cases.size, -np.inf)
         np.minimum.at(low, owner, heading)
         np.maximum.at(high, owner, heading)
         bins = np.floor((heading - low[owner]) * (_PIECES / (high - low + SAME)[owner]))
         even = np.diff(bins, prepend=-1.0) != 0
-        apart &= first | np.where((ranges > 1)[owner], wide, even)
+        apart &= first | even
     starts = np.nonzero(apart)[0]
     ends = np.append(starts[1:], len(heading))[: len(starts)] - 1
     return owner[starts], np.stack([heading[starts], heading[ends]])
