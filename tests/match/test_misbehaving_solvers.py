@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -113,8 +114,9 @@ def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work
                     continue
                 at_once = len(killed) % 2 == 1
                 if at_once or pid in seen:
-                    os.kill(pid, signal.SIGKILL)
-                    killed.append(pid)
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(pid, signal.SIGKILL)
+                        killed.append(pid)
                 seen.append(pid)
 
     thread = threading.Thread(target=killer)

@@ -154,8 +154,11 @@ def _alive(pid: int) -> bool:
     except ProcessLookupError:
         return False
     # a process that has ended but whose parent has not asked for it is dead enough
-    stat = Path(f"/proc/{pid}/stat")
-    return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return not Path("/proc").is_dir()
+    return state.rpartition(")")[2].split()[0] != "Z"
 
 
 ORPHAN = """
