@@ -127,10 +127,12 @@
       getSelection().addRange(range);
       return document.execCommand("copy");
     };
+    // a clipboard that somebody else holds may never answer
+    const late = () => new Promise((_, refuse) => setTimeout(refuse, 1000));
     copy.addEventListener("click", async () => {
       let done = false;
       try {
-        await navigator.clipboard.writeText(command.textContent);
+        await Promise.race([navigator.clipboard.writeText(command.textContent), late()]);
         done = true;
       } catch {
         done = select();
