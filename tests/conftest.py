@@ -1,5 +1,6 @@
 """What all tests share: golden files, the sample data, and the command line run in this process."""
 
+import contextlib
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -40,6 +41,23 @@ def home_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         yield
+
+
+@pytest.fixture
+def started_processes() -> Callable[[], dict[int, bytes]]:
+    """The processes that this one has started, each with its command, as far as /proc tells (Linux)."""
+
+    def found() -> dict[int, bytes]:
+        commands: dict[int, bytes] = {}
+        for thread in Path("/proc/self/task").iterdir():
+            # threads and processes end meanwhile
+            with contextlib.suppress(OSError):
+                for pid in (thread / "children").read_text().split():
+                    with contextlib.suppress(OSError):
+                        commands[int(pid)] = Path(f"/proc/{pid}/cmdline").read_bytes()
+        return commands
+
+    return found
 
 
 @pytest.fixture

@@ -96,7 +96,7 @@ def test_a_command_that_misbehaves_leaves_its_frames_unknown(reason, honest, ver
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="worker processes are found in /proc")
-def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work(honest, verdicts):
+def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work(honest, verdicts, started_processes):
     done = threading.Event()
     killed, seen, most = [], [], 0
 
@@ -109,8 +109,8 @@ def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work
     def killer():
         # one as soon as it is seen, that is at its start, the next when it is at work, and so on
         while not done.wait(0.1):
-            for pid in _workers():
-                if pid in killed or len(killed) >= most:
+            for pid, command in started_processes().items():
+                if b"scenicq.smt.worker" not in command or pid in killed or len(killed) >= most:
                     continue
                 at_once = len(killed) % 2 == 1
                 if at_once or pid in seen:
@@ -135,23 +135,6 @@ def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work
         for frame, row in found.items():
             assert row["verdict"] == honest[frame]["verdict"] or "crash" in reason_of(row), (frame, row)
         assert any(row["verdict"] != "unknown" for row in found.values())
-
-
-def _workers():
-    """Solver processes of this process."""
-    found = []
-    for thread in Path("/proc/self/task").iterdir():
-        try:
-            children = (thread / "children").read_text().split()
-        except OSError:
-            continue
-        for pid in children:
-            try:
-                if b"scenicq.smt.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
-                    found.append(int(pid))
-            except OSError:
-                continue
-    return found
 
 
 def test_solvers_that_hang_end_with_their_timeouts(verdicts, honest, tmp_path):

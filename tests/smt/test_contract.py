@@ -13,7 +13,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -348,7 +348,9 @@ def test_many(solver: SolverSession) -> None:
     assert [type(answer).__name__.lower() for answer in answers] == [example.answers for example in examples]
 
 
-def test_a_killed_process_costs_one_problem(solver: SolverSession) -> None:
+def test_a_killed_process_costs_one_problem(
+    solver: SolverSession, started_processes: Callable[[], dict[int, bytes]]
+) -> None:
     """Whatever runs the solver is killed at work: that problem is unknown, the next is decided."""
     if not Path(f"/proc/self/task/{os.getpid()}/children").exists():
         pytest.skip("processes are found in /proc")
@@ -359,9 +361,11 @@ def test_a_killed_process_costs_one_problem(solver: SolverSession) -> None:
     work.start()
     time.sleep(0.5)
     for _ in range(15):
-        for pid in _solving():
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
+        for pid, command in started_processes().items():
+            # Python's own looks after resources
+            if b"resource_tracker" not in command:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
         work.join(1.0)
         if not work.is_alive():
             break
@@ -370,20 +374,3 @@ def test_a_killed_process_costs_one_problem(solver: SolverSession) -> None:
         # z3 may have given up before
         assert answers == [NoAnswer("crash")]
     assert isinstance(solver.check(Problem((), TRUE), precision=1e-3, timeout_s=10.0), Sat)
-
-
-def _solving() -> list[int]:
-    """The processes that this one has started, but for Python's own that looks after resources."""
-    found: list[int] = []
-    for thread in Path("/proc/self/task").iterdir():
-        # threads and processes end meanwhile
-        with contextlib.suppress(OSError):
-            found += map(int, (thread / "children").read_text().split())
-    return [pid for pid in found if b"resource_tracker" not in _command_of(pid)]
-
-
-def _command_of(pid: int) -> bytes:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""
