@@ -197,21 +197,19 @@ class Examples:
         stack = [hanging] if hanging else []
         while stack:
             look()
-            block = [each for each in stack.pop() if each not in open_]
+            asked = [each for each in stack.pop() if each not in open_]
+            # what is not all observed can come out otherwise for all that is known, and what cannot be said, too
+            otherwise = {
+                place: that
+                for place in asked
+                if self._is_observed(*place)
+                and (that := self._that(*place, holds=bool(base[place[0]][place[1]] != TRUE))) is not None
+            }
+            open_ |= set(asked) - otherwise.keys()
+            block, those = [*otherwise], tuple(otherwise.values())
             if not block:
                 continue
-            # what is not all observed can come out otherwise for all that is known
-            open_ |= {(n, k) for n, k in block if not self._is_observed(n, k)}
-            block = [each for each in block if each not in open_]
-            if not block:
-                continue
-            otherwise = {(n, k): self._that(n, k, holds=bool(base[n][k] != TRUE)) for n, k in block}
-            open_ |= {place for place, that in otherwise.items() if that is None}
-            those = [that for that in otherwise.values() if that is not None]
-            block = [each for each in block if each not in open_]
-            if not block:
-                continue
-            answer = self._ask(those[0] if len(block) == 1 else Logic(LogicOp.OR, tuple(those)))
+            answer = self._ask(those[0] if len(block) == 1 else Logic(LogicOp.OR, those))
             if answer is False:
                 continue
             if answer is True:
