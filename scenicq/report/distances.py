@@ -21,6 +21,7 @@ from scenicq.geometry import shapes
 from scenicq.geometry.regions import Region
 from scenicq.geometry.shapes import XY, Bounds
 from scenicq.report.outlines import outline
+from scenicq.report.placement import Placement
 from scenicq.report.svg import Plane, element
 
 __all__ = ["Measured", "draw_distances", "measured_distances"]
@@ -34,6 +35,8 @@ _PARTS = (1 / 2, 1 / 3, 2 / 3, 1 / 5, 4 / 5)
 """Where along a line its length may stand, the best first."""
 _LETTER = 0.6
 """Width of a letter by its height."""
+_LENGTH = 5.0
+"""How bad it is to hide a length."""
 
 
 def measured_distances(scenario: Scenario, observed: Observation, bounds: Bounds) -> list[Measured]:
@@ -82,16 +85,16 @@ def _known(node: Node, observed: Observation) -> object:
     return found.value if isinstance(found, Constant) else None
 
 
-def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
+def draw_distances(found: list[Measured], plane: Plane, placement: Placement, size: int) -> str:
     """Lines between both ends, each with its length beside its middle, or where that of another is not.
 
     Args:
         found: As `measured_distances` gives them.
         plane: Where the picture lies.
+        placement: What is drawn already; the lengths become part of it.
         size: Height of the letters in centimetres.
     """
     parts: list[str] = []
-    taken: list[tuple[float, float, float]] = []  # of each length its centre and half its width
     for (x0, y0), (x1, y1) in found:
         metres = math.hypot(x1 - x0, y1 - y0)
         if 100 * metres < size:
@@ -100,25 +103,18 @@ def draw_distances(found: list[Measured], plane: Plane, size: int) -> str:
         parts.append(element("path", class_="distance", d=f"M{left} {top}L{right} {bottom}"))
         # beside the line, where no box at one of its ends hides it
         upright = abs(bottom - top) > abs(right - left)
-        aside, above = (_ASIDE, -round(size * 0.35)) if upright else (0, _ASIDE)
         told = f"{metres:.1f} m"
-        wide = size * _LETTER * len(told) / 2
-        before = wide if upright else 0.0  # the centre lies so far before where the text is anchored
+        wide, high = size * _LETTER * len(told) / 2, size / 2
+        aside, above = (_ASIDE + wide, -round(size * 0.35)) if upright else (0, _ASIDE)
         spots = [(left + part * (right - left) - aside, top + part * (bottom - top) - above) for part in _PARTS]
-
-        def crowded(spot: tuple[float, float], wide: float = wide, before: float = before) -> int:
-            x, y = spot[0] - before, spot[1]
-            return sum(abs(x - across) < wide + half and abs(y - along) < size for across, along, half in taken)
-
-        x, y = min(spots, key=crowded)
-        taken.append((x - before, y, wide))
+        x, y = placement.place(spots, wide, high, _LENGTH)
         parts.append(
             element(
                 "text",
                 told,
                 class_="metres",
-                x=math.floor(x),
-                y=math.floor(y),
+                x=round(x + wide if upright else x),
+                y=round(y),
                 font_size=size,
                 text_anchor="end" if upright else "middle",
             )

@@ -18,6 +18,7 @@ from scenicq.query.explain.frame_explanation import Explanation
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.distances import draw_distances, measured_distances
 from scenicq.report.overlay import Blame, blames, draw_blame, draw_overlay, draw_witness
+from scenicq.report.placement import Placement
 from scenicq.report.scene import Role, box_of, draw_object, draw_text, find_roles, observed_by
 from scenicq.report.svg import Plane, element, escape
 from scenicq.store.labels import Label
@@ -207,11 +208,13 @@ def draw_shot(shot: Shot, plane: Plane, view: View, letters: float = LETTERS) ->
         if math.hypot(*box_of(role.member)[:2]) < _SMALL * view.half:
             x, y = plane.at(role.member.x, role.member.y)
             parts.append(element("circle", class_=f"ring {role.colour}", cx=x, cy=y, r=round(_SMALL * 50 * view.half)))
+    (west, north), (east, south) = plane.at(bounds[0], bounds[3]), plane.at(bounds[2], bounds[1])
+    placement = Placement((west, east), (north, south))
     if scenario is not None:
         parts += [draw_witness(shot.verdict, roles, plane, bounds), draw_blame(broken, roles, plane)]
         ways = measured_distances(scenario, observed_by(roles), view.drawn)
-        parts.append(draw_distances(ways, plane, round(view.half * letters * _METRES)))
-    parts += [draw_text(roles, plane, bounds, round(view.half * letters)), _furniture(plane, view)]
+        parts.append(draw_distances(ways, plane, placement, round(view.half * letters * _METRES)))
+    parts += [draw_text(roles, plane, placement, round(view.half * letters)), _furniture(plane, view)]
     return "".join(parts)
 
 

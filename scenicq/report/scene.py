@@ -12,8 +12,9 @@ from scenicq.forest.evaluate import Observation
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.angles import direction
 from scenicq.geometry.boxes import corners
-from scenicq.geometry.shapes import XY, Bounds
+from scenicq.geometry.shapes import XY
 from scenicq.match.explanation import observe
+from scenicq.report.placement import Placement
 from scenicq.report.svg import Plane, element, escape, points_path
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label, LabelObject
@@ -29,6 +30,10 @@ _FULL = 0.95
 """Share of a picture's width that a name takes at most."""
 _AHEAD = 1.0
 """Metres ahead of a box around which no name should lie."""
+_HIGH, _TALL = 0.6125, 0.7
+"""Half the height of a name by that of its letters, and of what it should not hide of a box by its length."""
+_BOX, _NAME = 1.0, 9.0
+"""How bad it is to hide a box, and another name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,26 +128,23 @@ def draw_object(
     return element("g", told, shape, class_=" ".join(filter(None, classes)))
 
 
-def draw_text(roles: tuple[Role, ...], plane: Plane, bounds: Bounds, size: int) -> str:
-    """The names of the roles beside their boxes, where they hide each other least.
+def draw_text(roles: tuple[Role, ...], plane: Plane, placement: Placement, size: int) -> str:
+    """The names of the roles beside their boxes, where they hide least.
 
     Args:
         roles: The roles.
         plane: Where the picture lies.
-        bounds: What is drawn, in metres.
+        placement: What is drawn already; the names become part of it.
         size: Height of the letters in centimetres; names as long as the picture is wide have smaller ones.
     """
-    # what names should not hide: centre, half the width and height, and how bad it would be
-    taken: list[tuple[float, float, float, float, float]] = []
     for role in roles:
         half = 100 * box_of(role.member)[1] / 2
-        taken.append((*plane.at(role.member.x, role.member.y), half, half, 1.0))
+        placement.keep(plane.at(role.member.x, role.member.y), half, _TALL * half, _BOX)
         if role.member.heading is not None:
             # the wedge of what it may face lies ahead of it
             ahead = _point_ahead(role.member, role.member.heading, box_of(role.member)[1] / 2 + _AHEAD)
-            taken.append((*plane.at(*ahead), 100 * _AHEAD, 100 * _AHEAD, 1.0))
-    west, north = plane.at(bounds[0], bounds[3])
-    east, south = plane.at(bounds[2], bounds[1])
+            placement.keep(plane.at(*ahead), 100 * _AHEAD, _TALL * 100 * _AHEAD, _BOX)
+    (west, east), (north, south) = placement.across, placement.along
     parts: list[str] = []
     for role in roles:
         x, y = plane.at(role.member.x, role.member.y)
@@ -156,17 +158,7 @@ def draw_text(roles: tuple[Role, ...], plane: Plane, bounds: Bounds, size: int) 
         if seen:
             # moved to where all of it is in the picture
             spots += [(min(max(a, west + wide + 1), east - wide - 1), b) for a, b in spots]
-
-        def crowded(spot: tuple[float, float], wide: float = wide, height: float = height) -> float:
-            outside = not (west + wide < spot[0] < east - wide and north + height < spot[1] < south - height)
-            return 99.0 * outside + sum(
-                bad
-                for a, b, broad, tall, bad in taken
-                if abs(spot[0] - a) < wide + broad and abs(spot[1] - b) < (height + tall) * 0.7
-            )
-
-        left, top = min(spots, key=crowded)
-        taken.append((left, top, wide, 0.75 * height, 9.0))
+        left, top = placement.place(spots, wide, _HIGH * height, _NAME)
         parts.append(
             element(
                 "text",

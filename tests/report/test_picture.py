@@ -20,6 +20,7 @@ from scenicq.report.backdrop import Backdrop
 from scenicq.report.distances import draw_distances, measured_distances
 from scenicq.report.outlines import allowed_headings, allowed_place, outline
 from scenicq.report.picture import Shot, caption, draw, view_of
+from scenicq.report.placement import Placement
 from scenicq.report.png import can_make_png, png
 from scenicq.report.scene import draw_text, observed_by
 from scenicq.report.svg import Plane, element, escape
@@ -269,7 +270,9 @@ def test_no_box_hides_a_length(shoot):
 def test_lengths_of_distances_alongside_do_not_hide_one_another(to_east, to_north, size):
     ends = [(part * to_east, part * to_north) for part in (1.0, 1.05, 1.1)]
     texts = Drawn(
-        f'<svg data-origin="0 0">{draw_distances([((0.0, 0.0), end) for end in ends], Plane((0.0, 0.0)), size)}</svg>'
+        '<svg data-origin="0 0">'
+        + draw_distances([((0.0, 0.0), end) for end in ends], Plane((0.0, 0.0)), Placement(), size)
+        + "</svg>"
     ).with_class("metres")
     spans = []
     for text in texts:
@@ -312,13 +315,35 @@ def test_names_of_roles_near_each_other_do_not_overlap(shoot, apart, size):
         for number, role in enumerate(shot.roles)
     )
     plane = Plane((math.floor(member.x), math.floor(member.y)))
-    bounds = (member.x - 40, member.y - 40, member.x + 40, member.y + 40)
-    texts = list(ET.fromstring(f"<g>{draw_text(roles, plane, bounds, size)}</g>"))
+    (west, north), (east, south) = plane.at(member.x - 40, member.y + 40), plane.at(member.x + 40, member.y - 40)
+    placement = Placement((west, east), (north, south))
+    texts = list(ET.fromstring(f"<g>{draw_text(roles, plane, placement, size)}</g>"))
     assert [each.text for each in texts] == [role.name for role in roles]
     for one, other in itertools.combinations(texts, 2):
         across = 0.34 * size * (len(one.text) + len(other.text))
         aside = abs(int(one.get("x")) - int(other.get("x"))), abs(int(one.get("y")) - int(other.get("y")))
         assert aside[0] >= across or aside[1] >= size
+
+
+@pytest.mark.parametrize("size", [150, 300])
+@pytest.mark.parametrize("turn", range(0, 360, 30))
+def test_no_name_stands_on_a_length(shoot, size, turn):
+    shot, _ = shoot("03-busy-intersection/10", "02_crossing_cars.scenic")
+    ego, other = shot.roles[0], shot.roles[1]
+    away = math.radians(turn)
+    moved = replace(other.member, x=ego.member.x + 8 * math.cos(away), y=ego.member.y + 8 * math.sin(away))
+    roles = (ego, replace(other, member=moved))
+    plane = Plane((math.floor(ego.member.x), math.floor(ego.member.y)))
+    placement = Placement((-4000.0, 4000.0), (-4000.0, 4000.0))
+    ways = [((ego.member.x, ego.member.y), (moved.x, moved.y))]
+    drawn = draw_distances(ways, plane, placement, size) + draw_text(roles, plane, placement, size)
+    spans = []
+    for text in ET.fromstring(f"<g>{drawn}</g>").iter("text"):
+        wide, x = 0.6 * size * len(text.text), int(text.get("x"))
+        right = x if text.get("text-anchor") == "end" else x + wide / 2
+        spans.append((right - wide, right, int(text.get("y"))))
+    for (left, right, y), (start, end, line) in itertools.combinations(spans, 2):
+        assert right <= start or end <= left or abs(y - line) >= 0.7 * size
 
 
 def test_small_roles_have_a_ring(shoot):
