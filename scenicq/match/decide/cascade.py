@@ -1,8 +1,7 @@
 """The cascade of deciders of one group after conditioning: the first step that decides it.
 
-Ground constraints are evaluated; discrete variables are enumerated; a single affine feature is inverted; truth values
-that other values are made of are split into cases; affine systems go to a linear program. Every step is exact or says
-that it does not know.
+Ground constraints are evaluated; discrete variables are enumerated; a single affine feature is inverted; affine systems
+go to a linear program. Every step is exact or says that it does not know.
 """
 
 from __future__ import annotations
@@ -12,27 +11,21 @@ from collections.abc import Iterator
 from typing import cast
 
 from scenicq.budget import look
-from scenicq.forest import build
 from scenicq.forest.groups import Comparison, Constraint
-from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
-    Compare,
-    CompareOp,
     Constant,
     DiscreteRange,
     Identity,
     Index,
     Leaf,
-    Node,
-    Select,
     Value,
 )
-from scenicq.forest.walk import deciding_first, leaves, postorder
+from scenicq.forest.walk import deciding_first, leaves
 from scenicq.match.linear.affine_forms import affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
 from scenicq.match.linear.linear_program import NotLinear
 from scenicq.match.linear.linear_relaxation import solve_affine
-from scenicq.match.problem.conditioned import Item, conditioned, fact
+from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
@@ -42,7 +35,7 @@ __all__ = ["decide"]
 
 _MOST_BRANCHES = 4096
 _MOST_CHOSEN = 100
-"""Discrete variables and truth values that are chosen one below the other."""
+"""Discrete variables that are chosen one below the other."""
 _MOST_PROGRAMS = 20_000
 """Linear programs for one decision: some seconds, after which a solver does no worse."""
 
@@ -73,7 +66,7 @@ class _Cascade:
         Args:
             items: The constraints.
             given: Values of discrete variables chosen so far.
-            depth: How many of these and of truth values there are.
+            depth: How many of these there are.
         """
         look()
         open_items: list[Item] = []
@@ -96,9 +89,6 @@ class _Cascade:
                 return Satisfied(given | dict(reached.values))
             if reached.possible is False:
                 return Refuted(open_items[0][0])
-        truth = _free_truth(open_items)
-        if truth is not None:
-            return self._try_both(items, truth, given, depth + 1)
         return self._linear(open_items, given)
 
     def _branch(self, constraint: Constraint, outcomes: Iterator[Outcome]) -> Outcome:
@@ -125,16 +115,6 @@ class _Cascade:
             for option in options:
                 chosen: dict[Identity, Value] = {leaf.identity: float(option)}
                 yield self.decide(conditioned(items, chosen), given | chosen, depth)
-
-        return self._branch(items[0][0], outcomes())
-
-    def _try_both(self, items: list[Item], truth: Node, given: dict[Identity, Value], depth: int) -> Outcome:
-        """A truth value that makes up another value: one branch in which it holds, one in which it does not."""
-
-        def outcomes() -> Iterator[Outcome]:
-            for value in (True, False):
-                fixed = conditioned(items, memo={id(truth): Constant(value, span=truth.span)})
-                yield self.decide([*fixed, fact(truth if value else build.opposite(truth))], given, depth)
 
         return self._branch(items[0][0], outcomes())
 
@@ -179,20 +159,3 @@ def _options(leaf: Leaf) -> range | None:
             return range(math.ceil(low), math.floor(high) + 1)
         case _:
             return None
-
-
-def _free_truth(items: list[Item]) -> Node | None:
-    """An unknown truth value that other values are made of, the innermost first."""
-    for node in postorder([node for _, node, _ in items]):
-        match node:
-            case Select(index=Index()):
-                continue
-            case Select(index=truth) if kind_of(truth) == "boolean":
-                return truth
-            case Compare(CompareOp.EQ | CompareOp.NE, left, right):
-                for side in (left, right):
-                    if not isinstance(side, Constant) and kind_of(side) == "boolean":
-                        return side
-            case _:
-                pass
-    return None

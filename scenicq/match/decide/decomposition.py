@@ -7,6 +7,7 @@ propagation, where parts that one random number alone joins stay parts.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 
 from scenicq.forest.components import connected_components
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Range, TruncatedNormal, Value
@@ -14,7 +15,7 @@ from scenicq.forest.walk import leaves, postorder
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.hidden_distances import with_areas
 from scenicq.match.linear.affine_reach import ends
-from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.conditioned import Item, item_conjuncts
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
@@ -30,7 +31,7 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
         tolerance: Per feature.
     """
     left: list[Item] = []
-    for item in items:
+    for item in chain.from_iterable(map(item_conjuncts, items)):
         if not isinstance(item[1], Constant):
             left.append(item)
         elif not holds(item[0], item[1].value, item[2], tolerance):

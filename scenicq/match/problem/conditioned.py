@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
+from scenicq.forest import build
 from scenicq.forest.condition import Observation, condition
 from scenicq.forest.groups import Comparison, Condition, Constraint, Group
-from scenicq.forest.nodes import Feature, Identity, Node, Value
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import Compare, CompareOp, Feature, Identity, Index, Logic, LogicOp, Node, Select, Value
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import children, postorder
 
-__all__ = ["Item", "condition_group", "conditioned", "fact"]
+__all__ = ["Item", "condition_group", "conditioned", "fact", "item_conjuncts"]
 
 Item = tuple[Constraint, Node, Value]
 """A constraint, what conditioning left of its expression, and the label's value if it is a comparison."""
@@ -63,3 +65,34 @@ def conditioned(
 def fact(holding: Node) -> Item:
     """A condition that holds in one branch of a decision, as a constraint."""
     return (Condition(Requirement(holding, holding.span), holding), holding, None)
+
+
+def item_conjuncts(item: Item) -> list[Item]:
+    """A constraint as several that all hold; of alternatives, which one holds is a choice.
+
+    That two truth values are equal, or not, is an alternative, too: which values they have.
+    """
+    constraint, root, seen = item
+    if isinstance(constraint, Comparison):
+        return [item]
+    found: list[Item] = []
+    todo: list[tuple[Node, bool]] = [(root, True)]
+    while todo:
+        node, wanted = todo.pop()
+        if isinstance(node, Compare) and kind_of(node.left) == kind_of(node.right) == "boolean":
+            other = node.right if (node.op is CompareOp.EQ) is wanted else build.opposite(node.right)
+            both = build.logic(LogicOp.AND, node.left, other)
+            neither = build.logic(LogicOp.AND, build.opposite(node.left), build.opposite(other))
+            todo.append((build.logic(LogicOp.OR, both, neither, span=node.span), True))
+        elif not isinstance(node, Logic):
+            holding = node if wanted else build.opposite(node)
+            found.append((constraint, holding, seen))
+        elif node.op is LogicOp.NOT:
+            todo.append((node.args[0], not wanted))
+        elif (node.op is LogicOp.AND) is wanted:
+            todo += [(arg, wanted) for arg in reversed(node.args)]
+        else:
+            args = tuple(arg if wanted else build.opposite(arg) for arg in node.args)
+            index = Index((1.0,) * len(args), span=node.span)
+            found.append((constraint, Select(index, args, span=node.span), seen))
+    return found

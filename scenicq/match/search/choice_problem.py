@@ -9,16 +9,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.forest import build
 from scenicq.forest.components import connected_components
-from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import (
     DiscreteRange,
     Identity,
     Index,
     Leaf,
-    Logic,
-    LogicOp,
     Node,
     Normal,
     PointIn,
@@ -30,30 +26,7 @@ from scenicq.forest.walk import leaves
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.search.outcome_tables import ChoiceTree, ChoiceVariable, Outcomes, above_choices, tree_of
 
-__all__ = ["ChoiceProblem", "Component", "ConstraintChoices", "Domain", "conjuncts"]
-
-
-def conjuncts(item: Item) -> list[Item]:
-    """A constraint as several that all hold; of alternatives, which one holds is a choice."""
-    constraint, root, seen = item
-    if isinstance(constraint, Comparison):
-        return [item]
-    found: list[Item] = []
-    todo: list[tuple[Node, bool]] = [(root, True)]
-    while todo:
-        node, wanted = todo.pop()
-        if not isinstance(node, Logic):
-            holding = node if wanted else build.opposite(node)
-            found.append((constraint, holding, seen))
-        elif node.op is LogicOp.NOT:
-            todo.append((node.args[0], not wanted))
-        elif (node.op is LogicOp.AND) is wanted:
-            todo += [(arg, wanted) for arg in reversed(node.args)]
-        else:
-            args = tuple(arg if wanted else build.opposite(arg) for arg in node.args)
-            index = Index((1.0,) * len(args), span=node.span)
-            found.append((constraint, Select(index, args, span=node.span), seen))
-    return found
+__all__ = ["ChoiceProblem", "Component", "ConstraintChoices", "Domain"]
 
 
 class ConstraintChoices:

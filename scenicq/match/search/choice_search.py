@@ -20,19 +20,17 @@ from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     CompareOp,
     Constant,
-    DirectionAt,
     Identity,
     Node,
     Value,
 )
-from scenicq.forest.walk import postorder
 from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import Slot
-from scenicq.match.problem.conditioned import Item, conditioned, fact
+from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts
 from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
-from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices, conjuncts
+from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices
 from scenicq.match.search.outcome_bounds import possible_outcomes
 from scenicq.match.search.outcome_tables import TooManyOutcomesError
 from scenicq.match.tolerance import Tolerance
@@ -71,7 +69,7 @@ def decide_with_choices(
     Raises:
         TimeIsUp: See `scenicq.budget`.
     """
-    parts = [part for item in items for part in conjuncts(item)]
+    parts = [part for item in items for part in item_conjuncts(item)]
     try:
         found = [ConstraintChoices(item) for item in parts]
     except TooManyOutcomesError:
@@ -108,7 +106,6 @@ class _ChoiceSearch:
         self.decide = decide
         self.ask = ask
         self.depth = depth
-        self.asking = False
         self.blamed: tuple[int, Refuted] | None = None
         self.doubt: Undecided | None = None
         self.known: dict[tuple[int, tuple[tuple[int, int], ...]], Outcome] = {}
@@ -137,11 +134,6 @@ class _ChoiceSearch:
         try:
             for assignment in self._assignments():
                 return unsettled or self._values(assignment, values)
-            if self.doubt is not None and self.ask is not None:
-                # nothing else matches: now a solver is worth its time
-                self.asking, self.doubt = True, None
-                for assignment in self._assignments():
-                    return unsettled or self._values(assignment, values)
         except Exhausted:
             return Undecided(self.items[0][0], "budget")
         if self.doubt is not None:
@@ -214,18 +206,11 @@ class _ChoiceSearch:
                         return Consistency.NO, frozenset((slot, other))
         answer = Consistency.YES
         assigned = assignment.keys()
-        for number, part in enumerate(self.parts):
-            if slot in part.slots and part.slots <= assigned:
-                outcome = self._of(number, [part], [], part.slots, assignment, whole=False)
-                if isinstance(outcome, Refuted):
-                    return self._refuted(outcome, part.slots, assignment)
         for number, component in enumerate(self.components):
             if slot not in component.slots:
                 continue
             if component.slots <= assigned:
-                outcome = self._of(
-                    number + len(self.parts), component.parts, component.lookups, component.slots, assignment
-                )
+                outcome = self._together(number, assignment)
                 if isinstance(outcome, Refuted):
                     return self._refuted(outcome, component.slots, assignment)
                 if isinstance(outcome, Undecided):
@@ -236,7 +221,7 @@ class _ChoiceSearch:
             ready = [part for part in component.parts if part.slots <= assigned]
             if len(ready) > 1 and any(slot in part.slots for part in ready):
                 slots = frozenset(each for part in ready for each in part.slots)
-                outcome = self._of(number + len(self.parts) + len(self.components), ready, [], slots, assignment)
+                outcome = self._of(number + len(self.components), ready, [], slots, assignment, self.decide)
                 if isinstance(outcome, Refuted):
                     return self._refuted(outcome, slots, assignment)
         return answer, frozenset(assigned)
@@ -255,23 +240,18 @@ class _ChoiceSearch:
         lookups: Sequence[Node],
         slots: frozenset[int],
         assignment: Mapping[int, int],
-        *,
-        whole: bool = True,
+        decide: Decide,
     ) -> Outcome:
-        """What is decided of constraints for the outcomes of their slots, once; of a part only what is cheap."""
+        """What is decided of constraints for the outcomes of their slots, once."""
         key = (number, tuple([(slot, assignment[slot]) for slot in sorted(slots)]))
         if key not in self.known:
-            self.known[key] = self._decided(parts, lookups, slots, assignment, self.decide if whole else self._cheaply)
-        found = self.known[key]
-        if whole and self.asking and isinstance(found, Undecided):
-            found = self.known[key] = self._decided(parts, lookups, slots, assignment, self._by_solver)
-        return found
+            self.known[key] = self._decided(parts, lookups, slots, assignment, decide)
+        return self.known[key]
 
-    def _cheaply(self, items: list[Item]) -> Outcome:
-        """What is decided of a constraint that others share random variables with."""
-        if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in items])):
-            return Undecided(items[0][0], "nonlinear")
-        return self.decide(items)
+    def _together(self, number: int, assignment: Mapping[int, int]) -> Outcome:
+        """What is decided of a component all of whose slots are assigned."""
+        one = self.components[number]
+        return self._of(number, one.parts, one.lookups, one.slots, assignment, self._by_solver)
 
     def _by_solver(self, items: list[Item]) -> Outcome:
         outcome = self.decide(items)
@@ -327,9 +307,7 @@ class _ChoiceSearch:
         for number, component in enumerate(self.components):
             if not component.slots:
                 continue
-            outcome = self._of(
-                number + len(self.parts), component.parts, component.lookups, component.slots, assignment
-            )
+            outcome = self._together(number, assignment)
             if isinstance(outcome, Satisfied):
                 found.update(outcome.values)
         given, _ = self._given(frozenset(range(len(self.domains))), assignment)
