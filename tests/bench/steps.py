@@ -1,8 +1,9 @@
 """What each step of matching is worth: labels decided with every step, and with one of them switched off.
 
 Labels are drawn from small programs on the built-in street, chains and rows among them, and on the district of Boston
-where its map lies beside this checkout: as drawn among distractors, and with one object pushed away. No solver is
-asked, so that what a step alone decides shows as unknown without it.
+where its map lies beside this checkout: as drawn among distractors, and with one object pushed away. Programs of
+crowds are tried on people and cars that were not drawn from them. No solver is asked, so that what a step alone decides
+shows as unknown without it.
 
     python tests/bench/steps.py [--labels N] [--step NAME]... [--program NAME]...
 
@@ -13,6 +14,7 @@ the verdicts that differ without it; writes `steps.json` to bench-results/.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import platform
 import random
@@ -41,10 +43,10 @@ from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
 from scenicq.match.problem.outcome import Undecided  # noqa: E402
-from scenicq.match.search import group_cache, group_plan, label_search  # noqa: E402
+from scenicq.match.search import backtracking, group_cache, group_plan, label_search  # noqa: E402
 from scenicq.match.search.first_fit import FirstFit  # noqa: E402
 from scenicq.match.tolerance import Tolerance  # noqa: E402
-from scenicq.store.labels import Label  # noqa: E402
+from scenicq.store.labels import Label, LabelObject  # noqa: E402
 
 MAP = ROOT.parent / "shared" / "data" / "boston" / "maps" / "boston-seaport.geojson"
 CHAINS = {
@@ -77,6 +79,22 @@ ON_MAP = {
 } | {name: CHAINS[name] for name in ("row of 12, one shift", "platoon")} | {
     name: PROGRAMS[name] for name in ("facing field", "badly parked", "follow", "figure 3")
 }  # fmt: skip
+ANYWHERE = "in everywhere, facing Range(0, 360) deg"
+
+
+def _crowd(people: int, cars: int, *conditions: str) -> str:
+    """A program of people p0, p1, ... and cars c0, c1, ... of which only their distances matter."""
+    names = [f"p{n} = new Pedestrian" for n in range(people)] + [f"c{n} = new Car" for n in range(cars)]
+    lines = [f"{each} {ANYWHERE}" for each in ("ego = new Car", *names)]
+    return "\n".join([*lines, *(f"require {condition}" for condition in conditions)])
+
+
+CROWDS = {
+    "two pairs": _crowd(2, 2, "(distance from p0 to p1) < 30", "(distance from c0 to c1) < 1"),
+    "8 apart": _crowd(8, 0, *(f"(distance from p{a} to p{b}) > 3" for a, b in itertools.combinations(range(8), 2))),
+    "first and last of 6": _crowd(6, 0, "(distance from p0 to p5) < 1"),
+}
+"""Tried on crowds that are not drawn from them."""
 LIMIT_S = 1.0
 """Processor time after which a label is given up: "late"."""
 PATIENCE_S = 4.0
@@ -95,7 +113,22 @@ def _undecided(parts: Sequence[Sequence[Any]], *_: object) -> Undecided:
     return Undecided(parts[0][0][0], "switched off")
 
 
+def _back_by_one(frames: Sequence[Any], failed: Any, *rest: Any) -> None:
+    failed.blamed.update(frame.slot.name for frame in frames[-1:])
+    _JUMP(frames, failed, *rest)
+
+
+def _anew(self: Any, plan: Any, assignment: Mapping[int, int]) -> tuple[Any, Any]:
+    return plan.group, self._in_closed_form(plan, assignment) or self._by_cascade(plan.group, assignment)
+
+
+_JUMP = backtracking._jump
 STEPS: dict[str, Off] = {
+    "backjumping": _set(backtracking, "_jump", _back_by_one),
+    "interchangeable objects": _set(group_plan, "interchangeable", lambda *_: {}),
+    "enough later candidates": _set(backtracking, "_followers", lambda *_: {}),
+    "most constrained first": _set(backtracking, "_order", lambda slots, *_: sorted(slots, key=lambda s: s.name)),
+    "answers kept": _set(group_cache.GroupCache, "of", _anew),
     "first fit": _set(FirstFit, "fill", lambda *_: iter(())),
     "closed forms": _set(group_plan, "closed_form_of", lambda *_: None),
     "arc consistency": _set(label_search, "arc_consistent", lambda plan, candidates, *_: (candidates, None)),
@@ -120,6 +153,21 @@ def examples(scenario: Scenario, count: int) -> Iterator[Label]:
             place = rng.randrange(len(label.objects) - 4) if len(label.objects) > 4 else 0
             far = replace(label.objects[place], x=label.objects[place].x + rng.uniform(1, 6))
             yield replace(label, objects=(*label.objects[:place], far, *label.objects[place + 1 :]))
+
+
+def crowds(count: int) -> Iterator[Label]:
+    """Labels of people at seven corners, and of cars in a row with 5 m between their centres."""
+    ego = LabelObject("ego", "Car", "car", 0.0, 0.0, 0.0, 2.0, 4.5)
+    for seed in range(count):
+        rng = random.Random(seed)
+        corners = [(12.0 * n - 40, rng.uniform(-9, 9)) for n in range(7)]
+        people = [
+            (x + rng.uniform(-1, 1), y + rng.uniform(-1, 1)) for x, y in corners for _ in range(rng.randint(1, 3))
+        ]
+        spots = [("Pedestrian", *spot) for spot in people] + [("Car", 5.0 * n, 40.0) for n in range(24)]
+        rng.shuffle(spots)
+        others = (LabelObject(f"o{n}", each[0], each[0], *each[1:], 0.0, 0.7, 0.7) for n, each in enumerate(spots))
+        yield Label("frame", "recording", 0, "street", ego, tuple(others))
 
 
 def decided(
@@ -175,6 +223,9 @@ def main() -> None:
         if given.program is None or name in given.program:
             scenario = compiled(HEADER + text, network)
             scenarios[name] = scenario, list(examples(scenario, given.labels))
+    for name, text in CROWDS.items():
+        if given.program is None or name in given.program:
+            scenarios[name] = compiled(HEADER + text, STREET), list(crowds(2 * given.labels))
     base = decided(scenarios, None)
     whole = sum(seconds for seconds, _ in base.values())
     labels = sum(len(verdicts) for _, verdicts in base.values())

@@ -144,13 +144,6 @@ class LabelSearch:
         if self.failure is None or failure.depth > self.failure.depth:
             self.failure = failure
 
-    def _blamed(self, plan: GroupPlan, assignment: Mapping[int, int]) -> frozenset[int]:
-        """The roles that keep a group from being satisfied: one or two of them, if a part of it says so."""
-        for part in plan.parts:
-            if isinstance(self.decide(part, assignment), Refuted):
-                return frozenset(part.roles)
-        return frozenset(plan.roles)
-
     # --- the query paper's algorithm 1
 
     def _modular(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
@@ -294,7 +287,7 @@ class LabelSearch:
                     if answer is Consistency.NO:
                         # from now on its parts are looked at first
                         refuted.add(group.kind)
-                        return answer, self._blamed(group, assignment) if parts else roles
+                        return answer, roles
                     if answer is Consistency.UNKNOWN and not accept_unknown:
                         return Consistency.NO, roles
             return Consistency.YES, frozenset()
