@@ -323,7 +323,7 @@ class Ranked:
         if number == self.options.nothing:
             return self.cells(bounds)
         pieces = self.options.pieces_near(bounds, number)
-        return [FieldCell(piece.corners, heading, exact=True) for piece in pieces if self._is_meant(piece)]
+        return [FieldCell(piece.corners, heading) for piece in pieces if self._is_meant(piece)]
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every point with its option within the bounds."""
@@ -336,12 +336,12 @@ class Ranked:
     def _make_cells(self, bounds: Bounds) -> list[FieldCell]:
         options, scale = self.options, self.options.scale
         cells = [
-            FieldCell(piece.corners, piece.number / scale, exact=True)
+            FieldCell(piece.corners, piece.number / scale)
             for piece in options.pieces_near(bounds)
             if self._is_meant(piece)
         ]
         beside = options.outside(bounds)
-        return cells + [FieldCell(corners, options.nothing / scale, exact=True) for corners in beside]
+        return cells + [FieldCell(corners, options.nothing / scale) for corners in beside]
 
     def _is_meant(self, piece: Piece) -> bool:
         return piece.found[self.rank % len(piece.found)] == piece.number

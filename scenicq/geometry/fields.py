@@ -23,14 +23,13 @@ class FieldCell:
     Attributes:
         polygon: Corners in metres, counter-clockwise, shape (k, 2).
         heading: Radians.
-        exact: Whether the field allows `heading` at every inner point; if not, the cell covers too much.
-        guards: Of a cell that is not exact, which of its points are meant, if that is known: those that satisfy all.
+        guards: Which of its inner points are meant, those that satisfy all; at the others the field does not have
+            `heading`.
         bounds: The box around the polygon.
     """
 
     polygon: NDArray[np.float64]
     heading: float
-    exact: bool
     guards: tuple[Guard, ...] = ()
     bounds: Bounds = field(init=False)
 
@@ -40,12 +39,12 @@ class FieldCell:
         object.__setattr__(self, "bounds", (west, south, east, north))
 
     def part(self, bounds: Bounds) -> FieldCell | None:
-        """The same cell for points of a box only: fewer guards, exact if none is left; None if no point is meant."""
-        if self.exact or not self.guards:
+        """The same cell for points of a box only, with fewer guards; None if no point is meant."""
+        if not self.guards:
             return self
         look()
         left = narrowed(self.guards, bounds)
-        return None if left is None else FieldCell(self.polygon, self.heading, not left, left)
+        return None if left is None else FieldCell(self.polygon, self.heading, left)
 
 
 @runtime_checkable

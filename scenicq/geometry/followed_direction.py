@@ -147,7 +147,7 @@ class FollowedDirection(RoadDirection):
         found = self._cells_by_tile.get(tile)
         if found is None:
             parts = [part for area in self._free_in(tile) for part in convex_parts(area)]
-            found = self._cells_by_tile[tile] = [FieldCell(part, OFF_ROAD, exact=True) for part in parts]
+            found = self._cells_by_tile[tile] = [FieldCell(part, OFF_ROAD) for part in parts]
         return found
 
 

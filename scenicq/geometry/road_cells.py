@@ -62,7 +62,7 @@ def segment_cells(
         outlines = [piece.outline for piece in pieces if (not piece.rivals) == exact]
         guards = () if exact else (Nearer(segments[index][None], segments[rivals]),)
         for part in _joined(outlines):
-            cells.append(FieldCell(part, float(headings[index]), exact, guards))
+            cells.append(FieldCell(part, float(headings[index]), guards))
     return cells
 
 

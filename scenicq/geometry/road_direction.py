@@ -293,7 +293,7 @@ class RoadDirection:
             else:
                 guarded += self._guarded(square, near)
         plain = [(heading, box) for heading, squares in found_in.items() for box in joined_boxes(squares)]
-        return [FieldCell(_corners(box), heading, exact=True) for heading, box in plain] + guarded
+        return [FieldCell(_corners(box), heading) for heading, box in plain] + guarded
 
     @cached_property
     def _covered(self) -> dict[Bounds, bool]:
@@ -363,7 +363,7 @@ class RoadDirection:
             for heading, own in by_heading.items():
                 others = [index for key, indices in by_heading.items() if key != heading for index in indices]
                 guards = [*common, *([Nearer(segments[own], segments[others])] if others else [])]
-                cell = FieldCell(corners, heading, not guards, tuple(guards)).part(square)
+                cell = FieldCell(corners, heading, tuple(guards)).part(square)
                 if cell is not None:
                     cells.append(cell)
         return cells

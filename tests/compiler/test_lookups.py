@@ -194,7 +194,9 @@ def test_cells_hold_every_point_with_its_option(lookup: str) -> None:
                 assert -math.pi < value <= math.pi
                 here = [cell for shape, cell in cells if shape.distance(shapely.Point(x, y)) < 1e-9]
                 assert any(cell.heading == value for cell in here), (lookup, x, y)
-                assert all(cell.heading == value for cell in here if cell.exact and len(field.options.at(x, y)) == 1)
+                assert all(
+                    cell.heading == value for cell in here if not cell.guards and len(field.options.at(x, y)) == 1
+                )
 
 
 def test_what_is_found_is_what_the_map_says() -> None:

@@ -86,7 +86,7 @@ def test_cells_cover_the_field(field: RoadDirection, seed: int) -> None:
         for value in values:
             assert any(distance(cell.heading, value) < 1e-9 for cell in near), (point, value)
         for cell, shape in zip(cells, shapes, strict=True):
-            if cell.exact and shape.contains(here) and shape.exterior.distance(here) > 1e-6:
+            if not cell.guards and shape.contains(here) and shape.exterior.distance(here) > 1e-6:
                 assert any(distance(cell.heading, value) < 1e-9 for value in values), (point, cell)
 
 
@@ -95,7 +95,6 @@ def test_cells_cover_the_field(field: RoadDirection, seed: int) -> None:
 def test_guards_say_which_points_of_a_cell_are_meant(field: RoadDirection, seed: int) -> None:
     cells = field.cells((-16.0, -16.0, 16.0, 16.0))
     shapes = [Polygon(cell.polygon) for cell in cells]
-    assert all(cell.exact == (not cell.guards) for cell in cells)
     beside = [(dx, dy) for dx in (-1e-5, 0.0, 1e-5) for dy in (-1e-5, 0.0, 1e-5)]
     for x, y in np.random.default_rng(seed).uniform(-16, 16, (40, 2)).tolist():
         values, *others = field.values_many(np.array([(x + dx, y + dy) for dx, dy in beside]))
@@ -107,7 +106,7 @@ def test_guards_say_which_points_of_a_cell_are_meant(field: RoadDirection, seed:
             box = (x - half, y - half, x + half, y + half)
             meant = [part.heading for cell in holding if (part := cell.part(box)) is not None]
             assert all(any(distance(heading, value) < 1e-9 for heading in meant) for value in values), (x, y, half)
-            sure = [part.heading for cell in holding if (part := cell.part(box)) is not None and part.exact]
+            sure = [part.heading for cell in holding if (part := cell.part(box)) is not None and not part.guards]
             for heading in meant if half == 0.0 else sure:
                 assert any(distance(heading, value) < 1e-9 for value in values), (x, y, half, heading)
 

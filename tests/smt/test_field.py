@@ -36,7 +36,7 @@ def test_the_formula_allows_what_the_field_allows() -> None:
     for name, field in FIELDS.items():
         limits = (-WIDE, -WIDE, WIDE, WIDE)
         cells = field_cells(field, (Var("x"), Var("y")), limits)
-        guarded = [cell for cell in field.cells(limits) if not cell.exact]
+        guarded = [cell for cell in field.cells(limits) if cell.guards]
         curved = 0
         for x, y in rng.uniform(-WIDE, WIDE, (25, 2)).tolist():
             around = field.values_many(np.array([(x, y), (x + 1e-4, y), (x, y + 1e-4), (x - 1e-4, y), (x, y - 1e-4)]))

@@ -22,6 +22,7 @@ from scenicq.geometry.cell_guards import half_planes
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds
+from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.linear.affine_forms import Affine, AffineVector, affine_scalar, affine_vector
 from scenicq.match.linear.linear_program import NotLinear, Row
@@ -45,7 +46,7 @@ class HeadingAssignment:
     """A part with all its directions chosen.
 
     Attributes:
-        case: The case that it was made of.
+        network: The group's constraints as they were.
         items: Its constraints with these directions, affine.
         places: The points of its fields.
         cells: For each of them where a border may matter, the cells that it may lie in.
@@ -54,10 +55,9 @@ class HeadingAssignment:
         limits: Where the number can be that it shares with other parts.
         middles: A value for each random variable, should nothing be said of it.
         exact: Whether it has no solution where its linear program has none.
-        vague: The points of fields, no heading pinned, of which cells cover places where the field points otherwise.
     """
 
-    case: BoxSet
+    network: ConstraintNetwork
     items: list[Item]
     places: list[Node]
     cells: list[Alternative]
@@ -66,7 +66,6 @@ class HeadingAssignment:
     limits: FloatInterval
     middles: Mapping[Identity, Value]
     exact: bool
-    vague: list[Node]
 
 
 def solved(
@@ -80,7 +79,7 @@ def solved(
         known: Values that some of its random numbers are to have.
     """
     fixed = [Row(Affine(0.0, {(key, 0): 1.0}), value, value) for key, value in known.items()]
-    items = list(way.case.network.items)
+    items = list(way.network.items)
     open_ended = Undecided(items[0][0], "nonlinear")
     values: dict[Identity, Value] = {**way.middles, **way.given}
     # a solution on the border of two cells may count to the other one: the second time it keeps away from borders
@@ -150,12 +149,12 @@ def assignment_of(cases: BoxSet, number: int, shared: Identity | None) -> Headin
     # most cases fail here, where no expression is rewritten yet
     pointing: list[tuple[DirectionAt, Bounds, list[FieldCell]]] = []
     for node in network.choices:
-        near = None if isinstance(node, Index) else _cells(cases, number, node)
-        if near is None or isinstance(node, Index):
+        if isinstance(node, Index):
             continue
-        if not near[1]:
+        box, near = _cells(cases, number, node)
+        if not near:
             return None
-        pointing.append((node, *near))
+        pointing.append((node, box, near))
     items = conditioned(network.items, given, memo=memo)
     if any(isinstance(node, Constant) and not holds(c, node.value, seen, network.tolerance) for c, node, seen in items):
         return None
@@ -166,22 +165,18 @@ def assignment_of(cases: BoxSet, number: int, shared: Identity | None) -> Headin
         (c, condition(node, {}, None, pinned) if isinstance(seen, tuple) else node, seen) for c, node, seen in items
     ]
     places: list[Node] = []
-    vague: list[Node] = []
     for node, box, near in pointing:
         point = condition(node.point, {}, given, memo)
         place = condition(point, {}, None, pinned)
         form = affine_vector(place)
         places.append(place)
         cells.append([[]] if form is None else [_within(form, cell, box) for cell in near])
-        if form is None or not all(cell.exact for cell in near):
-            vague.append(point)
     limits = (-math.inf, math.inf)
     if shared in network.leaves:
         low, high = cases.ranges[shared][:, number].tolist()
         limits = (low, high)
     middles = {identity: _middle(leaf, cases, number) for identity, leaf in network.leaves.items()}
-    case = cases.take(np.array([number]))
-    return HeadingAssignment(case, straight, places, cells, given, headings, limits, middles, exact, vague)
+    return HeadingAssignment(network, straight, places, cells, given, headings, limits, middles, exact)
 
 
 def _is_affine(node: Node, seen: Value) -> bool:
@@ -204,8 +199,8 @@ def _pinned(cases: BoxSet, number: int, items: list[Item], cells: list[Alternati
     return pinned
 
 
-def _cells(cases: BoxSet, number: int, node: DirectionAt) -> tuple[Bounds, list[FieldCell]] | None:
-    """The box of a field's point and where in it the field points as chosen; None if it does in all of it."""
+def _cells(cases: BoxSet, number: int, node: DirectionAt) -> tuple[Bounds, list[FieldCell]]:
+    """The box of a field's point and where in it the field points as chosen."""
     (x0, x1), (y0, y1) = cases.place(node)[:, :, number].tolist()
     box = (x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN)
     heading = float(cases.chosen[id(node)][:, number].mean())
@@ -213,20 +208,16 @@ def _cells(cases: BoxSet, number: int, node: DirectionAt) -> tuple[Bounds, list[
     key, known = (id(node), heading, box), cases.network.cells
     if key not in known:
         known[key] = _cells_in(cast(VectorField, cast(Constant, node.field).value), heading, box)
-    found = known[key]
-    return None if found is None else (box, found)
+    return box, known[key]
 
 
-def _cells_in(field: VectorField, heading: float, box: Bounds) -> list[FieldCell] | None:
-    """Where in a box a field may have a heading; None if it has it in all of the box."""
+def _cells_in(field: VectorField, heading: float, box: Bounds) -> list[FieldCell]:
+    """Where in a box a field may have a heading."""
     found: list[FieldCell] = []
     for whole in field.cells_of(heading, box) if isinstance(field, Ranked | RoadDirection) else field.cells(box):
         cell = whole.part(box) if abs(whole.heading - heading) <= SAME and _meets(whole, box) else None
-        if cell is None:
-            continue
-        if cell.exact and _covers(cell, box):
-            return None
-        found.append(cell)
+        if cell is not None:
+            found.append(cell)
     return found
 
 
@@ -248,13 +239,3 @@ def _middle(leaf: Leaf, cases: BoxSet, number: int) -> Value:
 def _meets(cell: FieldCell, box: Bounds) -> bool:
     west, south, east, north = cell.bounds
     return west <= box[2] and east >= box[0] and south <= box[3] and north >= box[1]
-
-
-def _covers(cell: FieldCell, box: Bounds) -> bool:
-    """Whether a cell holds all corners of a box."""
-    west, south, east, north = box
-    corners = np.array([(west, south), (east, south), (east, north), (west, north)])
-    start, end = cell.polygon, np.roll(cell.polygon, -1, axis=0)
-    along = end - start
-    off = corners[:, None] - start[None]
-    return bool((along[:, 0] * off[..., 1] - along[:, 1] * off[..., 0] >= 0).all())

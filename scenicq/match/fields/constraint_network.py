@@ -53,7 +53,7 @@ class ConstraintNetwork:
         return found
 
     @cached_property
-    def cells(self) -> dict[tuple[int, float, Bounds], list[FieldCell] | None]:
+    def cells(self) -> dict[tuple[int, float, Bounds], list[FieldCell]]:
         """Cells found so far, by the id of the use of a field, its heading in radians and the box of its point."""
         return {}
 

@@ -76,14 +76,12 @@ class BoxSet:
         ranges: Where each random number or point can be.
         chosen: For each choice that was made, by the node's id, the number of the option (n,), or of a field the range
             of headings (2, n).
-        asked: By the id of a field's use, how large the box of its point was when its headings were last looked up.
     """
 
     network: ConstraintNetwork
     size: int
     ranges: dict[Identity, Enclosure]
     chosen: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
-    asked: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
     _bounds: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
     _turns: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
 
@@ -120,7 +118,6 @@ class BoxSet:
             len(cases),
             {key: value[..., cases] for key, value in self.ranges.items()},
             {key: value[..., cases] for key, value in self.chosen.items()},
-            {key: value[cases] for key, value in self.asked.items()},
             {key: value[..., cases] for key, value in self._bounds.items()},
             {key: value[..., cases] for key, value in self._turns.items()},
         )
@@ -133,18 +130,14 @@ class BoxSet:
         """The bounds of a number, (2, n), after narrowing."""
         return self._scalar(node)
 
-    def keep(self, node: Node, limits: Enclosure) -> None:
-        """Leave of the bounds of a node what some others have in common with them."""
-        self._meet(node, limits)
-
     def those(self, wanted: NDArray[np.bool_]) -> BoxSet:
         """The cases that a mask (n,) names."""
         return self if wanted.all() else self.take(np.nonzero(wanted)[0])
 
-    def narrowed(self, passes: int = _PASSES) -> BoxSet:
-        """The cases of which something is left, over narrower ranges, after so many passes at most."""
+    def narrowed(self) -> BoxSet:
+        """The cases of which something is left, over narrower ranges."""
         branches = self
-        for _ in range(passes):
+        for _ in range(_PASSES):
             # most cases that are none miss what the label observes from the start
             branches._upward()
             branches = branches.those(~branches._lost())

@@ -31,26 +31,14 @@ _MOST_CASES = 100_000
 """Cases of one part that are looked at."""
 _FAR = 60.0
 """Metres: where a point may be farther about than this, a number that it hangs on is divided before directions are."""
-_PASSES = 12
-"""Times that places and headings narrow each other at most."""
-_BEFORE_HEADINGS = 2
-"""Passes over the places before headings are looked up anew, which narrows more than further passes do."""
-_WORTH = 0.8
-"""A share of the range of headings, or of the place of a point, above which nothing is gained by looking again."""
 _POINT = 1.5e-9
 """Radians that the headings of one direction may be apart, being rounded."""
 _PIECES = 4
 """Ranges into which the headings of a bend are parted."""
-_SOME = 64
-"""Numbers of options between which a number may be for their areas to be looked at."""
-_ALMOST = 1e-3
-"""By how much a number of an option may be off by rounding."""
 _FINEST = 1e-5
 """Width of a range that is not divided any more."""
 _LONG = 1.0
 """Width of a range of numbers that is divided before directions are, where these are many."""
-_PARTS = 8
-"""Parts into which it is divided at once, at most."""
 
 
 class LimitError(Exception):
@@ -86,16 +74,11 @@ def directed(start: BoxSet, soon: int = _MOST_CASES) -> Iterator[BoxSet]:
 
 
 def propagated(cases: BoxSet) -> BoxSet:
-    """The cases of which something is left, narrowed until places and headings do not narrow each other any more."""
-    for _ in range(_PASSES):
-        cases = _placed(cases.narrowed(_BEFORE_HEADINGS))
-        gained = False
-        for node in cases.network.choices:
-            if isinstance(node, DirectionAt) and cases.size:
-                cases, less = _turned(cases, node)
-                gained = gained or less
-        if not gained or not cases.size:
-            break
+    """The cases of which something is left, their places narrowed and then their headings."""
+    cases = _placed(cases.narrowed())
+    for node in cases.network.choices:
+        if isinstance(node, DirectionAt) and cases.size:
+            cases = _turned(cases, node)
     return cases
 
 
@@ -112,7 +95,7 @@ def bisected(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
     found = _widest(cases, below)
     if found is None or found[0] <= _FINEST:
         raise LimitError
-    return _divided(cases, *found[1:], 2)
+    return _halves(cases, *found[1:])
 
 
 def _widest(cases: BoxSet, below: Sequence[Leaf]) -> tuple[float, Identity, int] | None:
@@ -127,17 +110,15 @@ def _widest(cases: BoxSet, below: Sequence[Leaf]) -> tuple[float, Identity, int]
     return widest
 
 
-def _divided(cases: BoxSet, identity: Identity, axis: int, count: int) -> list[BoxSet]:
-    """The cases over each of some equal parts of a range."""
+def _halves(cases: BoxSet, identity: Identity, axis: int) -> list[BoxSet]:
+    """The cases over either half of a range."""
     found: list[BoxSet] = []
-    most = max(1, _AT_ONCE // count)
-    for first in range(0, cases.size, most):
-        some = np.arange(first, min(first + most, cases.size))
-        parts = cases.take(np.tile(some, count))
+    for first in range(0, cases.size, _AT_ONCE // 2):
+        some = np.arange(first, min(first + _AT_ONCE // 2, cases.size))
+        parts = cases.take(np.tile(some, 2))
         ends = parts.ranges[identity].reshape(-1, 2, parts.size)[axis]
-        share = np.repeat(np.arange(count), len(some))
-        low, width = ends[0].copy(), (ends[1] - ends[0]) / count
-        ends[0], ends[1] = low + share * width, np.where(share == count - 1, ends[1], low + (share + 1) * width)
+        middle = ends.mean(axis=0)
+        ends[1, : len(some)], ends[0, len(some) :] = middle[: len(some)], middle[len(some) :]
         found.append(parts)
     return found
 
@@ -149,60 +130,26 @@ def _placed(cases: BoxSet) -> BoxSet:
         if not (isinstance(region, PolygonSet | PolylineSet | PointSet) and cases.size):
             continue
         place = cases.ranges[identity]
-        size = np.hypot(*(place[:, 1] - place[:, 0]))
-        before = cases.asked.get(id(identity), np.full(cases.size, np.inf))
-        if not np.isfinite(size).all() or (size > _WORTH * before).all():
+        if not np.isfinite(place).all():
             continue
         boxes = np.concatenate([place[:, 0] - MARGIN, place[:, 1] + MARGIN]).T
         held = np.zeros(cases.size, dtype=bool)
         held[shapes.tree_pairs_within(region.tree, shapes.boxes(boxes), SLACK)[0]] = True
-        cases = cases.take(np.nonzero(held)[0])
-        cases.asked[id(identity)] = size[held]
+        cases = cases.those(held)
     return cases
 
 
-def _turned(cases: BoxSet, node: DirectionAt) -> tuple[BoxSet, bool]:
-    """The cases in which a field has a heading, its range the least that holds them all; whether that narrowed any."""
-    field = cast(Constant, node.field).value
-    if isinstance(field, Ranked):
-        cases = _occupied(cases, node, field)
-    size = _extent(cases, node)
-    before = cases.asked.get(id(node), np.full(cases.size, np.inf))
-    less = np.nonzero(size <= _WORTH * before)[0]
-    if size.max() > _FAR or not len(less):
-        return cases, False
-    owner, heading = _headings(cases, node, less)
-    known = cases.chosen.get(id(node), np.broadcast_to([[-np.inf], [np.inf]], (2, cases.size)))
-    found = known.copy()
-    found[0, less], found[1, less] = np.inf, -np.inf
+def _turned(cases: BoxSet, node: DirectionAt) -> BoxSet:
+    """The cases in which a field has a heading, with the range of all it has; large places are left alone."""
+    if _extent(cases, node).max() > _FAR:
+        return cases
+    owner, heading = _headings(cases, node)
+    found = np.tile([[np.inf], [-np.inf]], cases.size)
     np.minimum.at(found[0], owner, heading)
     np.maximum.at(found[1], owner, heading)
-    gained = bool((np.ptp(found, axis=0) < _WORTH * np.ptp(known, axis=0) - _POINT).any())
     cases = cases.take(np.arange(cases.size))
-    cases.chosen[id(node)], cases.asked[id(node)] = found, np.where(size <= _WORTH * before, size, before)
-    return cases.those(found[0] <= found[1]), gained
-
-
-def _occupied(cases: BoxSet, node: DirectionAt, field: Ranked) -> BoxSet:
-    """The cases in which a point is kept near the areas that may be found at it, as far as these are few."""
-    options = field.options
-    first, last = cases.value(node) * options.scale
-    first = np.clip(np.ceil(first - _ALMOST), 0, options.nothing).astype(int)
-    last = np.clip(np.floor(last + _ALMOST), 0, options.nothing).astype(int)
-    if not cases.size or (last - first).max() > _SOME:
-        return cases
-    boxes = np.stack([_hull(options.extents[low : high + 1]) for low, high in zip(first, last, strict=True)], axis=-1)
-    cases = cases.take(np.arange(cases.size))
-    cases.keep(node.point, np.stack([boxes[[0, 2]], boxes[[1, 3]]]))
-    if id(node) not in cases.chosen and (first == last).all():
-        # what is found there is known however large the area is
-        cases.chosen[id(node)] = np.stack([first, last]) / options.scale
-    return cases
-
-
-def _hull(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The box around boxes (n, 4); of none an empty one."""
-    return np.concatenate([boxes[:, :2].min(axis=0, initial=np.inf), boxes[:, 2:].max(axis=0, initial=-np.inf)])
+    cases.chosen[id(node)] = found
+    return cases.those(found[0] <= found[1])
 
 
 def _parted(cases: BoxSet) -> list[BoxSet] | None:
@@ -224,7 +171,7 @@ def _parted(cases: BoxSet) -> list[BoxSet] | None:
         # over less of the way that random numbers allow there are fewer directions
         found = _widest(cases, [leaf for leaf in leaves(node) if not isinstance(leaf, PointIn)])
         if found is not None and found[0] > _LONG:
-            return _divided(cases, *found[1:], min(_PARTS, math.ceil(found[0] / _LONG)))
+            return _halves(cases, *found[1:])
     return _split(cases, node, owner, ranges)
 
 
@@ -239,12 +186,11 @@ def _extent(cases: BoxSet, node: DirectionAt) -> NDArray[np.float64]:
     return np.hypot(*(place[:, 1] - place[:, 0]))
 
 
-def _headings(cases: BoxSet, node: DirectionAt, some: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Pairs (case, heading) of some cases: all that a field may have where its point can be, if it is not excluded."""
-    place = cases.place(node)[..., some]
+def _headings(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Pairs (case, heading): all that a field may have where its point can be, if it is not excluded."""
+    place = cases.place(node)
     boxes = np.concatenate([place[:, 0] - MARGIN, place[:, 1] + MARGIN]).T
     owner, heading = cast(VectorField, cast(Constant, node.field).value).headings(boxes)
-    owner = some[owner]
     low, high = cases.value(node)
     kept = (heading >= low[owner] - SAME) & (heading <= high[owner] + SAME)
     return owner[kept], heading[kept]
@@ -252,7 +198,7 @@ def _headings(cases: BoxSet, node: DirectionAt, some: NDArray[np.intp]) -> tuple
 
 def _pieces(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Pairs (case, range of headings), the ranges (2, m): the directions that a field may have in parts."""
-    owner, heading = _headings(cases, node, np.arange(cases.size))
+    owner, heading = _headings(cases, node)
     order = np.lexsort((heading, owner))
     owner, heading = owner[order], heading[order]
     first = np.diff(owner, prepend=-1) > 0

@@ -7,7 +7,7 @@ one after the other, not of all combinations of their ways.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from scenicq.forest.bounds import FloatInterval
@@ -42,7 +42,6 @@ def find_shared_value(
     parts: Sequence[Sequence[HeadingAssignment]],
     shared: Identity,
     tolerance: Tolerance,
-    divided: Callable[[HeadingAssignment], list[HeadingAssignment] | None],
 ) -> Outcome:
     """Decide parts that share a random number; `Undecided` where that takes too long or cannot be told.
 
@@ -50,9 +49,8 @@ def find_shared_value(
         parts: Of each part the ways.
         shared: The number.
         tolerance: Per feature.
-        divided: Makes ways of one over smaller ranges that have all of its solutions; None where that is no use.
     """
-    first = parts[0][0].case.network.items[0][0]
+    first = parts[0][0].network.items[0][0]
     stretches = [[_Stretch(way, *way.limits) for way in ways] for ways in parts]
     sure = True
     tried: dict[int, tuple[float, Satisfied, HeadingAssignment]] = {}
@@ -67,12 +65,12 @@ def find_shared_value(
             if part in tried and tried[part][0] == value:
                 continue
             fitting = [stretch for stretch in stretches[part] if stretch.holds(value)]
-            found = _first(fitting, shared, value, tolerance)
-            if found is not None:
-                tried[part] = (value, *found)
+            outcomes = _until_satisfied(fitting, shared, value, tolerance)
+            if outcomes and isinstance(outcomes[-1], Satisfied):
+                tried[part] = (value, outcomes[-1], fitting[len(outcomes) - 1].way)
                 continue
-            for stretch in fitting:
-                less, complete = _sharper(stretch, shared, value, tolerance, divided)
+            for stretch, outcome in zip(fitting, outcomes, strict=True):
+                less, complete = _sharper(stretch, shared, value, tolerance, outcome)
                 at = stretches[part].index(stretch)
                 stretches[part][at : at + 1] = less
                 sure = sure and complete
@@ -108,22 +106,20 @@ def _common(parts: Sequence[Sequence[_Stretch]]) -> list[FloatInterval]:
     return common or []
 
 
-def _first(
+def _until_satisfied(
     stretches: Sequence[_Stretch], shared: Identity, value: float, tolerance: Tolerance
-) -> tuple[Satisfied, HeadingAssignment] | None:
+) -> list[Outcome]:
+    """What comes of a value in each stretch, up to the first in which it is part of a solution."""
+    found: list[Outcome] = []
     for stretch in stretches:
-        found = solved(stretch.way, tolerance, {shared: value})
-        if isinstance(found, Satisfied):
-            return found, stretch.way
-    return None
+        found.append(solved(stretch.way, tolerance, {shared: value}))
+        if isinstance(found[-1], Satisfied):
+            break
+    return found
 
 
 def _sharper(
-    stretch: _Stretch,
-    shared: Identity,
-    value: float,
-    tolerance: Tolerance,
-    divided: Callable[[HeadingAssignment], list[HeadingAssignment] | None],
+    stretch: _Stretch, shared: Identity, value: float, tolerance: Tolerance, outcome: Outcome
 ) -> tuple[list[_Stretch], bool]:
     """What is left of a stretch in which a value fails, and whether that is all for sure."""
     way = stretch.way
@@ -134,13 +130,11 @@ def _sharper(
         less = replace(stretch, low=ends[0], high=ends[1], tight=True)
         if not less.holds(value) or ends[1] - ends[0] < stretch.high - stretch.low - _FINEST:
             return [less], way.exact
-    ways = divided(way) if way.vague else None
-    if ways is not None:
-        return [_Stretch(each, *each.limits) for each in ways], True
     if stretch.high - stretch.low <= _FINEST:
         return [], False
-    sides = [(stretch.low, value), (value, stretch.high)]
-    return [_Stretch(way, low, high) for low, high in sides if high - low > _FINEST], False
+    # there may be solutions on either side of a gap between cells
+    sides = [_Stretch(way, stretch.low, value), _Stretch(way, value, stretch.high)]
+    return sides, isinstance(outcome, Refuted)
 
 
 def _all(
@@ -152,6 +146,6 @@ def _all(
         values |= outcome.values
         headings |= way.headings
     values[shared] = value
-    items = [item for _, way in found for item in way.case.network.items]
+    items = [item for _, way in found for item in way.network.items]
     good = replay(items, values, tolerance, SLACK, headings)
     return Satisfied(values) if good else Undecided(items[0][0], "nonlinear")

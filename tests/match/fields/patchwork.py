@@ -21,20 +21,20 @@ HEADINGS = (0.2, 0.9, 1.7, -0.7)
 
 @dataclass(frozen=True, eq=False)
 class Patchwork:
-    """Tiles in rows from the origin; over more than one of them it gives cells of four tiles, which cover too much."""
+    """Tiles in rows from the origin."""
 
     tiles: np.ndarray
     name: str = "patchwork"
 
-    def near(self, west, south, east, north, side=SIDE):
-        """The squares of a side that meet a box: their corners."""
-        columns, rows = (int(count * SIDE / side) for count in self.tiles.shape)
+    def near(self, west, south, east, north):
+        """The tiles that meet a box: their corners."""
+        columns, rows = self.tiles.shape
         return [
-            (column * side, row * side)
+            (column * SIDE, row * SIDE)
             for column in range(columns)
             for row in range(rows)
-            if column * side <= east and west <= (column + 1) * side
-            if row * side <= north and south <= (row + 1) * side
+            if column * SIDE <= east and west <= (column + 1) * SIDE
+            if row * SIDE <= north and south <= (row + 1) * SIDE
         ]
 
     def at(self, x, y):
@@ -47,14 +47,8 @@ class Patchwork:
         return [self.values(*each) for each in xy.tolist()]
 
     def cells(self, bounds):
-        west, south, east, north = bounds
-        side = SIDE if max(east - west, north - south) < SIDE else 2 * SIDE
-        found = []
-        for x, y in self.near(*bounds, side):
-            square = np.array([(x, y), (x + side, y), (x + side, y + side), (x, y + side)])
-            inside = {self.at(*each) for each in self.near(x + 0.1, y + 0.1, x + side - 0.1, y + side - 0.1)}
-            found += [FieldCell(square, heading, len(inside) == 1) for heading in sorted(inside)]
-        return found
+        sides = [(0, 0), (SIDE, 0), (SIDE, SIDE), (0, SIDE)]
+        return [FieldCell(np.add(corner, sides), self.at(*corner)) for corner in self.near(*bounds)]
 
     def headings(self, boxes):
         pairs = [

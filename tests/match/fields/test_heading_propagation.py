@@ -46,7 +46,7 @@ def label(x, y, heading, ahead=2.0):
 def beyond_borders(count):
     """Points of a guarded cell that lie on the wrong side of its border, with the heading of the cell."""
     rng, found = random.Random(7), []
-    cells = [cell for cell in FIELD.cells((-9, -6, 9, 9)) if not cell.exact]
+    cells = [cell for cell in FIELD.cells((-9, -6, 9, 9)) if cell.guards]
     while len(found) < count:
         cell = rng.choice(cells)
         weights = np.array([rng.random() ** 2 for _ in cell.polygon])
