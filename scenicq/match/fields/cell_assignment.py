@@ -22,7 +22,6 @@ from scenicq.geometry.cell_guards import half_planes
 from scenicq.geometry.fields import FieldCell, VectorField
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds
-from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.linear.affine_forms import Affine, AffineVector, affine_scalar, affine_vector
 from scenicq.match.linear.linear_program import NotLinear, Row
@@ -46,7 +45,7 @@ class HeadingAssignment:
     """A part with all its directions chosen.
 
     Attributes:
-        network: The group's constraints as they were.
+        case: The case that it was made of.
         items: Its constraints with these directions, affine.
         places: The points of its fields.
         cells: For each of them where a border may matter, the cells that it may lie in.
@@ -55,9 +54,10 @@ class HeadingAssignment:
         limits: Where the number can be that it shares with other parts.
         middles: A value for each random variable, should nothing be said of it.
         exact: Whether it has no solution where its linear program has none.
+        vague: The points of fields, no heading pinned, of which cells cover places where the field points otherwise.
     """
 
-    network: ConstraintNetwork
+    case: BoxSet
     items: list[Item]
     places: list[Node]
     cells: list[Alternative]
@@ -66,6 +66,7 @@ class HeadingAssignment:
     limits: FloatInterval
     middles: Mapping[Identity, Value]
     exact: bool
+    vague: list[Node]
 
 
 def solved(
@@ -79,7 +80,7 @@ def solved(
         known: Values that some of its random numbers are to have.
     """
     fixed = [Row(Affine(0.0, {(key, 0): 1.0}), value, value) for key, value in known.items()]
-    items = list(way.network.items)
+    items = list(way.case.network.items)
     open_ended = Undecided(items[0][0], "nonlinear")
     values: dict[Identity, Value] = {**way.middles, **way.given}
     # a solution on the border of two cells may count to the other one: the second time it keeps away from borders
@@ -165,18 +166,22 @@ def assignment_of(cases: BoxSet, number: int, shared: Identity | None) -> Headin
         (c, condition(node, {}, None, pinned) if isinstance(seen, tuple) else node, seen) for c, node, seen in items
     ]
     places: list[Node] = []
+    vague: list[Node] = []
     for node, box, near in pointing:
         point = condition(node.point, {}, given, memo)
         place = condition(point, {}, None, pinned)
         form = affine_vector(place)
         places.append(place)
         cells.append([[]] if form is None else [_within(form, cell, box) for cell in near])
+        if form is None or any(cell.guards for cell in near):
+            vague.append(point)
     limits = (-math.inf, math.inf)
     if shared in network.leaves:
         low, high = cases.ranges[shared][:, number].tolist()
         limits = (low, high)
+    case = cases.take(np.array([number]))
     middles = {identity: _middle(leaf, cases, number) for identity, leaf in network.leaves.items()}
-    return HeadingAssignment(network, straight, places, cells, given, headings, limits, middles, exact)
+    return HeadingAssignment(case, straight, places, cells, given, headings, limits, middles, exact, vague)
 
 
 def _is_affine(node: Node, seen: Value) -> bool:

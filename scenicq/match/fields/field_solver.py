@@ -7,6 +7,7 @@ these the directions are known, so that the rest is a linear program with one ma
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -18,7 +19,7 @@ from scenicq.forest.walk import leaves
 from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_of, solved
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
-from scenicq.match.fields.heading_propagation import LimitError, directed
+from scenicq.match.fields.heading_propagation import LimitError, bisected, directed, propagated
 from scenicq.match.fields.probing import MUCH, probed
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.problem.conditioned import Item, conditioned
@@ -31,6 +32,8 @@ _MOST_WAYS = 256
 """Ways of one part that are put to the linear program."""
 _MANY_CASES = 128
 """Cases of one part after which a witness is looked for by more draws than at first."""
+_MOST_HALVES = 64
+"""Ways of one part that are divided."""
 _CLOSE = 0.05
 """How far from the answer of a solver a solution is looked for."""
 
@@ -70,7 +73,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     ways = [_ways(found, shared) for found in chosen]
     if not all(ways):
         return Refuted(first)
-    found = find_shared_value(ways, shared, tolerance)
+    found = find_shared_value(ways, shared, tolerance, lambda way: _divided(way, shared))
     choices = [id(node) for network in networks for node in network.choices]
     if isinstance(found, Undecided) and len(set(choices)) < len(choices):
         # fields that several parts ask for at one point have one direction there
@@ -88,8 +91,9 @@ def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:
 
 
 def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
-    """What comes of the ways of one part."""
-    doubt, sure = Undecided(first, "nonlinear"), True
+    """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
+    todo: deque[HeadingAssignment] = deque()
+    doubt = Undecided(first, "nonlinear")
     try:
         for number, way in enumerate(_one_by_one(directed(start, _MANY_CASES))):
             found = _tried(start, tolerance) if way is None else solved(way, tolerance)
@@ -97,16 +101,38 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
                 return found
             if number == _MOST_WAYS:
                 return doubt
-            sure = sure and not isinstance(found, Undecided)
+            if isinstance(found, Undecided) and way is not None:
+                todo.append(way)
     except LimitError:
         return doubt
-    return Refuted(first) if sure else doubt
+    for _ in range(_MOST_HALVES):
+        if not todo:
+            return Refuted(first)
+        less = _divided(todo.popleft(), None) if todo[0].vague else None
+        if less is None:
+            break
+        for way in less:
+            found = solved(way, tolerance)
+            if isinstance(found, Satisfied):
+                return found
+            if isinstance(found, Undecided):
+                todo.append(way)
+    return doubt
 
 
 def _tried(start: BoxSet, tolerance: Tolerance) -> Satisfied | None:
     """A witness of one part by more draws than at first."""
     narrowed = start.narrowed()
     return probed(narrowed, tolerance, MUCH) if narrowed.size else None
+
+
+def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAssignment] | None:
+    """What is left of a way in cells that cover too much over either half of the widest range that matters there."""
+    try:
+        halves = [propagated(half) for half in bisected(way.case, leaves(*way.vague))]
+    except LimitError:
+        return None
+    return _ways([half for half in halves if half.size], shared)
 
 
 def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: Tolerance) -> Satisfied | None:
@@ -152,6 +178,6 @@ def _within(found: Sequence[BoxSet], shared: Identity, limits: Sequence[FloatInt
 
 
 def _ways(found: Sequence[BoxSet], shared: Identity | None) -> list[HeadingAssignment]:
-    """The cases as constraints."""
-    ways = (assignment_of(cases, number, shared) for cases in found for number in range(cases.size))
-    return [way for way in ways if way is not None]
+    """The cases as constraints, those first in which a linear program tells all."""
+    ways = [assignment_of(cases, number, shared) for cases in found for number in range(cases.size)]
+    return sorted((way for way in ways if way is not None), key=lambda way: bool(way.vague))

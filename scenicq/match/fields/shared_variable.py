@@ -7,7 +7,7 @@ one after the other, not of all combinations of their ways.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from scenicq.forest.bounds import FloatInterval
@@ -42,6 +42,7 @@ def find_shared_value(
     parts: Sequence[Sequence[HeadingAssignment]],
     shared: Identity,
     tolerance: Tolerance,
+    divided: Callable[[HeadingAssignment], list[HeadingAssignment] | None],
 ) -> Outcome:
     """Decide parts that share a random number; `Undecided` where that takes too long or cannot be told.
 
@@ -49,8 +50,9 @@ def find_shared_value(
         parts: Of each part the ways.
         shared: The number.
         tolerance: Per feature.
+        divided: Makes ways of one over smaller ranges that have all of its solutions; None where that is no use.
     """
-    first = parts[0][0].network.items[0][0]
+    first = parts[0][0].case.network.items[0][0]
     stretches = [[_Stretch(way, *way.limits) for way in ways] for ways in parts]
     sure = True
     tried: dict[int, tuple[float, Satisfied, HeadingAssignment]] = {}
@@ -70,7 +72,7 @@ def find_shared_value(
                 tried[part] = (value, outcomes[-1], fitting[len(outcomes) - 1].way)
                 continue
             for stretch, outcome in zip(fitting, outcomes, strict=True):
-                less, complete = _sharper(stretch, shared, value, tolerance, outcome)
+                less, complete = _sharper(stretch, shared, value, tolerance, outcome, divided)
                 at = stretches[part].index(stretch)
                 stretches[part][at : at + 1] = less
                 sure = sure and complete
@@ -119,7 +121,12 @@ def _until_satisfied(
 
 
 def _sharper(
-    stretch: _Stretch, shared: Identity, value: float, tolerance: Tolerance, outcome: Outcome
+    stretch: _Stretch,
+    shared: Identity,
+    value: float,
+    tolerance: Tolerance,
+    outcome: Outcome,
+    divided: Callable[[HeadingAssignment], list[HeadingAssignment] | None],
 ) -> tuple[list[_Stretch], bool]:
     """What is left of a stretch in which a value fails, and whether that is all for sure."""
     way = stretch.way
@@ -130,6 +137,9 @@ def _sharper(
         less = replace(stretch, low=ends[0], high=ends[1], tight=True)
         if not less.holds(value) or ends[1] - ends[0] < stretch.high - stretch.low - _FINEST:
             return [less], way.exact
+    ways = divided(way) if way.vague else None
+    if ways is not None:
+        return [_Stretch(each, *each.limits) for each in ways], True
     if stretch.high - stretch.low <= _FINEST:
         return [], False
     # there may be solutions on either side of a gap between cells
@@ -146,6 +156,6 @@ def _all(
         values |= outcome.values
         headings |= way.headings
     values[shared] = value
-    items = [item for _, way in found for item in way.network.items]
+    items = [item for _, way in found for item in way.case.network.items]
     good = replay(items, values, tolerance, SLACK, headings)
     return Satisfied(values) if good else Undecided(items[0][0], "nonlinear")

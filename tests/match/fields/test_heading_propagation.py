@@ -108,12 +108,14 @@ def test_the_cell_across_the_border_counts_where_the_tolerance_reaches_it(offset
         assert isinstance(verdict, Match if near else NoMatch), (offset, heading, verdict)
 
 
-@pytest.mark.parametrize("offset", [-0.02, -0.0101, -0.0099, 0.0, 0.0099, 0.0101, 0.02])
-def test_a_curved_border_is_told_without_a_solver_however_close(offset):
-    # between a line and a point the border is a parabola, which no cell follows: here at (3.125, -2) across (0.8, 0.6)
+def gap():
+    """A road whose border between directions, between a line and a point, is a parabola, which no cell follows.
+
+    At (3.125, -2) it goes across (0.8, 0.6).
+    """
     lines = [[(0.0, -9.0), (0.0, 0.0)], [(4.0, 1.0), (20.0, 1.0)]]
     area = box(-9, -9, 20, 9)
-    road = Network(
+    return Network(
         "gap",
         [
             MapFeature("road", "road", area, {"forward": "group"}),
@@ -121,11 +123,29 @@ def test_a_curved_border_is_told_without_a_solver_however_close(offset):
             MapFeature("lane", "lane", area, {"road": "road", "group": "group", "centerline": lines}),
         ],
     )
+
+
+@pytest.mark.parametrize("offset", [-0.02, -0.0101, -0.0099, 0.0, 0.0099, 0.0101, 0.02])
+def test_a_curved_border_is_told_without_a_solver_however_close(offset):
     program = (
         "model scenic.domains.driving.model\nspot = new OrientedPoint on network.laneRegion, facing roadDirection\n"
     )
-    scenario = compiled(program + "ego = new Car at spot offset by (0, 0), facing spot.heading", road)
+    scenario = compiled(program + "ego = new Car at spot offset by (0, 0), facing spot.heading", gap())
     matcher = Matcher(scenario, MatchOptions(tolerance=Tolerance(position=0.01, heading=1e-3)))
     for heading, near in ((0.0, offset <= 0.01), (-math.pi / 2, offset >= -0.01)):
         verdict = matcher.match(label(3.125 + 0.8 * offset, -2.0 + 0.6 * offset, heading, ahead=0.0))
         assert isinstance(verdict, Match if near else NoMatch), (offset, heading, verdict)
+
+
+@pytest.mark.parametrize(("wide", "long"), [(0.1, 7.0), (1.0, 2.0), (2.0, 7.0), (3.0, 3.0)])
+def test_a_curved_border_is_told_without_a_solver_however_much_of_it_comes_into_question(wide, long):
+    # the spot may be in a rectangle behind the ego, of which one corner comes closest to where it points ahead
+    program = (
+        "model scenic.domains.driving.model\nspot = new OrientedPoint on network.laneRegion, facing roadDirection\n"
+        f"ego = new Car at spot offset by (Range(-{wide}, {wide}), Range(0, {long})), facing spot.heading"
+    )
+    matcher = Matcher(compiled(program, gap()), MatchOptions(tolerance=Tolerance(position=0.01, heading=1e-3)))
+    for offset in (-1.0, -0.1, -0.0105, -0.0095, 0.0, 0.0095, 0.0105, 0.1, 1.0):
+        given = label(3.125 + 0.8 * offset + wide, -2.0 + 0.6 * offset + long, 0.0, ahead=0.0)
+        verdict = matcher.match(given)
+        assert isinstance(verdict, Match if offset < 0.01 else NoMatch), (offset, verdict)

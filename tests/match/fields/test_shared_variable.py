@@ -86,7 +86,7 @@ def test_a_way_without_a_solution_excludes_only_if_its_program_is_exact(monkeypa
     ways = [replace(part[0], exact=one) for part, one in zip(parts, exact, strict=False)]
     limits = next(each.limits for each in ways)
     ways = [[replace(way, limits=limits)] for way in ways]
-    monkeypatch.setattr(shared_variable, "solved", lambda way, *_: Undecided(way.network.items[0][0], "nonlinear"))
+    monkeypatch.setattr(shared_variable, "solved", lambda way, *_: Undecided(way.case.network.items[0][0], "nonlinear"))
     monkeypatch.setattr(shared_variable, "extent", lambda *_: None)
     outcome = find_shared_value(ways, *rest)
     # the first part is asked first, and is the one that has nothing left
