@@ -31,6 +31,8 @@ _MOST_CASES = 100_000
 """Cases of one part that are looked at."""
 _FAR = 60.0
 """Metres: where a point may be farther about than this, a number that it hangs on is divided before directions are."""
+_PASSES = 12
+"""Times that places and headings narrow each other at most."""
 _POINT = 1.5e-9
 """Radians that the headings of one direction may be apart, being rounded."""
 _PIECES = 4
@@ -74,11 +76,15 @@ def directed(start: BoxSet, soon: int = _MOST_CASES) -> Iterator[BoxSet]:
 
 
 def propagated(cases: BoxSet) -> BoxSet:
-    """The cases of which something is left, their places narrowed and then their headings."""
-    cases = _placed(cases.narrowed())
-    for node in cases.network.choices:
-        if isinstance(node, DirectionAt) and cases.size:
-            cases = _turned(cases, node)
+    """The cases of which something is left, narrowed until places and headings do not narrow each other any more."""
+    for _ in range(_PASSES):
+        cases, gained = _placed(cases.narrowed()), False
+        for node in cases.network.choices:
+            if isinstance(node, DirectionAt) and cases.size:
+                cases, less = _turned(cases, node)
+                gained = gained or less
+        if not gained or not cases.size:
+            break
     return cases
 
 
@@ -139,17 +145,22 @@ def _placed(cases: BoxSet) -> BoxSet:
     return cases
 
 
-def _turned(cases: BoxSet, node: DirectionAt) -> BoxSet:
-    """The cases in which a field has a heading, with the range of all it has; large places are left alone."""
+def _turned(cases: BoxSet, node: DirectionAt) -> tuple[BoxSet, bool]:
+    """The cases in which a field has a heading, with the range of all it has; whether any got less than it had.
+
+    Large places are left alone.
+    """
     if _extent(cases, node).max() > _FAR:
-        return cases
+        return cases, False
     owner, heading = _headings(cases, node)
+    known = cases.chosen.get(id(node), np.broadcast_to([[-np.inf], [np.inf]], (2, cases.size)))
     found = np.tile([[np.inf], [-np.inf]], cases.size)
     np.minimum.at(found[0], owner, heading)
     np.maximum.at(found[1], owner, heading)
+    gained = bool((np.ptp(found, axis=0) < np.ptp(known, axis=0) - _POINT).any())
     cases = cases.take(np.arange(cases.size))
     cases.chosen[id(node)] = found
-    return cases.those(found[0] <= found[1])
+    return cases.those(found[0] <= found[1]), gained
 
 
 def _parted(cases: BoxSet) -> list[BoxSet] | None:

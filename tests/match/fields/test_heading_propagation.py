@@ -149,3 +149,30 @@ def test_a_curved_border_is_told_without_a_solver_however_much_of_it_comes_into_
         given = label(3.125 + 0.8 * offset + wide, -2.0 + 0.6 * offset + long, 0.0, ahead=0.0)
         verdict = matcher.match(given)
         assert isinstance(verdict, Match if offset < 0.01 else NoMatch), (offset, verdict)
+
+
+@pytest.mark.parametrize("x", [-2.6, -2.2, -1.4, -1.0, -0.8, -0.63, -0.4, 0.2])
+def test_a_heading_that_is_known_narrows_what_hangs_on_it(x):
+    # all places that the field is asked at have one direction; what hangs on it is no linear program: a circle
+    program = (
+        "F = PolylineRegion([(-40.0, 0.0), (-10.0, 30.0)]).orientation\n"
+        "ego = new Object at (3, -4), facing -32 deg\nspot = (-28.7, 12.1 + Range(-1.16, 1.78))\n"
+        "there = spot offset along F by (-7.76, -4.29)\n"
+        "other = new Object beyond ego.position by (Range(-4.84, -2.79), -7.67) from there\n"
+    )
+    first, second = np.meshgrid(np.linspace(-4.84, -2.79, 400), np.linspace(-1.16, 1.78, 400))
+    spot = np.stack([np.full_like(second, -28.7), 12.1 + second]) + turned(-7.76, -4.29, -math.pi / 4)[:, None, None]
+    ahead = np.array([3.0, -4.0])[:, None, None] - spot
+    place = np.array([3.0, -4.0])[:, None, None] + turned(first, -7.67, np.arctan2(-ahead[0], ahead[1]))
+    away = np.hypot(place[0] - x, place[1] - 3.55).min()
+    assert abs(away - 0.25) > 0.02
+    ego = LabelObject("ego", "Object", "object", 3.0, -4.0, math.radians(-32), 1.0, 1.0)
+    other = LabelObject("other", "Object", "object", x, 3.55, None, 1.0, 1.0)
+    matcher = Matcher(compiled(program, HAIRPIN), MatchOptions(tolerance=Tolerance(position=0.25, heading=0.1)))
+    verdict = matcher.match(Label("frame", "recording", 0, "hairpin", ego, (other,)))
+    assert isinstance(verdict, Match if away < 0.25 else NoMatch), (away, verdict)
+
+
+def turned(x, y, angle):
+    """A vector turned by an angle in radians."""
+    return np.stack([x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)])
