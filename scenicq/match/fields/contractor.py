@@ -76,12 +76,14 @@ class BoxSet:
         ranges: Where each random number or point can be.
         chosen: For each choice that was made, by the node's id, the number of the option (n,), or of a field the range
             of headings (2, n).
+        asked: By the id of a field's use, how large the box of its point was when its headings were last looked up.
     """
 
     network: ConstraintNetwork
     size: int
     ranges: dict[Identity, Enclosure]
     chosen: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
+    asked: dict[int, NDArray[np.float64]] = field(default_factory=dict[int, "NDArray[np.float64]"])
     _bounds: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
     _turns: dict[int, Enclosure] = field(default_factory=dict[int, Enclosure])
 
@@ -118,6 +120,7 @@ class BoxSet:
             len(cases),
             {key: value[..., cases] for key, value in self.ranges.items()},
             {key: value[..., cases] for key, value in self.chosen.items()},
+            {key: value[cases] for key, value in self.asked.items()},
             {key: value[..., cases] for key, value in self._bounds.items()},
             {key: value[..., cases] for key, value in self._turns.items()},
         )

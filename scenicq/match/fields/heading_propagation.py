@@ -33,6 +33,8 @@ _FAR = 60.0
 """Metres: where a point may be farther about than this, a number that it hangs on is divided before directions are."""
 _PASSES = 12
 """Times that places and headings narrow each other at most."""
+_WORTH = 0.8
+"""A share of the range of headings, or of the place of a point, above which nothing is gained by looking again."""
 _POINT = 1.5e-9
 """Radians that the headings of one direction may be apart, being rounded."""
 _PIECES = 4
@@ -78,7 +80,8 @@ def directed(start: BoxSet, soon: int = _MOST_CASES) -> Iterator[BoxSet]:
 def propagated(cases: BoxSet) -> BoxSet:
     """The cases of which something is left, narrowed until places and headings do not narrow each other any more."""
     for _ in range(_PASSES):
-        cases, gained = _placed(cases.narrowed()), False
+        cases = _placed(cases.narrowed())
+        gained = False
         for node in cases.network.choices:
             if isinstance(node, DirectionAt) and cases.size:
                 cases, less = _turned(cases, node)
@@ -136,30 +139,34 @@ def _placed(cases: BoxSet) -> BoxSet:
         if not (isinstance(region, PolygonSet | PolylineSet | PointSet) and cases.size):
             continue
         place = cases.ranges[identity]
-        if not np.isfinite(place).all():
+        size = np.hypot(*(place[:, 1] - place[:, 0]))
+        before = cases.asked.get(id(identity), np.full(cases.size, np.inf))
+        if not np.isfinite(size).all() or (size > _WORTH * before).all():
             continue
         boxes = np.concatenate([place[:, 0] - MARGIN, place[:, 1] + MARGIN]).T
         held = np.zeros(cases.size, dtype=bool)
         held[shapes.tree_pairs_within(region.tree, shapes.boxes(boxes), SLACK)[0]] = True
-        cases = cases.those(held)
+        cases = cases.take(np.nonzero(held)[0])
+        cases.asked[id(identity)] = size[held]
     return cases
 
 
 def _turned(cases: BoxSet, node: DirectionAt) -> tuple[BoxSet, bool]:
-    """The cases in which a field has a heading, with the range of all it has; whether any got less than it had.
-
-    Large places are left alone.
-    """
-    if _extent(cases, node).max() > _FAR:
+    """The cases in which a field has a heading, its range the least that holds them all; whether that narrowed any."""
+    size = _extent(cases, node)
+    before = cases.asked.get(id(node), np.full(cases.size, np.inf))
+    less = np.nonzero(size <= _WORTH * before)[0]
+    if size.max() > _FAR or not len(less):
         return cases, False
-    owner, heading = _headings(cases, node)
+    owner, heading = _headings(cases, node, less)
     known = cases.chosen.get(id(node), np.broadcast_to([[-np.inf], [np.inf]], (2, cases.size)))
-    found = np.tile([[np.inf], [-np.inf]], cases.size)
+    found = known.copy()
+    found[0, less], found[1, less] = np.inf, -np.inf
     np.minimum.at(found[0], owner, heading)
     np.maximum.at(found[1], owner, heading)
-    gained = bool((np.ptp(found, axis=0) < np.ptp(known, axis=0) - _POINT).any())
+    gained = bool((np.ptp(found, axis=0) < _WORTH * np.ptp(known, axis=0) - _POINT).any())
     cases = cases.take(np.arange(cases.size))
-    cases.chosen[id(node)] = found
+    cases.chosen[id(node)], cases.asked[id(node)] = found, np.where(size <= _WORTH * before, size, before)
     return cases.those(found[0] <= found[1]), gained
 
 
@@ -197,11 +204,12 @@ def _extent(cases: BoxSet, node: DirectionAt) -> NDArray[np.float64]:
     return np.hypot(*(place[:, 1] - place[:, 0]))
 
 
-def _headings(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Pairs (case, heading): all that a field may have where its point can be, if it is not excluded."""
-    place = cases.place(node)
+def _headings(cases: BoxSet, node: DirectionAt, some: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Pairs (case, heading) of some cases: all that a field may have where its point can be, if it is not excluded."""
+    place = cases.place(node)[..., some]
     boxes = np.concatenate([place[:, 0] - MARGIN, place[:, 1] + MARGIN]).T
     owner, heading = cast(VectorField, cast(Constant, node.field).value).headings(boxes)
+    owner = some[owner]
     low, high = cases.value(node)
     kept = (heading >= low[owner] - SAME) & (heading <= high[owner] + SAME)
     return owner[kept], heading[kept]
@@ -209,7 +217,7 @@ def _headings(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArr
 
 def _pieces(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Pairs (case, range of headings), the ranges (2, m): the directions that a field may have in parts."""
-    owner, heading = _headings(cases, node)
+    owner, heading = _headings(cases, node, np.arange(cases.size))
     order = np.lexsort((heading, owner))
     owner, heading = owner[order], heading[order]
     first = np.diff(owner, prepend=-1) > 0
