@@ -11,6 +11,7 @@ from comparisons import between, c
 from scenicq.forest import build
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Rotate, VectorOf, VectorSum
+from scenicq.geometry.cell_guards import Nearer
 from scenicq.geometry.fields import FieldCell
 
 SIDE = 4.0
@@ -21,20 +22,20 @@ HEADINGS = (0.2, 0.9, 1.7, -0.7)
 
 @dataclass(frozen=True, eq=False)
 class Patchwork:
-    """Tiles in rows from the origin."""
+    """Tiles in rows from the origin; over more than one of them it gives cells of four tiles, which cover too much."""
 
     tiles: np.ndarray
     name: str = "patchwork"
 
-    def near(self, west, south, east, north):
-        """The tiles that meet a box: their corners."""
-        columns, rows = self.tiles.shape
+    def near(self, west, south, east, north, side=SIDE):
+        """The squares of a side that meet a box: their corners."""
+        columns, rows = (int(count * SIDE / side) for count in self.tiles.shape)
         return [
-            (column * SIDE, row * SIDE)
+            (column * side, row * side)
             for column in range(columns)
             for row in range(rows)
-            if column * SIDE <= east and west <= (column + 1) * SIDE
-            if row * SIDE <= north and south <= (row + 1) * SIDE
+            if column * side <= east and west <= (column + 1) * side
+            if row * side <= north and south <= (row + 1) * side
         ]
 
     def at(self, x, y):
@@ -47,8 +48,17 @@ class Patchwork:
         return [self.values(*each) for each in xy.tolist()]
 
     def cells(self, bounds):
-        sides = [(0, 0), (SIDE, 0), (SIDE, SIDE), (0, SIDE)]
-        return [FieldCell(np.add(corner, sides), self.at(*corner)) for corner in self.near(*bounds)]
+        west, south, east, north = bounds
+        side = SIDE if max(east - west, north - south) < SIDE else 2 * SIDE
+        found = []
+        for x, y in self.near(*bounds, side):
+            square = np.array([(x, y), (x + side, y), (x + side, y + side), (x, y + side)])
+            inside = self.near(x + 0.1, y + 0.1, x + side - 0.1, y + side - 0.1)
+            for heading in sorted({self.at(*each) for each in inside}):
+                own = middles(each for each in inside if self.at(*each) == heading)
+                rivals = middles(each for each in inside if self.at(*each) != heading)
+                found.append(FieldCell(square, heading, (Nearer(own, rivals),) if len(rivals) else ()))
+        return found
 
     def headings(self, boxes):
         pairs = [
@@ -57,6 +67,11 @@ class Patchwork:
             for heading in {self.at(*corner) for corner in self.near(*each)}
         ]
         return np.array([owner for owner, _ in pairs], dtype=np.intp), np.array([heading for _, heading in pairs])
+
+
+def middles(corners):
+    """The middles of tiles as segments of no length: a point lies in the tile whose middle is nearest."""
+    return np.array([(x + SIDE / 2, y + SIDE / 2) * 2 for x, y in corners])
 
 
 def patchwork(rng, count):

@@ -83,7 +83,7 @@ def test_a_way_without_a_solution_excludes_only_if_its_program_is_exact(monkeypa
     items = next(items for items, true in groups(CROSSING.format(cars=3), 1) if true and len(items) >= 6)
     decide_decomposed(items, Tolerance(position=0.05, heading=0.02))
     parts, *rest = found[0]
-    ways = [replace(part[0], exact=one) for part, one in zip(parts, exact, strict=False)]
+    ways = [replace(part[0], exact=one, vague=[]) for part, one in zip(parts, exact, strict=False)]
     limits = next(each.limits for each in ways)
     ways = [[replace(way, limits=limits)] for way in ways]
     monkeypatch.setattr(shared_variable, "solved", lambda way, *_: Undecided(way.case.network.items[0][0], "nonlinear"))
