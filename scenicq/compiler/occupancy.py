@@ -11,7 +11,6 @@ as in these, as in Scenic; here the border is a polygon, so that the plane falls
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -159,17 +158,6 @@ class Occupancy:
             if number is None or self.layers[level][hit][1] == number
             for piece in self._pieces_of(level, hit)
         ]
-
-    @cached_property
-    def extents(self) -> NDArray[np.float64]:
-        """Of each number the box around all points that have the option, (n, 4); the plane for no option at all."""
-        found = np.full((self.nothing + 1, 4), (np.inf, np.inf, -np.inf, -np.inf))
-        for area, number, _ in itertools.chain.from_iterable(self.layers):
-            box = np.array(shapes.bounds_of(area))
-            found[number, :2] = np.minimum(found[number, :2], box[:2] - TOLERANCE)
-            found[number, 2:] = np.maximum(found[number, 2:], box[2:] + TOLERANCE)
-        found[self.nothing] = (-np.inf, -np.inf, np.inf, np.inf)
-        return found
 
     def outside(self, bounds: Bounds) -> list[Corners]:
         """Convex pieces of what lies in no area within a box."""
