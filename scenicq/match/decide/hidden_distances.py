@@ -17,7 +17,6 @@ from shapely.geometry import Polygon
 from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Compare, CompareOp, Constant, Contains, Distance, Node
-from scenicq.forest.walk import conjuncts
 from scenicq.geometry import shapes
 from scenicq.geometry.membership import distance
 from scenicq.geometry.regions import Nowhere, PolygonSet, PolylineSet, Region, UnionOf
@@ -38,22 +37,17 @@ def with_areas(items: Sequence[Item], tolerance: Tolerance, *, outer: bool = Tru
     """Constraints with areas in place of distances of hidden points; None if there are no such distances.
 
     Args:
-        items: The constraints, conditioned.
+        items: The constraints, conditioned, in conjuncts.
         tolerance: Per feature.
         outer: Whether areas leave out no point that satisfies the constraints; else they have no other points.
     """
-    parts = [
-        (constraint, part, seen)
-        for constraint, node, seen in items
-        for part in ((node,) if isinstance(constraint, Comparison) else conjuncts(node))
-    ]
-    compared = [_distance_of(node) for constraint, node, _ in parts if not isinstance(constraint, Comparison)]
+    compared = [_distance_of(node) for constraint, node, _ in items if not isinstance(constraint, Comparison)]
     if not any(compared):
         return None
-    boxes = position_boxes(parts, tolerance)
+    boxes = position_boxes(items, tolerance)
     found: list[Item] = []
     changed = False
-    for constraint, node, seen in parts:
+    for constraint, node, seen in items:
         asked = None if isinstance(constraint, Comparison) else _distance_of(node)
         area = None if asked is None else _area_of(asked, vector_bounds(asked.point, boxes), outer=outer)
         if asked is None or area is None:
