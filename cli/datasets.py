@@ -19,7 +19,8 @@ def open_checked(address: str | Path) -> Dataset:
         DataError: As `open_dataset` does.
     """
     dataset = open_dataset(address, check=False)
-    if not is_noted_sound(dataset.place, dataset.manifest):
-        check_apart(dataset.address)
-        note_sound(dataset.place, dataset.manifest)
+    with dataset.blamed():
+        if not is_noted_sound(dataset.place, dataset.manifest):
+            check_apart(dataset.reference)
+            note_sound(dataset.place, dataset.manifest)
     return dataset

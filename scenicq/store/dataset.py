@@ -7,7 +7,7 @@ nothing: every connection is an in-memory database with views over the manifest'
 from __future__ import annotations
 
 import sys
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +32,35 @@ from scenicq.store.sql import sql_list
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["Dataset", "open_dataset"]
+__all__ = ["Dataset", "DatasetReference", "open_dataset"]
+
+
+@dataclass(frozen=True, slots=True)
+class DatasetReference:
+    """A dataset as it is named to another process.
+
+    Attributes:
+        address: Where it is.
+        digest: Of its tables.
+    """
+
+    address: str
+    digest: str
+
+    def open(self, *, check: bool = False) -> Dataset:
+        """Open the dataset.
+
+        Args:
+            check: As of `open_dataset`.
+
+        Raises:
+            DataError: As `open_dataset` does; store-damaged where the dataset there is not the one that was meant.
+        """
+        dataset = open_dataset(self.address, check=check)
+        if dataset.manifest.digest != self.digest:
+            message = f"{self.address} has changed since the query began, or is another one where it is read"
+            raise DataError(Diagnostic("store-damaged", message, hints=("run the query again",)))
+        return dataset
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +101,15 @@ class Dataset:
             message = f"{self.name} can only be read: this needs a dataset on this machine"
             raise DataError(Diagnostic("option-invalid", message))
         return self.folder
+
+    @property
+    def reference(self) -> DatasetReference:
+        """What opens this version of the dataset, and no other, in any process that sees the same files."""
+        return DatasetReference(self.address, self.manifest.digest)
+
+    def __reduce__(self) -> tuple[Callable[[DatasetReference], Dataset], tuple[DatasetReference]]:
+        """A copy, also in another process, is opened anew: it reads under a lock of its own."""
+        return DatasetReference.open, (self.reference,)
 
     def release(self) -> None:
         """Let writers remove the files of this version once there is a newer one."""
@@ -215,12 +252,12 @@ class Dataset:
         Raises:
             DataError: `store-damaged`, one diagnostic a file.
         """
-        problems = [
-            Diagnostic("store-damaged", f"{part.path} has changed since it was written")
-            for parts in self.manifest.tables.values()
-            for part in parts
-            if self.place.checksum(part) != part.sha256
-        ]
+        problems: list[Diagnostic] = []
+        for part in (part for parts in self.manifest.tables.values() for part in parts):
+            if told := self.place.problems([part]):
+                problems += told
+            elif self.place.checksum(part) != part.sha256:
+                problems.append(Diagnostic("store-damaged", f"{part.path} has changed since it was written"))
         if problems:
             raise DataError(problems)
 

@@ -5,6 +5,7 @@ Everything but `provenance` is a function of the source alone, so two runs over 
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Mapping
@@ -99,6 +100,12 @@ class Manifest:
     left_out: tuple[LeftOut, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict[str, Any])
     schema: int = SCHEMA_VERSION
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what all tables hold, in hexadecimal: the version of the dataset."""
+        parts = [(name, [part.sha256 for part in parts]) for name, parts in sorted(self.tables.items())]
+        return hashlib.sha256(repr(parts).encode()).hexdigest()
 
     def to_json(self) -> str:
         """The text of `dataset.json`."""

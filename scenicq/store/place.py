@@ -122,9 +122,12 @@ class LocalFolder:
         return self._root / part.path
 
     def checksum(self, part: Part) -> str:
-        """SHA-256 of a file."""
-        with (self._root / part.path).open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        """SHA-256 of a file; nothing where it has gone."""
+        try:
+            with (self._root / part.path).open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError:
+            return ""
 
     def stamp(self, parts: Iterable[Part]) -> str:
         """Identity, size and times of change of every file."""

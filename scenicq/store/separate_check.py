@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.processes import Lost, Workers
-from scenicq.store.dataset import open_dataset
+from scenicq.store.dataset import DatasetReference
 
 __all__ = ["check_apart"]
 
@@ -15,23 +15,23 @@ _MEMORY = 6 << 30
 """Bytes of address space that the process may take."""
 
 
-def check_apart(address: str) -> None:
+def check_apart(dataset: DatasetReference) -> None:
     """Refuse a dataset that is not sound, or that ends the process which reads it.
 
     Args:
-        address: Of the dataset, as `open_dataset` takes it.
+        dataset: The dataset.
 
     Raises:
-        DataError: As `open_dataset` does.
+        DataError: As `DatasetReference.open` does.
     """
     with Workers(1, _start) as workers:
-        for _, answer in workers.run([address], tries=1):
+        for _, answer in workers.run([dataset], tries=1):
             if isinstance(answer, Lost):
-                message = f"{address}: the process that reads it dies, or needs more than {_MEMORY >> 30} GiB"
+                message = f"{dataset.address}: the process that reads it dies, or needs more than {_MEMORY >> 30} GiB"
                 raise DataError(Diagnostic("dataset-invalid", message))
 
 
-def _start() -> Callable[[str, Callable[[object], None]], None]:
+def _start() -> Callable[[DatasetReference, Callable[[object], None]], None]:
     if sys.platform == "linux":
         import resource  # noqa: PLC0415 - not everywhere
 
@@ -39,7 +39,7 @@ def _start() -> Callable[[str, Callable[[object], None]], None]:
         limits = [limit for limit in (_MEMORY, soft, hard) if limit != resource.RLIM_INFINITY]
         resource.setrlimit(resource.RLIMIT_AS, (min(limits), hard))
 
-    def work(address: str, _tell: Callable[[object], None]) -> None:
-        open_dataset(address)
+    def work(dataset: DatasetReference, _tell: Callable[[object], None]) -> None:
+        dataset.open(check=True)
 
     return work

@@ -28,8 +28,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from rounds import Round, attend
 
-from scenicq.store.dataset import open_dataset
-
 ROOT = Path(__file__).parents[2]
 _COMMAND = str(Path(sys.executable).with_name("scenicq"))
 _FRAME = "03-busy-intersection/09"
@@ -297,7 +295,7 @@ def _invoke(words: list[str], checks_here: bool, modules: Path | None = None) ->
     from scenicq_cli import datasets, start
 
     if checks_here:
-        datasets.check_apart = lambda address: open_dataset(address) and None
+        datasets.check_apart = lambda dataset: dataset.open(check=True) and None
     sys.argv = [_COMMAND, *words]
     try:
         start.main()

@@ -103,7 +103,7 @@ def test_every_command_that_is_run_on_damage_does_its_work_without(what, run, cr
 
 @pytest.mark.parametrize("what", COMMANDS)
 def test_no_command_reads_nested_collections(what, run, hostile, tmp_path, monkeypatch):
-    monkeypatch.setattr("scenicq_cli.datasets.check_apart", open_dataset)
+    monkeypatch.setattr("scenicq_cli.datasets.check_apart", lambda dataset: dataset.open(check=True))
     result = run(*commands(hostile("regions.geometry nested"), tmp_path)[what])
     assert result.exit_code == 2
     assert result.stderr.startswith("error[dataset-invalid]")
@@ -148,7 +148,7 @@ def _die() -> object:
 def test_a_dataset_that_ends_the_process_which_reads_it_is_refused(crossroads, monkeypatch):
     monkeypatch.setattr("scenicq.store.separate_check._start", _answer_by_dying)
     with pytest.raises(DataError, match="the process that reads it dies"):
-        check_apart(str(crossroads))
+        check_apart(open_dataset(crossroads, check=False).reference)
 
 
 def _answer_by_dying():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -23,8 +22,7 @@ def name_origin(dataset: Dataset) -> str:
 
     The name is the source's, so that copies and another folder do not change it; the version is a digest of all tables.
     """
-    parts = [(name, [part.sha256 for part in parts]) for name, parts in sorted(dataset.manifest.tables.items())]
-    return f"{dataset.manifest.name}@{hashlib.sha256(repr(parts).encode()).hexdigest()[:_DIGITS]}"
+    return f"{dataset.manifest.name}@{dataset.manifest.digest[:_DIGITS]}"
 
 
 def check_origins(

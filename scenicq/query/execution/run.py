@@ -37,7 +37,7 @@ from scenicq.query.execution.program_files import sibling_loader
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
-from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.dataset import Dataset, DatasetReference
 from scenicq.store.manifest import Counts
 from scenicq.temporal.interval_options import IntervalOptions
 
@@ -348,7 +348,7 @@ class Query:
         left, ahead = self.options.limit, FramesAhead(progress)
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
-            setup = (self.dataset.address, self.source, self.options, self.file)
+            setup = (self.dataset.reference, self.source, self.options, self.file)
             decider = self.decider()
             executor = BlockExecutor(self.dataset, self.options.jobs, decider, _start_worker, setup)
             hands = stack.enter_context(executor)
@@ -385,10 +385,10 @@ class Query:
 
 
 def _start_worker(
-    dataset: str, source: Source, options: QueryOptions, file: Path | None
+    dataset: DatasetReference, source: Source, options: QueryOptions, file: Path | None
 ) -> Callable[[Block, Callable[[object], None]], Decided]:
     """What a worker process keeps between blocks."""
-    decider = Query(open_dataset(dataset, check=False), source, options, file=file).decider(threads=1)
+    decider = Query(dataset.open(), source, options, file=file).decider(threads=1)
 
     def work(block: Block, tell: Callable[[object], None]) -> Decided:
         decided = decider.decide(block)

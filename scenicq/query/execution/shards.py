@@ -7,14 +7,14 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scenicq.errors import DataError, Diagnostic, Source
+from scenicq.errors import Source
 from scenicq.match.verdict import Match
 from scenicq.processes import Lost, Workers, as_many_as_pay
 from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
 from scenicq.query.execution.record_reader import read_record
 from scenicq.query.execution.results import Funnel, Result, record
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.store.dataset import open_dataset
+from scenicq.store.dataset import DatasetReference
 
 __all__ = [
     "Asked",
@@ -42,14 +42,14 @@ class Question:
     """A query as it is sent to other processes, perhaps on other machines.
 
     Attributes:
-        dataset: Path of the dataset; the same wherever it is asked.
+        dataset: The dataset.
         fingerprint: Of dataset, program and options.
         source: The program.
         file: Of the program.
         options: The options.
     """
 
-    dataset: str
+    dataset: DatasetReference
     fingerprint: str
     source: Source
     file: Path
@@ -59,7 +59,7 @@ class Question:
     def of(cls, query: Query) -> Question:
         """The question of a query, for processes that have one thread of work each."""
         return cls(
-            dataset=query.dataset.address,
+            dataset=query.dataset.reference,
             fingerprint=fingerprint(query.dataset, query.source.text, query.options),
             source=query.source,
             file=(query.file or Path(query.source.name)).resolve(),
@@ -72,11 +72,7 @@ class Question:
         Raises:
             DataError: store-missing, or store-damaged where the dataset is not the one that was asked about.
         """
-        dataset = open_dataset(self.dataset, check=False)
-        if fingerprint(dataset, self.source.text, self.options) != self.fingerprint:
-            message = f"{self.dataset} has changed since the query began, or is another one where it is read"
-            raise DataError(Diagnostic("store-damaged", message, hints=("run the query again",)))
-        return Query(dataset, self.source, self.options, file=self.file)
+        return Query(self.dataset.open(), self.source, self.options, file=self.file)
 
 
 Asked = tuple[Question, Partition]
