@@ -16,10 +16,26 @@ from typing import Any, cast
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS, UPGRADABLE
 
-__all__ = ["MANIFEST", "Counts", "LeftOut", "Manifest", "Part", "is_dataset", "read_manifest"]
+__all__ = [
+    "FOLDERS",
+    "MANIFEST",
+    "SEGMENTS",
+    "Counts",
+    "LeftOut",
+    "Manifest",
+    "Part",
+    "find_links",
+    "is_dataset",
+    "read_manifest",
+]
 
 MANIFEST = "dataset.json"
 """Name of the manifest's file."""
+
+SEGMENTS = "segments"
+"""Name of the folder with descriptions of segments."""
+FOLDERS = (*SCHEMAS, SEGMENTS)
+"""Names of all folders of a dataset."""
 
 _FORMAT = "scenicq"
 _LARGEST = 1 << 63
@@ -122,6 +138,15 @@ def is_dataset(folder: Path) -> bool:
     except (OSError, ValueError, RecursionError):
         return False
     return isinstance(content, dict) and cast(dict[str, object], content).get("format") == _FORMAT
+
+
+def find_links(folder: Path) -> list[Path]:
+    """Folders of a dataset that are links: what is read or written there belongs to somebody else.
+
+    Args:
+        folder: Of the dataset, or one in which a dataset grows; it may be a link itself.
+    """
+    return [folder / name for name in FOLDERS if (folder / name).is_symlink()]
 
 
 def read_manifest(name: str, data: bytes, *, older: bool = False) -> Manifest:

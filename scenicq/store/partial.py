@@ -18,7 +18,7 @@ from typing import IO
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.atomic_files import sync_folder
-from scenicq.store.manifest import is_dataset
+from scenicq.store.manifest import FOLDERS, find_links, is_dataset
 from scenicq.store.read_lock import nobody_reads
 
 try:
@@ -46,8 +46,10 @@ class Partial:
 
         Raises:
             OSError: The place cannot be written.
-            DataError: `target-exists` while another process writes there.
+            DataError: `target-exists` while another process writes there; `target-unwritable` where it is a link.
         """
+        if self.folder.is_symlink():
+            raise _through_link(self.target, self.folder)
         try:
             while self._lock is None:
                 self.folder.mkdir(exist_ok=True)
@@ -55,6 +57,8 @@ class Partial:
         except KeyboardInterrupt:
             self._abandon()
             raise
+        for link in find_links(self.folder):
+            link.unlink()  # what an earlier process left there is not ours to go on from
 
     def _locked(self) -> IO[bytes] | None:
         path = self.folder / _LOCK
@@ -82,7 +86,7 @@ class Partial:
     def clear(self) -> None:
         """Remove what an earlier process left in the folder."""
         for path in self.folder.iterdir():
-            if path.is_dir():
+            if path.is_dir() and not path.is_symlink():
                 shutil.rmtree(path)
             elif path.name != _LOCK:
                 path.unlink()
@@ -137,7 +141,8 @@ class Partial:
         # the new dataset is complete: what fails from here on is left for the next ingest
         with suppress(OSError), nobody_reads(self.target) as free:
             if free:
-                _remove_others(self.target, set(self._kept))
+                for name in FOLDERS:
+                    _remove_others(self.target, set(self._kept), name)
         self.remove()
 
     def _unlock(self) -> None:
@@ -146,9 +151,14 @@ class Partial:
             self._lock = None
 
 
-def _remove_others(folder: Path, files: set[Path]) -> None:
-    """Remove everything in a folder but some files, given relative to it."""
-    for path in sorted(folder.rglob("*"), reverse=True):
+def _through_link(target: Path, link: Path) -> DataError:
+    message = f"{target} cannot be written: {link} is a link, and nothing is written or removed through one"
+    return DataError(Diagnostic("target-unwritable", message, hints=("put a folder in its place, or remove it",)))
+
+
+def _remove_others(folder: Path, files: set[Path], below: str = "") -> None:
+    """Remove everything in a folder, or in one below it, but some files, given relative to it."""
+    for path in sorted((folder / below).rglob("*"), reverse=True):
         if path.is_dir() and not path.is_symlink():
             with suppress(OSError):
                 path.rmdir()
@@ -165,7 +175,8 @@ def check_target(target: Path, *, force: bool = False, update: bool = False) -> 
         update: Whether it may be brought up to date.
 
     Raises:
-        DataError: `target-exists`, or `target-unwritable` for a path without a name of its own.
+        DataError: `target-exists`; `target-unwritable` for a path without a name of its own, or one of whose folders
+            is a link.
     """
     if not target.name or target.name == "..":
         raise DataError(Diagnostic("target-unwritable", f"{target} is not the name of a new folder"))
@@ -177,3 +188,5 @@ def check_target(target: Path, *, force: bool = False, update: bool = False) -> 
     if not force and not update:
         hints = ("`--force` replaces it", "`--update` adds what is new in the source")
         raise DataError(Diagnostic("target-exists", f"the dataset {target} exists", hints=hints))
+    for link in find_links(target):
+        raise _through_link(target, link)

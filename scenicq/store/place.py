@@ -19,7 +19,7 @@ from urllib.parse import unquote, urlsplit
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.manifest import MANIFEST, Manifest, Part
+from scenicq.store.manifest import MANIFEST, Manifest, Part, find_links
 from scenicq.store.read_lock import Reading
 from scenicq.store.remote import RemoteFile, RemoteFolder
 
@@ -114,7 +114,13 @@ class LocalFolder:
             raise DataError(Diagnostic("store-missing", f"{self.path} has no {MANIFEST}", hints=(hint,))) from error
 
     def problems(self, parts: Iterable[Part]) -> list[Diagnostic]:
-        """Files that are missing, have another size, or lead out of the folder."""
+        """Folders that are links; else files that are missing, have another size, or lead out of the folder."""
+        if links := find_links(self._root):
+            told = ", ".join(str(each.relative_to(self._root)) for each in links)
+            hint = "copy the whole dataset there; its own folder may be a link"
+            return [
+                Diagnostic("store-damaged", f"{self.path}: folders of a dataset are no links: {told}", hints=(hint,))
+            ]
         return [problem for part in parts if (problem := _problem(self._root, part))]
 
     def file(self, part: Part) -> Path:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns
-from scenicq.store.manifest import Counts, Part
+from scenicq.store.manifest import SEGMENTS, Counts, Part
 from scenicq.store.parquet import TableWriter, part_path
 from scenicq.store.rows import recording_rows
 from scenicq.store.schema import SEGMENT_TABLES
@@ -42,8 +42,6 @@ __all__ = [
 
 SEGMENT_OBJECTS = 1 << 20
 """Upper bound of the label objects of a segment, unless a single recording has more."""
-
-_FOLDER = "segments"
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +218,7 @@ class SegmentWriter:
             told=tuple(told),
         )
         self._tables.clear()
-        (self.folder / _FOLDER).mkdir(exist_ok=True)
+        (self.folder / SEGMENTS).mkdir(exist_ok=True)
         write_whole(_description(self.folder, self.number), _to_json(segment))
         return segment
 
@@ -235,7 +233,7 @@ class SegmentWriter:
 def read_segments(folder: Path) -> dict[int, Segment]:
     """The complete segments of a dataset, finished or not, by number; damaged ones are passed over."""
     found: dict[int, Segment] = {}
-    for path in sorted((folder / _FOLDER).glob("part-*.json")):
+    for path in sorted((folder / SEGMENTS).glob("part-*.json")):
         try:
             number = int(path.stem.removeprefix("part-"))
             segment = _from_json(json.loads(path.read_bytes()))
@@ -267,7 +265,7 @@ def take_over(segment: Segment, source: Path, number: int, target: Path, new_num
 
 
 def _description(folder: Path, number: int) -> Path:
-    return folder / _FOLDER / f"part-{number:05}.json"
+    return folder / SEGMENTS / f"part-{number:05}.json"
 
 
 def _to_json(segment: Segment) -> str:
