@@ -57,6 +57,8 @@ CODES: dict[str, str] = {
     "file-missing": "a file that the source must have is not there",
     "file-invalid": "a file cannot be read as what it should be",
     "record-invalid": "one record of the source is not sound",
+    "assumed": "what the source does not say, and is taken for granted",
+    "not-read": "what the source holds, and no dataset of ours has a place for",
     "map-missing": "a map that the labels refer to is not there",
     "map-invalid": "an element of a map is not sound",
     "store-missing": "the folder is not a dataset of ours",

@@ -17,6 +17,7 @@ __all__ = [
     "heading_of_yaw",
     "matrix",
     "quaternion",
+    "turns",
     "unit_quaternion",
     "velocities",
 ]
@@ -154,6 +155,21 @@ def euler(roll: float, pitch: float, yaw: float, origin: Vector) -> Rigid:
         (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
         origin,
     )
+
+
+def turns(axes: str, angles: Sequence[float], origin: Vector) -> Rigid:
+    """The pose of a body turned about its own axes, one after the other.
+
+    Args:
+        axes: Letters X, Y and Z.
+        angles: For each letter, radians.
+        origin: The body's origin, metres.
+    """
+    pose = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), origin)
+    for axis, angle in zip(axes, angles, strict=True):
+        about = {"X": (angle, 0.0, 0.0), "Y": (0.0, angle, 0.0), "Z": (0.0, 0.0, angle)}[axis]
+        pose = pose.then(euler(*about, (0.0, 0.0, 0.0)))
+    return pose
 
 
 def matrix(rows: Sequence[Sequence[float]]) -> Rigid:

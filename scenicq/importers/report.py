@@ -14,6 +14,8 @@ from scenicq.store.segment import SourceProblem
 __all__ = ["Report"]
 
 _TOLD = 20
+_MOST_ELEMENTS, _LONGEST_ELEMENT = 200, 200
+"""Kinds of elements that are counted apart, and characters of what they are called: a source may make up any number."""
 
 
 class Report:
@@ -33,6 +35,7 @@ class Report:
         self._counts: Counter[tuple[bool, str, str, str]] = Counter()
         self._told: list[SourceProblem] = []
         self._told_of: Counter[tuple[str, str]] = Counter()
+        self._elements = 0
 
     def left_out(self, what: str, code: str, message: str, *, hints: tuple[str, ...] = ()) -> None:
         """Something is not taken.
@@ -61,11 +64,34 @@ class Report:
         Raises:
             DataError: The ingest is strict.
         """
-        key = (True, what, code, name)
-        if name and key in self._counts:
-            self._counts[key] += 1
-        else:
-            self._add(SourceProblem(what, code, name, True, message, hints))
+        self._add(SourceProblem(what, code, name, True, message, hints))
+
+    def assumed(self, what: str, name: str, message: str, *, hints: tuple[str, ...] = ()) -> None:
+        """Something that the source does not say is taken for granted: told once, and no problem of a strict ingest.
+
+        Args:
+            what: "recording", "map" ...
+            name: What is assumed, in a few words.
+            message: The fact with its place.
+            hints: Statements that one can act on.
+        """
+        self._add(SourceProblem(what, "assumed", name, True, message, hints), strict=False)
+
+    def not_read(self, element: str, count: int = 1) -> None:
+        """Something that the source holds, sound as it is, is passed over: counted, and no problem of a strict ingest.
+
+        Args:
+            element: What it is, in the words of the format.
+            count: How many there are.
+        """
+        if not count:
+            return
+        element = readable(element)[:_LONGEST_ELEMENT]
+        if (key := (False, "element", "not-read", element)) not in self._counts:
+            self._elements += 1
+            if self._elements > _MOST_ELEMENTS:
+                key = (False, "element", "not-read", "others")
+        self._counts[key] += count
 
     def merge(self, counts: Iterable[tuple[str, str, str, bool, int]], told: Iterable[SourceProblem]) -> None:
         """Take in the `tally` and the `told` of another report, as if its problems had been reported here."""
@@ -75,7 +101,10 @@ class Report:
                 self._told.append(problem)
                 self._told_of[problem.what, problem.code] += 1
         for what, code, name, kept, count in counts:
-            self._counts[kept, what, code, name] += count
+            if code == "not-read":
+                self.not_read(name, count)
+            else:
+                self._counts[kept, what, code, name] += count
 
     @property
     def tally(self) -> tuple[tuple[str, str, str, bool, int], ...]:
@@ -107,11 +136,14 @@ class Report:
     def _total(self, what: str, code: str) -> int:
         return sum(count for (_, *key, _name), count in self._counts.items() if key == [what, code])
 
-    def _add(self, problem: SourceProblem) -> None:
+    def _add(self, problem: SourceProblem, *, strict: bool = True) -> None:
         problem = replace(problem, name=readable(problem.name), message=readable(problem.message))
-        if self._strict:
+        if self._strict and strict:
             raise DataError(Diagnostic(problem.code, problem.message, hints=problem.hints))
+        known = problem.name and _key(problem) in self._counts
         self._counts[_key(problem)] += 1
+        if known:
+            return
         kind = problem.what, problem.code
         if self._told_of[kind] < _TOLD:
             self._told_of[kind] += 1
