@@ -20,7 +20,7 @@ from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.layouts import openlabel_files
-from scenicq.importers.openlabel_objects import Boxes, objects_of
+from scenicq.importers.openlabel_objects import FrameObjects, objects_of
 from scenicq.importers.openlabel_systems import Systems, first_vehicle
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
@@ -168,7 +168,7 @@ def _read_frames(content: Record, file: str, prefix: str, classes: ClassNames, r
             properties = fields.optional_record(frame, "frame_properties")
             at_frame = Systems(systems, fields.optional_record(properties, "transforms"))
             report.not_read("frames/*/frame_properties/transforms/* of no coordinate system", len(at_frame.unknown))
-            boxes = Boxes(at_frame, classes, report, where)
+            boxes = FrameObjects(at_frame, classes, report, where)
             members = objects_of(content, frame, int(key), boxes)
             time = _time(properties)
             ego = next((each for each in members if each.id == "ego"), None)

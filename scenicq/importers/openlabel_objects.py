@@ -15,7 +15,7 @@ from scenicq.importers.openlabel_systems import Systems
 from scenicq.importers.report import Report
 from scenicq.store.labels import LabelObject, OutOfPlane
 
-__all__ = ["Boxes", "objects_of"]
+__all__ = ["FrameObjects", "objects_of"]
 
 _EGO = frozenset({"ego", "egocar", "egovehicle", "egoobject", "host", "hostvehicle"})
 _NO_OBJECT = "dontcare"
@@ -23,7 +23,7 @@ _SCALARS = ("boolean", "num", "text")
 
 
 @dataclass(frozen=True, slots=True)
-class Boxes:
+class FrameObjects:
     """What the boxes of a frame need to become objects.
 
     Attributes:
@@ -39,7 +39,7 @@ class Boxes:
     where: str
 
 
-def objects_of(content: Record, frame: Record, number: int, boxes: Boxes) -> list[LabelObject]:
+def objects_of(content: Record, frame: Record, number: int, boxes: FrameObjects) -> list[LabelObject]:
     """The objects with a box, the ego among them as `ego`.
 
     Args:
@@ -81,7 +81,7 @@ def _lives(whole: Record, number: int) -> bool:
     )
 
 
-def _object(name: str, whole: Record, own: Record, boxes: Boxes) -> LabelObject | None:
+def _object(name: str, whole: Record, own: Record, boxes: FrameObjects) -> LabelObject | None:
     """An object; None for what has no box and so no place, and for what stands for no object."""
     static = fields.optional_record(whole, "object_data")
     # Some writers say in each frame what the object is.
@@ -121,7 +121,7 @@ def _elements(data: Record, key: str) -> list[Record]:
     return [fields.record(each, f"`{key}`") for each in fields.optional_items(data, key)]
 
 
-def _attributes(data: Record, boxes: Boxes) -> Iterator[tuple[str, str | float | bool]]:
+def _attributes(data: Record, boxes: FrameObjects) -> Iterator[tuple[str, str | float | bool]]:
     for kind in _SCALARS:
         for each in _elements(data, kind):
             value: Any = each.get("val")
