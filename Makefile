@@ -10,7 +10,7 @@ LINTED := scenicq cli tests sample_data
 FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/search/test_backtracking.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check test test-all golden bench bench-scale conformance conformance-time fuzz mutate browser dreal clean
+.PHONY: help setup demo check test test-all golden bench bench-scale conformance conformance-random conformance-time fuzz mutate browser dreal clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
@@ -73,6 +73,10 @@ ifdef SCENIC
 else
 	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(SEED)
 endif
+
+PROGRAMS ?= 3000
+conformance-random: $(READY) ## Match scenes that Scenic 3.1.1 draws from random programs on five towns (MAPS=folders of OpenDRIVE maps, PROGRAMS=, SEED=)
+	$(BIN)/python tests/conformance/random_scenes.py --maps $(MAPS) --programs $(PROGRAMS) --seed $(SEED)
 
 TRACES ?= 2
 conformance-time: $(READY) ## Match what Scenic 3.1.1 simulates over time (MAP=an OpenDRIVE file; or SCENIC=a checkout; TRACES= of each program)

@@ -7,8 +7,9 @@ Writes OUT/map.geojson (Scenic's own network of the map, as interchange features
 object a line on standard input and standard output: {"text": program, "count": scenes, "seed": number, "seconds":
 limit}, or "file" with a path in place of the text, with {"scenes": [...]}, each with its objects (the ego first,
 headings in Scenic's convention) and parameters, or with {"error": text} where Scenic refuses the program. No scenes at
-all means that none was found in time. {"points": how many, "seed": number} and {"elements": true} ask the network, see
-`map_answers`.
+all means that none was found in time. {"text": program, "witness": values, "labels": objects, "seconds": limit} asks
+whether the program allows them, see `replay_witness`. {"points": how many, "seed": number} and {"elements": true} ask
+the network, see `map_answers`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ import scenic
 from map_answers import at_points, of_elements
 from network_features import features_of
 from patience import OutOfPatienceError, patience
-from scenic.core.distributions import RejectionException
+from scenic.core.distributions import RejectionException, Samplable
 from scenic.core.errors import InvalidScenarioError
 from scenic.domains.driving.roads import Network
 
@@ -34,6 +35,7 @@ MOST_ATTEMPTS = 20_000
 CARLA = "0.9.16"
 """Its version for the blueprints of objects, where it is not installed: the last that has bicycles."""
 INSTALLED = importlib.metadata.version
+SAMPLE_ALL = Samplable.sampleAll
 MODE = {} if INSTALLED("scenic").startswith("2.") else {"mode2D": True}
 
 
@@ -49,12 +51,32 @@ def thing(thing: Any) -> dict[str, Any]:
     }
 
 
+OFF_ROAD: list[Any] = []
+"""Places of the last sample off the road at which it asks for the direction of traffic."""
+
+
+def _road_direction(self: Any, point: Any) -> Any:
+    """As Scenic's own default, which gives 0 off the road, but told."""
+    element = self.findPointIn(point, self._nominalDirElems, reject=False)
+    if element is None:
+        OFF_ROAD.append(point)
+        return 0
+    return element.orientation[point]
+
+
+def _sample_all(quantities: Any) -> Any:
+    """As Scenic's own, which draws one sample at each call."""
+    OFF_ROAD.clear()
+    return SAMPLE_ALL(quantities)
+
+
 def plain(scene: Any) -> dict[str, Any]:
     """A scene as plain data."""
     values = {name: value for name, value in scene.params.items() if isinstance(value, str | int | float | bool)}
     return {
         "objects": [thing(each) for each in scene.objects],
         "params": {name: value for name, value in values.items() if name != "map"},
+        "directions_off_road": len(OFF_ROAD),
     }
 
 
@@ -83,10 +105,29 @@ def draw(request: dict[str, Any], chart: Path) -> dict[str, Any]:
     return {"scenes": scenes}
 
 
+def replayed(request: dict[str, Any], chart: Path) -> dict[str, str]:
+    """Whether Scenic allows what is said to match, see `replay_witness`."""
+    from replay_witness import places, replay  # 2.1.0 has nothing of it
+
+    found: dict[tuple[int, int], list[Any]] = {}
+    try:
+        with patience(request["seconds"]):
+            with places(found):
+                scenario = compiled(request, chart)
+            return replay(scenario, found, request)
+    except (OutOfPatienceError, RejectionException) as end:
+        return {"replay": "open", "why": f"{type(end).__name__}: {end}"}
+    except Exception as error:  # a replay that Scenic is not made for
+        return {"replay": "open", "why": f"{type(error).__name__}: {error}"}
+
+
 def main(arguments: list[str]) -> None:
     """Write the map, then answer requests."""
     chart, out = Path(arguments[0]), Path(arguments[1])
     importlib.metadata.version = lambda name: CARLA if name == "carla" else INSTALLED(name)
+    if MODE:
+        Network._defaultRoadDirection = _road_direction
+        Samplable.sampleAll = staticmethod(_sample_all)
     Network.fromFile = functools.cache(Network.fromFile)  # one map for all programs
     network = Network.fromFile(str(chart))
     collection = {"type": "FeatureCollection", "features": features_of(network)}
@@ -97,6 +138,8 @@ def main(arguments: list[str]) -> None:
 
 
 def _answer(request: dict[str, Any], chart: Path, network: Any) -> dict[str, Any]:
+    if "witness" in request:
+        return replayed(request, chart)
     if "points" in request:
         return {"points": at_points(network, request["points"], request["seed"])}
     return {"elements": of_elements(network)} if "elements" in request else draw(request, chart)

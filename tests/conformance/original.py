@@ -75,6 +75,23 @@ class Original:
         """
         return self._ask({"file": str(file.resolve()), "count": count, "seed": seed, "seconds": seconds})
 
+    def allows(
+        self, text: str, witness: dict[str, Any], labels: list[dict[str, Any]], seconds: float
+    ) -> tuple[str, str]:
+        """Whether a program allows labels with a witness: "allowed", "refuted" or "open", and why.
+
+        Args:
+            text: The program.
+            witness: Values of random variables by `line:column`.
+            labels: One for each object of the program, the ego first.
+            seconds: Processor time that it may take.
+
+        Raises:
+            SystemExit: The process has ended.
+        """
+        answer = self._ask({"text": text, "witness": witness, "labels": labels, "seconds": seconds})
+        return answer["replay"], answer["why"]
+
     def simulate(self, program: dict[str, str], seed: int, seconds: float, steps: int) -> dict[str, Any]:
         """A trace of a program, by `simulate.py`, or the error that Scenic reports for it.
 
