@@ -1,7 +1,8 @@
 """OpenDRIVE maps (`.xodr`) through Scenic's own parser, which the extra `scenicq[opendrive]` installs.
 
 The parser runs in a child process on a copy of the map, so that neither its caches nor its faults reach the user: it
-reads no crossings, and fails on some maps. What it gives is kept by the map's content in a folder of the caller's.
+reads no crossings and drops lanes of many types, which is told, and fails on some maps. What it gives is kept by the
+map's content in a folder of the caller's.
 """
 
 from __future__ import annotations
@@ -11,11 +12,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
+from scenicq.importers.xml_tree import read_xml
 from scenicq.store.atomic_files import whole_file, write_whole
 
 __all__ = ["SUFFIX", "convert_maps", "convert_xodr"]
@@ -25,6 +29,10 @@ _WORKER = Path(__file__).with_name("opendrive_worker.py")
 _TIMEOUT_S = 600.0
 _LARGEST_BYTES = 256 << 20
 _MISSING, _FAILED = 3, 4
+_SIDES = ("left", "right")
+_FOR_VEHICLES = frozenset(
+    {"HOV", "bus", "taxi", "bidirectional", "mwyEntry", "mwyExit", "slipLane", "shared", "roadWorks"}
+)
 _INSTALL = "`pip install 'scenicq[opendrive]'` installs Scenic, whose parser reads OpenDRIVE"
 
 
@@ -44,10 +52,27 @@ def convert_maps(files: Mapping[str, Path], cache: Path, report: Report) -> dict
         found[name] = file
         if file.suffix.lower() == SUFFIX:
             found[name] = convert_xodr(file, cache)
-            if b'type="crosswalk"' in file.read_bytes():
-                message = f"{file.name}: Scenic's parser reads no crossings; the map has some"
-                report.left_out("map element", "map-lacks", message)
+            _tell_left_out(file, report)
     return found
+
+
+def _tell_left_out(file: Path, report: Report) -> None:
+    """Count what the map has and Scenic's parser does not read; crossings and lanes are told."""
+    root = read_xml(file)
+    known = specification("opendrive")
+    known.count_xml(root, report)
+    if any(each.get("type") == "crosswalk" for each in root.iter("object")):
+        message = f"{file.name}: Scenic's parser reads no crossings; the map has some"
+        report.left_out("map element", "map-lacks", message)
+    lanes = Counter(
+        lane.get("type") or "" for side in _SIDES for lanes in root.iter(side) for lane in lanes.iter("lane")
+    )
+    for kind, count in sorted(lanes.items()):
+        if not known.count(f"lane/@type/{kind}", report, count) and kind in _FOR_VEHICLES:
+            message = f"{file.name}: Scenic's parser takes lanes of the type `{kind}` for no road; the map has {count}"
+            report.left_out("map element", "map-lacks", message)
+    both = sum(lane.get("direction") == "both" for lane in root.iter("lane"))
+    report.not_read('lane/@direction="both"', both)
 
 
 def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeout_s: float = _TIMEOUT_S) -> Path:
@@ -118,6 +143,6 @@ def _run(path: Path, command: list[str], folder: Path, timeout_s: float) -> None
         raise DataError(Diagnostic("option-invalid", message, hints=(_INSTALL,)))
     if done.returncode:
         lines = done.stderr.decode(errors="replace").strip().splitlines()
-        why = lines[-1][:300] if done.returncode == _FAILED and lines else f"it ended with code {done.returncode}"
+        why = lines[-1][:500] if done.returncode == _FAILED and lines else f"it ended with code {done.returncode}"
         hint = "Scenic 3.1.1 fails on some maps; a GeoJSON map can be given in its place"
         raise DataError(Diagnostic("file-invalid", f"map {path}: Scenic's parser cannot read it: {why}", hints=(hint,)))

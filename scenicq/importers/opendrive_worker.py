@@ -2,7 +2,10 @@
 
 Usage: `python opendrive_worker.py MAP.xodr MAP.geojson`. It imports nothing of this package, so the Python that runs it
 only needs Scenic. Exit codes: 0 done, 3 Scenic is missing, 4 Scenic cannot read the map (the last line on stderr says
-why).
+why, and at which road or junction).
+
+Scenic 3.1.1 takes lanes on the right of every road to run along it and those on the left against it, whatever the map
+says of sides and directions. Lanes that run the other way are turned here, one by one.
 """
 
 # Scenic has no type stubs.
@@ -13,6 +16,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 from xml.etree import ElementTree
@@ -30,7 +34,7 @@ try:
 except ImportError:
     Network = None
 
-__all__: list[str] = []
+__all__ = ["Directions", "explain"]
 
 _MEMORY_BYTES = 8 << 30
 """A map that claims a road of a million kilometres must not take the machine down."""
@@ -48,36 +52,132 @@ def _main(source: str, target: str) -> int:
         # Neither reads nor writes Scenic's own cache, which would lie beside the map.
         network: Any = Network.fromFile(source, useCache=False, writeCache=False)
     except Exception as error:  # noqa: BLE001 - whatever Scenic's parser stumbles over is the map's fault here
-        sys.stderr.write(f"\n{type(error).__name__}: {error}".replace("\n", " ") + "\n")
+        sys.stderr.write("\n" + explain(error, source).replace("\n", " ") + "\n")
         return 4
-    features = _features(network, _keeps_left(source))
+    features = _features(network, Directions(ElementTree.parse(source).getroot()))  # noqa: S314 - Scenic read it, too
     with open(target, "w", encoding="utf-8") as file:
         json.dump({"type": "FeatureCollection", "features": features}, file)
     return 0
 
 
-def _features(network: Any, left_hand: bool) -> list[dict[str, Any]]:
+class Directions:
+    """Which way the lanes of a map run, as far as that is not what Scenic takes them to do.
+
+    Attributes:
+        left_hand: Roads, by id, on which traffic keeps to the left.
+    """
+
+    def __init__(self, root: ElementTree.Element) -> None:
+        """Read the rules of roads and the directions of lanes."""
+        self.left_hand = {road.get("id", "") for road in root.iter("road") if (road.get("rule") or "").upper() == "LHT"}
+        self._turned: dict[tuple[str, int], bool] = {}
+        for road in root.iter("road"):
+            for lane in road.iter("lane"):
+                name = lane.get("id") or ""
+                if name.lstrip("-").isdigit() and (turned := self._turns(road, lane, int(name))) is not None:
+                    self._turned.setdefault((road.get("id", ""), int(name)), turned)
+
+    def _turns(self, road: ElementTree.Element, lane: ElementTree.Element, number: int) -> bool | None:
+        """Whether a lane says that it runs otherwise than Scenic takes it to do; None if it says nothing."""
+        direction = lane.get("direction")
+        if direction in ("standard", "reversed"):
+            return (direction == "reversed") != (road.get("id", "") in self.left_hand)
+        if road.get("rule"):
+            return None
+        # so say the tools that made CARLA's maps, where the standard's own words are missing
+        way = next((each.get("travelDir") for each in lane.iter("vectorLane")), None)
+        return (way == "backward") != (number > 0) if way in ("forward", "backward") else None
+
+    def turned(self, road: str, lane: int) -> bool:
+        """Whether a lane, by its road and number, runs against what Scenic takes it to do."""
+        return self._turned.get((road, lane), road in self.left_hand)
+
+
+def explain(error: BaseException, source: str) -> str:
+    """What Scenic's parser stumbled over: its own words, the elements that it was at, and what is not there.
+
+    Args:
+        error: What it raised.
+        source: The map.
+    """
+    if isinstance(error, ElementTree.ParseError):
+        return f"it is not sound XML: {error}"
+    words = str(error).replace(source, "the map")
+    text = f"{type(error).__name__}: {words}" if words else type(error).__name__
+    if at := list(dict.fromkeys(_elements_at(error))):
+        text += f", at {', '.join(at[:3])}"
+    if lost := list(dict.fromkeys(_dangling(ElementTree.parse(source).getroot()))):  # noqa: S314 - Scenic has read it the same way
+        text += f"; {'; '.join(lost[:3])}"
+    return text
+
+
+_CALLED = {"RoadLink": "the link of road", "Road": "road", "Junction": "junction", "Lane": "lane", "Signal": "signal"}
+"""Scenic's classes that stand for an element, and what the element is called."""
+
+
+def _elements_at(error: BaseException) -> Iterator[str]:
+    """The elements that were worked on, the innermost first."""
+    frames: list[Any] = []
+    trace = error.__traceback__
+    while trace is not None:
+        frames.append(trace.tb_frame)
+        trace = trace.tb_next
+    for frame in reversed(frames):
+        for value in frame.f_locals.values():
+            if isinstance(value, ElementTree.Element) and value.get("id") is not None:
+                yield f"{value.tag} `{value.get('id')}`"
+            called = _CALLED.get(type(value).__name__)
+            name = getattr(value, "id_", getattr(value, "id_a", None))
+            if called is not None and name is not None:
+                yield f"{called} `{name}`"
+
+
+def _dangling(root: ElementTree.Element) -> Iterator[str]:
+    """References to roads and junctions that are not there."""
+    roads = {road.get("id") for road in root.iter("road")}
+    junctions = {junction.get("id") for junction in root.iter("junction")}
+    for junction in root.iter("junction"):
+        for connection in junction.iter("connection"):
+            for key in ("incomingRoad", "connectingRoad"):
+                if (name := connection.get(key)) not in roads:
+                    yield f"junction `{junction.get('id')}`: there is no {key} `{name}`"
+    for road in root.iter("road"):
+        for way in ("predecessor", "successor"):
+            link = road.find(f"link/{way}")
+            if link is not None:
+                name, kind = link.get("elementId"), link.get("elementType")
+                if name not in (junctions if kind == "junction" else roads):
+                    yield f"road `{road.get('id')}`: its {way} is {kind} `{name}`, which is not there"
+
+
+def _features(network: Any, directions: Directions) -> list[dict[str, Any]]:
+    def turned(lane: Any) -> bool:
+        return directions.turned(str(lane.road.id), lane.sections[0].openDriveID)
+
+    def keeps_left(element: Any) -> bool:
+        return str(element.road.id) in directions.left_hand
+
     crossing_of: dict[str, str] = {}
     after: dict[str, list[str]] = {}
     for lane in network.lanes:
         for maneuver in lane.maneuvers:
             way = [part.uid for part in (lane, maneuver.connectingLane, maneuver.endLane) if part is not None]
-            for here, there in pairwise(reversed(way) if left_hand else way):
+            for here, there in pairwise(reversed(way) if turned(lane) else way):
                 after.setdefault(here, []).append(there)
     for crossing in network.intersections:
         for maneuver in crossing.maneuvers:
             if maneuver.connectingLane is not None:
                 crossing_of[maneuver.connectingLane.road.uid] = crossing.uid
-    found = [_lane(lane, after, left_hand) for lane in network.lanes]
-    found += [_section(section, left_hand) for section in network.laneSections]
+    found = [_lane(lane, after, turned(lane), keeps_left(lane)) for lane in network.lanes]
+    found += [_section(section, turned(section.lane), keeps_left(section.lane)) for section in network.laneSections]
     for group in network.laneGroups:
         links = {"road": group.road.uid, "opposite": _uid(group._opposite)}
         found.append(_feature(group.uid, "lane_group", group.polygon, links))
         if group.curb is not None:
             found.append(_feature(f"{group.uid}_curb", "curb", _line(group.curb), {"group": group.uid}))
     for road in (*network.roads, *network.connectingRoads):
-        directions = (_uid(road.forwardLanes), _uid(road.backwardLanes))
-        forward, backward = reversed(directions) if left_hand else directions
+        groups = (_uid(road.forwardLanes), _uid(road.backwardLanes))
+        forward, backward = reversed(groups) if keeps_left(road.lanes[0]) else groups
         links = {"forward": forward, "backward": backward}
         links["intersection"] = crossing_of.get(road.uid)
         found.append(_feature(road.uid, "road", road.polygon, links))
@@ -87,42 +187,33 @@ def _features(network: Any, left_hand: bool) -> list[dict[str, Any]]:
     found += [_feature(element.uid, "crossing", element.polygon, {}) for element in network.crossings]
     for kind, elements in (("sidewalk", network.sidewalks), ("shoulder", network.shoulders)):
         for element in elements:
-            links = {"centerline": _points(element.centerline, left_hand)}
+            links = {"centerline": _points(element.centerline, keeps_left(element))}
             found.append(_feature(element.uid, kind, element.polygon, links))
     return found
 
 
-def _lane(lane: Any, after: dict[str, list[str]], left_hand: bool) -> dict[str, Any]:
+def _lane(lane: Any, after: dict[str, list[str]], turned: bool, left_hand: bool) -> dict[str, Any]:
     links = {
         "group": _uid(lane.group),
         "road": _uid(lane.road),
         "successors": list(dict.fromkeys(after.get(lane.uid, []))),
         "traffic": "left" if left_hand else None,
-        "centerline": _points(lane.centerline, left_hand),
+        "centerline": _points(lane.centerline, turned),
     }
     return _feature(lane.uid, "lane", lane.polygon, links)
 
 
-def _section(section: Any, left_hand: bool) -> dict[str, Any]:
+def _section(section: Any, turned: bool, left_hand: bool) -> dict[str, Any]:
     sides = (section._laneToLeft, section._laneToRight)
-    left, right = reversed(sides) if left_hand else sides
+    left, right = reversed(sides) if turned else sides
     links = {
         "lane": section.lane.uid,
         "left": _uid(left),
         "right": _uid(right),
         "traffic": "left" if left_hand else None,
-        "centerline": _points(section.centerline, left_hand),
+        "centerline": _points(section.centerline, turned),
     }
     return _feature(section.uid, "lane_section", section.polygon, links)
-
-
-def _keeps_left(source: str) -> bool:
-    """Whether the map says that traffic keeps to the left.
-
-    Scenic 3.1.1 does not read that, and takes all traffic to keep to the right: every lane runs the wrong way then.
-    """
-    roads = ElementTree.parse(source).iter("road")  # noqa: S314 - Scenic has read it the same way before
-    return any((road.get("rule") or "").upper() == "LHT" for road in roads)
 
 
 def _uid(element: Any) -> str | None:

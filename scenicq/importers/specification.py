@@ -90,7 +90,7 @@ class Specification:
                     if self.count(child, report, _members(member)) and (below := self._below.get(child)):
                         waiting.append((below, member))
 
-    def count_xml(self, element: Element, report: Report, at: str) -> None:
+    def count_xml(self, element: Element, report: Report, at: str = "") -> None:
         """Count what is left out of an XML element; attributes are below their element, with an `@`.
 
         Args:
@@ -102,9 +102,9 @@ class Specification:
         while waiting:
             path, element = waiting.pop()
             for name in element.attrib:
-                self.count(f"{path}/@{name}", report)
+                self.count(f"{path}/@{name}" if path else f"@{name}", report)
             for child in element:
-                inner = f"{path}/{child.tag}"
+                inner = f"{path}/{child.tag}" if path else child.tag
                 if self.count(inner, report) and (below := self._below.get(inner)):
                     waiting.append((below, child))
 

@@ -6,15 +6,19 @@ import importlib.util
 import json
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
+import shapely
 
 from scenicq.errors import DataError
 from scenicq.geometry.features import read_geojson
 from scenicq.geometry.network import Network
 from scenicq.importers.ingest import ingest
 from scenicq.importers.opendrive import convert_maps, convert_xodr
+from scenicq.importers.opendrive_worker import Directions, explain
 from scenicq.importers.report import Report
 from scenicq.store.dataset import open_dataset
 
@@ -85,7 +89,148 @@ def test_crossings_that_are_lost_are_told(xodr: Path, tmp_path: Path) -> None:
     files = convert_maps({"Town": xodr, "other": tmp_path / "x.geojson"}, tmp_path, report)
     assert files["other"] == tmp_path / "x.geojson"
     assert files["Town"].suffix == ".geojson"
-    assert [(entry.what, entry.code) for entry in report.counts] == [("map element", "map-lacks")]
+    assert [entry.what for entry in report.counts if entry.code == "map-lacks"] == ["map element"]
+
+
+def lane(number: int, kind: str = "driving", attributes: str = "", more: str = "") -> str:
+    width = '<width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
+    return f'<lane id="{number}" type="{kind}" level="false" {attributes}>{width}{more}</lane>'
+
+
+def road(number: int, y: float, left: str, right: str, attributes: str = "") -> str:
+    """A straight road of 100 m along x."""
+    sides = f'<left>{left}</left><center><lane id="0" type="none"/></center><right>{right}</right>'
+    return (
+        f'<road name="" length="100" id="{number}" junction="-1" {attributes}><planView>'
+        f'<geometry s="0" x="0" y="{y}" hdg="0" length="100"><line/></geometry></planView>'
+        f'<lanes><laneSection s="0">{sides}</laneSection></lanes></road>'
+    )
+
+
+def opendrive(*elements: str) -> str:
+    return f'<OpenDRIVE><header revMajor="1" revMinor="8"/>{"".join(elements)}</OpenDRIVE>'
+
+
+def vector(way: str) -> str:
+    return f'<userData><vectorLane travelDir="{way}"/></userData>'
+
+
+DIRECTIONS = [
+    # attributes of the road, number and attributes of the lane and what is in it, whether it runs along the road
+    ("", -1, "", "", True),
+    ("", 1, "", "", False),
+    ('rule="RHT"', -1, "", "", True),
+    ('rule="LHT"', -1, "", "", False),
+    ('rule="LHT"', 1, "", "", True),
+    ("", -1, 'direction="standard"', "", True),
+    ("", -1, 'direction="reversed"', "", False),
+    ("", 1, 'direction="reversed"', "", True),
+    ('rule="LHT"', 1, 'direction="standard"', "", True),
+    ('rule="LHT"', 1, 'direction="reversed"', "", False),
+    ("", -1, "", vector("forward"), True),
+    ("", 1, "", vector("backward"), False),
+    ("", 1, "", vector("forward"), True),
+    ("", -1, "", vector("backward"), False),
+    ('rule="LHT"', -1, "", vector("forward"), False),
+    ("", -1, "", vector("undirected"), True),
+]
+
+
+@pytest.mark.parametrize(("rule", "number", "attributes", "more", "along"), DIRECTIONS)
+def test_each_lane_runs_as_its_road_and_itself_say(
+    rule: str, number: int, attributes: str, more: str, along: bool
+) -> None:
+    sides = (lane(number, "driving", attributes, more), "")
+    other = road(2, 50, lane(1), lane(-1))
+    text = opendrive(road(1, 0, *(sides if number > 0 else sides[::-1]), rule), other)
+    directions = Directions(ElementTree.fromstring(text))
+    # Scenic takes lanes on the right to run along the road.
+    assert ((number < 0) != directions.turned("1", number)) == along
+    assert not directions.turned("2", 1)
+    assert not directions.turned("2", -1)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("scenic") is None, reason="Scenic is not installed")
+def test_roads_of_both_rules_in_one_map(tmp_path: Path) -> None:
+    file = tmp_path / "mixed.xodr"
+    roads: list[str] = []
+    for number, (rule, lane_number, attributes, more, _) in enumerate(DIRECTIONS, start=1):
+        sides = (lane(lane_number, "driving", attributes, more), "")
+        roads.append(road(number, 50.0 * number, *(sides if lane_number > 0 else sides[::-1]), rule))
+    file.write_text(opendrive(*roads))
+    features = read_geojson(convert_xodr(file, tmp_path / "cache"), lambda _, problem: pytest.fail(problem))
+    found: dict[int, bool] = {}
+    for feature in features:
+        if feature.kind == "lane":
+            (line,) = feature.properties["centerline"]
+            found[round(shapely.centroid(feature.shape).y / 50)] = line[-1][0] > line[0][0]
+    assert found == {number: case[-1] for number, case in enumerate(DIRECTIONS, start=1)}
+
+
+def test_lanes_that_are_lost_are_counted_by_type(xodr: Path, tmp_path: Path) -> None:
+    right = lane(-1, "HOV") + lane(-2, "bus") + lane(-3, "bus", 'direction="both"') + lane(-4) + lane(-5, "biking")
+    xodr.write_text(opendrive(road(1, 0, lane(1), right)))
+    report = Report()
+    convert_xodr(xodr, tmp_path, python=stand_in(tmp_path, f"printf '%s' '{EMPTY}' > \"$4\""))
+    convert_maps({"Town": xodr}, tmp_path, report)
+    counts = {entry.name: entry.count for entry in report.counts if entry.code == "not-read"}
+    assert counts == {
+        "lane/@type/HOV": 1, "lane/@type/bus": 2, "lane/@type/biking": 1, 'lane/@direction="both"': 1
+    }  # fmt: skip
+    told = [diagnostic.message for diagnostic in report.diagnostics if diagnostic.code == "map-lacks"]
+    assert [("`HOV`" in text, "`bus`" in text) for text in told] == [(True, False), (False, True)]
+
+
+class TestWhatScenicStumblesOver:
+    """A stand-in for Scenic's parser, whose classes and variables are called the same."""
+
+    def explain(self, tmp_path: Path, text: str, parse: Callable[[ElementTree.Element], object]) -> str:
+        file = tmp_path / "map.xodr"
+        file.write_text(text)
+        try:
+            parse(ElementTree.parse(file).getroot())
+        except Exception as error:
+            return explain(error, str(file))
+        raise AssertionError("nothing was raised")
+
+    def test_the_road_and_the_lane_are_named(self, tmp_path: Path) -> None:
+        class Road:
+            def __init__(self, id_: str) -> None:
+                self.id_ = id_
+
+        def parse_lanes(side: ElementTree.Element) -> None:
+            for each in side.iter("lane"):
+                float(each.get("nothing", "x"))
+
+        def parse(root: ElementTree.Element) -> None:
+            for element in root.iter("road"):
+                made = Road(element.get("id", ""))
+                parse_lanes(element)
+                assert made
+
+        text = self.explain(tmp_path, opendrive(road(7, 0, lane(1), lane(-1))), parse)
+        assert text == "ValueError: could not convert string to float: 'x', at road `7`, lane `1`"
+
+    def test_what_is_not_there_is_named(self, tmp_path: Path) -> None:
+        connection = '<connection id="0" incomingRoad="7" connectingRoad="9" contactPoint="start"/>'
+        link = '<link><successor elementType="junction" elementId="3"/></link>'
+        text = opendrive(
+            road(7, 0, lane(1), lane(-1)).replace("<planView>", f"{link}<planView>"),
+            f'<junction id="2">{connection}</junction>',
+        )
+        said = self.explain(tmp_path, text, lambda root: {}[9])
+        assert "junction `2`: there is no connectingRoad `9`" in said
+        assert "road `7`: its successor is junction `3`, which is not there" in said
+
+    def test_no_temporary_path_is_named(self, tmp_path: Path) -> None:
+        def parse(root: ElementTree.Element) -> None:
+            raise ValueError(f"{tmp_path / 'map.xodr'} does not appear to be an OpenDRIVE file")
+
+        said = self.explain(tmp_path, "<a/>", parse)
+        assert said == "ValueError: the map does not appear to be an OpenDRIVE file"
+
+    def test_xml(self, tmp_path: Path) -> None:
+        assert "not sound XML" in self.explain(tmp_path, "<a", lambda root: None)
 
 
 @pytest.mark.slow
