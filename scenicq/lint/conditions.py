@@ -13,6 +13,7 @@ from typing import cast
 from shapely import minimum_rotated_rectangle, unary_union
 from shapely.geometry import MultiPolygon, Polygon
 
+from scenicq.compiler.temporal import is_temporal
 from scenicq.errors import Diagnostic, Span
 from scenicq.forest.bounds import Box, scalar_bounds
 from scenicq.forest.condition import expand
@@ -82,8 +83,7 @@ def _dropped(scenario: Scenario, body: tuple[ast.Statement, ...]) -> Iterator[Di
     """Requirements that are known to hold without a scene: the compiler has left them out."""
     kept = {each.span for each in (*scenario.requirements, *scenario.soft)}
     for statement in body:
-        timed = isinstance(statement, ast.Require) and isinstance(statement.condition, ast.Temporal | ast.UntilOperator)
-        if isinstance(statement, ast.Require) and not timed and statement.span not in kept:
+        if isinstance(statement, ast.Require) and statement.span not in kept and not is_temporal(statement.condition):
             yield _always(statement.span)
 
 

@@ -27,6 +27,7 @@ from scenicq.syntax.tokens import CLOSERS
 __all__ = ["OperatorParser"]
 
 _TEMPORAL = ("always", "eventually", "next")
+_SIGNS = ("-", "+", "~")
 
 
 class OperatorParser(PrefixParser):
@@ -186,7 +187,7 @@ class OperatorParser(PrefixParser):
         if token.kind == "name":
             if self.is_prefix():
                 return self.prefix_at(level)
-            if text in _TEMPORAL and self.is_temporal():
+            if text in _TEMPORAL and self.is_temporal(level):
                 return self.temporal_operator()
             if text == "new" and self.peek().kind == "name" and self.names_class(self.index + 1):
                 return self.new()
@@ -202,7 +203,7 @@ class OperatorParser(PrefixParser):
             self.advance()
             value = self.binary(NOT)
             return ast.UnaryOp(self.span(token.start), "not", value)
-        elif text in ("-", "+", "~"):
+        elif text in _SIGNS:
             self.advance()
             value = self.binary(SIGN)
             symbol: Literal["-", "+", "~"] = "-" if text == "-" else "+" if text == "+" else "~"
@@ -222,14 +223,17 @@ class OperatorParser(PrefixParser):
             raise self.fail(f"the operator that starts with `{self.text}` needs parentheses here", hint=hint)
         return self.prefix()
 
-    def is_temporal(self) -> bool:
-        """Whether `always`, `eventually` or `next` is an operator here, and not a function or a variable."""
+    def is_temporal(self, level: int) -> bool:
+        """Whether `always`, `eventually` or `next` is an operator here, and not a function or a variable.
+
+        Before a bracket or a sign it is one where a requirement may have one: `always -x < 3`, but not `y > always(x)`.
+        """
         following = self.peek()
-        if following.text in CLOSERS:
-            return self.temporal and following.text == "("
+        if following.text in CLOSERS or following.text in _SIGNS:
+            return self.temporal and level <= NOT
         if following.text == "relative" and self.peek(2).text == "to":
             return False
-        return self.starts_operand(self.index + 1) and following.text not in ("-", "+", "*", "~")
+        return self.starts_operand(self.index + 1) and following.text != "*"
 
     def temporal_operator(self) -> ast.Expression:
         """Read `always x`, `eventually x` or `next x`."""

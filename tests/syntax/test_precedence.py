@@ -123,8 +123,20 @@ def test_temporal_operators_in_requirements(text: str, expected: str) -> None:
     assert shape(statement(f"require {text}")) == f"Require({expected})"
 
 
-def test_temporal_words_are_functions_elsewhere() -> None:
+@pytest.mark.parametrize("word", ["always", "eventually", "next"])
+@pytest.mark.parametrize("place", ["{}", "not {}", "y and {}", "y or {}", "y implies {}", "y until {}", "({})"])
+@pytest.mark.parametrize(
+    "operand", ["x", "1", "'x'", "-x", "+x", "~x", "-1 < 3", "(x)", "[x][0]", "{1: x}[1]", "not x", "f(x)", "x.y[0]"]
+)
+def test_temporal_operators_before_whatever_begins_an_operand(word: str, place: str, operand: str) -> None:
+    inner = shape(expression(operand))
+    assert f"Temporal({word}, {inner})" in shape(statement(f"require {place.format(f'{word} {operand}')}"))
+
+
+def test_temporal_words_are_functions_and_variables_elsewhere() -> None:
     assert shape(expression("next(x) + always(y)")) == "(+ next(x) always(y))"
+    for text in ("y > always(x)", "y > always - 1", "y in always[0]", "y + next[0] > 1"):
+        assert "Temporal" not in shape(statement(f"require {text}"))
 
 
 @pytest.mark.parametrize("text", ["1 + distance to x", "-angle to x", "2 * front of x", "x ** visible y"])
