@@ -6,20 +6,20 @@ else (columns computed from the map, files, checksums) is the store's. Read next
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
-
-import numpy as np
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import InvalidError, check_characters, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
-from scenicq.store.columns import MemberColumns, RecordingColumns
+from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.labels import Label, LabelObject, Recording
+from scenicq.store.value_rules import LONGEST_NAME, find_problems, json_object
 from scenicq.store.wkb import FARTHEST_M
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ __all__ = [
     "read_class_map",
     "read_maps",
 ]
+
+_Facts = Sequence[str | None]
+"""What is wrong with each of some things; None where nothing is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +188,7 @@ class Labels:
             recording: The recording.
         """
         name, map_name, frames = recording.name, recording.map, recording.frames
-        if not (_are_places(recording.egos) and _are_places(recording.objects)):
+        if find_problems(recording):
             return False
         unique = set(frames)
         if len(unique) < len(frames) or unique & self._frames or any((name, frame) in self._taken for frame in frames):
@@ -205,7 +208,11 @@ class Labels:
         sound: list[Label] = []
         times: dict[int, str] = {}
         map_name = labels[0][0].map if labels else ""
-        for label, place in labels:
+        problems = find_problems(columns_of(Recording(name, map_name, tuple(label for label, _ in labels))))
+        first_object = first_sensor = 0
+        for number, (label, place) in enumerate(labels):
+            objects, sensors = first_object, first_sensor
+            first_object, first_sensor = objects + len(label.objects), sensors + len(label.sensors)
             if label.frame in self._frames or (name, label.frame) in self._taken:
                 self._leave_out(f"{place}: label id `{label.frame}` is used twice")
             elif label.map != map_name:
@@ -214,12 +221,14 @@ class Labels:
             elif label.timestamp_us in times:
                 message = f"label `{label.frame}` has the time of label `{times[label.timestamp_us]}`"
                 self._leave_out(f"{place}: {message} in recording `{name}`")
-            elif not _is_place(label.ego):
-                self._leave_out(f"{place}: the ego of label `{label.frame}` is at no place on a map")
+            elif number in problems.labels:
+                self._leave_out(f"{place}: label `{label.frame}` or its ego: {problems.labels[number]}")
             else:
                 self._frames.add(label.frame)
                 times[label.timestamp_us] = label.frame
-                sound.append(self._with_sound_objects(label, place))
+                of_objects = [problems.objects.get(objects + row) for row in range(len(label.objects))]
+                of_sensors = [problems.sensors.get(sensors + row) for row in range(len(label.sensors))]
+                sound.append(self._with_sound_objects(label, of_objects, of_sensors, place))
         if not sound:
             self._report.left_out("recording", "record-invalid", f"recording `{name}` has no sound label")
             return None
@@ -237,33 +246,31 @@ class Labels:
     def _leave_out(self, message: str) -> None:
         self._report.left_out("label", "record-invalid", message)
 
-    def _with_sound_objects(self, label: Label, place: str) -> Label:
+    def _with_sound_objects(self, label: Label, of_objects: _Facts, of_sensors: _Facts, place: str) -> Label:
+        """A label without the objects and sensor files of which something is wrong."""
         ids = {"ego"}
         sound: list[LabelObject] = []
-        for member in label.objects:
+        owner = f"of label `{label.frame}`"
+        for member, problem in zip(label.objects, of_objects, strict=True):
             if member.id in ids:
                 why = "is kept for the ego" if member.id == "ego" else "is used twice"
-                message = f"{place}: object id `{member.id}` of label `{label.frame}` {why}"
+                message = f"{place}: object id `{member.id}` {owner} {why}"
                 self._report.left_out("object", "record-invalid", message)
-            elif not _is_place(member):
-                message = f"{place}: object `{member.id}` of label `{label.frame}` is at no place on a map"
+            elif problem is not None:
+                message = f"{place}: object `{member.id}` {owner}: {problem}"
                 self._report.left_out("object", "record-invalid", message)
             else:
                 ids.add(member.id)
                 sound.append(member)
-        if len(sound) == len(label.objects):
+        sensors = dict(label.sensors)
+        for channel, problem in zip(label.sensors, of_sensors, strict=True):
+            if problem is not None:
+                del sensors[channel]
+                message = f"{place}: sensor file `{channel}` {owner}: {problem}"
+                self._report.left_out("sensor file", "record-invalid", message)
+        if len(sound) == len(label.objects) and len(sensors) == len(label.sensors):
             return label
-        return replace(label, objects=tuple(sound))
-
-
-def _is_place(member: LabelObject) -> bool:
-    z = None if member.out_of_plane is None else member.out_of_plane.z
-    return all(abs(part) <= FARTHEST_M for part in (member.x, member.y, z or 0.0))
-
-
-def _are_places(members: MemberColumns) -> bool:
-    parts = (members.x, members.y, *(() if members.z is None else (members.z,)))
-    return not any(bool((np.abs(part) > FARTHEST_M).any()) for part in parts)
+        return replace(label, objects=tuple(sound), sensors=sensors)
 
 
 def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict[str, tuple[MapFeature, ...]]:
@@ -275,12 +282,29 @@ def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict
     """
     kept: dict[str, tuple[MapFeature, ...]] = {}
     for name, features in maps.items():
-        far = {feature.id for feature in features if not _farthest(feature) <= FARTHEST_M}
-        for each in sorted(far):
-            message = f"map `{name}`: element `{each}` is at no place on a map"
+        unsound = {feature.id: problem for feature in features if (problem := _element_problem(feature))}
+        for each in sorted(unsound):
+            message = f"map `{name}`: element `{each}` {unsound[each]}"
             report.left_out("map element", "map-invalid", message)
-        kept[name] = tuple(feature for feature in features if feature.id not in far)
+        kept[name] = tuple(feature for feature in features if feature.id not in unsound)
     return kept
+
+
+def _element_problem(feature: MapFeature) -> str | None:
+    """What an element of a map has that no dataset may have."""
+    if not _farthest(feature) <= FARTHEST_M:
+        return "is at no place on a map"
+    from scenicq.geometry.features import REFERENCES, names  # noqa: PLC0415 - slow to load, and for maps
+    from scenicq.store.map_validation import properties_problem  # noqa: PLC0415 - the same
+
+    # the centreline is numbers by now, and most of what there is
+    properties = {key: value for key, value in feature.properties.items() if key != "centerline"}
+    if problem := properties_problem(feature.kind, json_object(json.dumps(properties))):
+        return f"has unsound properties: {problem}"
+    texts = [feature.id, feature.kind]
+    for key in REFERENCES.get(feature.kind, {}):
+        texts += names(feature, key) if key in feature.properties else ()
+    return f"has a name of more than {LONGEST_NAME} characters" if max(map(len, texts)) > LONGEST_NAME else None
 
 
 def _farthest(feature: MapFeature) -> float:

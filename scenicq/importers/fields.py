@@ -7,6 +7,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
+from scenicq.store.value_rules import LONGEST_NAME
+
 __all__ = [
     "LONGEST_TEXT",
     "InvalidError",
@@ -27,7 +29,7 @@ __all__ = [
 ]
 
 Record = Mapping[str, Any]
-LONGEST_TEXT = 1 << 12
+LONGEST_TEXT = LONGEST_NAME
 """Characters of a name."""
 _LARGEST = 2**63 - 1
 

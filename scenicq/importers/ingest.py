@@ -15,6 +15,7 @@ from pathlib import Path
 from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.base import Entry, Importer, OpenedSource, Options, on_the_map, read_class_map
+from scenicq.importers.fields import LONGEST_TEXT
 from scenicq.importers.folders import readable
 from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
@@ -264,6 +265,9 @@ def _map_files(maps: Sequence[str | Path]) -> dict[str, Path]:
         path = Path(file if equals else name)
         if not path.is_file():
             raise DataError(Diagnostic("file-missing", f"map {path} is not there"))
+        if not 0 < len(name if equals else path.stem) <= LONGEST_TEXT:
+            message = f"the name of map {path} is empty, or has more than {LONGEST_TEXT} characters"
+            raise DataError(Diagnostic("option-invalid", message))
         files[readable(name if equals else path.stem)] = path
     return files
 

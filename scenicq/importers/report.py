@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
@@ -16,6 +17,8 @@ __all__ = ["Report"]
 _TOLD = 20
 _MOST_ELEMENTS, _LONGEST_ELEMENT = 200, 200
 """Kinds of elements that are counted apart, and characters of what they are called: a source may make up any number."""
+_LONG = re.compile(r"`([^`]{80})[^`]{20,}`")
+"""A name of more characters than a message should show."""
 
 
 class Report:
@@ -137,7 +140,8 @@ class Report:
         return sum(count for (_, *key, _name), count in self._counts.items() if key == [what, code])
 
     def _add(self, problem: SourceProblem, *, strict: bool = True) -> None:
-        problem = replace(problem, name=readable(problem.name), message=readable(problem.message))
+        message = _LONG.sub(r"`\1...`", readable(problem.message))
+        problem = replace(problem, name=readable(problem.name), message=message)
         if self._strict and strict:
             raise DataError(Diagnostic(problem.code, problem.message, hints=problem.hints))
         known = problem.name and _key(problem) in self._counts

@@ -14,10 +14,11 @@ import shapely
 
 from scenicq.geometry.features import REFERENCES
 from scenicq.store.schema import ArrowTable
-from scenicq.store.validation import invalid, json_object
+from scenicq.store.validation import invalid
+from scenicq.store.value_rules import json_object
 from scenicq.store.wkb import FARTHEST_M, wkb_problem
 
-__all__ = ["check_lanes", "check_regions"]
+__all__ = ["check_lanes", "check_regions", "properties_problem"]
 
 _DEEPEST = 64
 """Nested lists and objects of properties."""
@@ -46,7 +47,7 @@ def check_regions(rows: ArrowTable, file: str, counts: Mapping[str, int]) -> Non
         found[name].add(key)
         if (problem := wkb_problem(geometry, lines=kind == "curb")) is not None:
             invalid(file, problem, row, "geometry")
-        if (problem := _properties_problem(kind, json_object(text))) is not None:
+        if (problem := properties_problem(kind, json_object(text))) is not None:
             invalid(file, problem, row, "properties")
     told = {name: len(keys) for name, keys in found.items()}
     if told != {name: count for name, count in counts.items() if count}:
@@ -68,7 +69,13 @@ def check_lanes(rows: ArrowTable, file: str) -> None:
             invalid(file, problem, row, "centerline")
 
 
-def _properties_problem(kind: str, properties: dict[str, Any] | None) -> str | None:
+def properties_problem(kind: str, properties: Mapping[str, Any] | None) -> str | None:
+    """What is wrong with the properties of an element of a map; None where nothing is.
+
+    Args:
+        kind: Of the element.
+        properties: What `json_object` makes of their text.
+    """
     if properties is None:
         return "is no JSON object of finite numbers"
     for key in REFERENCES.get(kind, {}):

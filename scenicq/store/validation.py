@@ -11,11 +11,9 @@ maps. What the writer guarantees needs no such look.
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Collection, Generator, Sequence
 from contextlib import contextmanager
-from typing import Any, NoReturn, cast
+from typing import Any, NoReturn
 
 import numpy as np
 import pyarrow as pa
@@ -26,23 +24,13 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.store.classes import is_class
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
-from scenicq.store.wkb import FARTHEST_M
+from scenicq.store.value_rules import TEXT_KEYS, is_json, longest_text, plain_object_problem, unsound_reals
 
-__all__ = ["check_table", "invalid", "json_object", "read_sound"]
+__all__ = ["check_table", "invalid", "read_sound"]
 
 _MOST_BYTES = 1 << 32
 """Of one file, decoded. A segment has a quarter of that at most, unless a recording is very long."""
-_LONGEST_NAME, _LONGEST_JSON = 1 << 12, 1 << 20
-"""Characters of a text."""
-_HALF_TURN = math.pi + 1e-6
-_PLACES = frozenset({"x", "y", "z", "ego_x", "ego_y", "ego_z"})
-_TURNS = frozenset(
-    "heading ego_heading relative_heading road_directions ego_road_directions pitch roll ego_pitch ego_roll".split()
-)
-_NOT_NEGATIVE = frozenset({"object_count", "first_object", "sensor_count", "first_sensor", "ordinal", "distance"})
-_SIZES = frozenset({"width", "length", "height", "ego_width", "ego_length", "ego_height", "ego_distance"})
-_TEXT_KEYS = frozenset({"frame", "recording", "map"})
-"""Names that must not be empty."""
+_NOT_NEGATIVE = frozenset({"object_count", "first_object", "sensor_count", "first_sensor", "ordinal"})
 
 
 def invalid(file: object, what: str, row: int | None = None, column: str | None = None) -> NoReturn:
@@ -177,28 +165,24 @@ def _check_nested(name: str, kind: Any, values: ArrowArray, file: str) -> None:
 
 def _check_reals(name: str, values: ArrowArray, file: str) -> None:
     _refuse(pc.invert(pc.is_finite(values)), "is not finite", file, name)
-    if name in _PLACES:
-        _refuse(pc.greater(pc.abs(values), FARTHEST_M), "is no place on a map", file, name)
-    if name in _TURNS:
-        _refuse(pc.greater(pc.abs(values), _HALF_TURN), "is not an angle between -pi and pi", file, name)
-    if name in _SIZES or name in _NOT_NEGATIVE:
-        _refuse(pc.less(values, 0.0), "is negative", file, name)
+    for wrong, what in unsound_reals(name, values.to_numpy(zero_copy_only=False)):
+        if wrong.any():
+            invalid(file, what, int(np.argmax(wrong)), name)
 
 
 def _check_texts(name: str, values: ArrowArray, file: str) -> None:
     coded = values if kinds.is_dictionary(values.type) else values.dictionary_encode()
     texts, numbers = coded.dictionary, coded.indices
-    is_json = name.endswith(("attributes", "params", "properties"))
-    most = _LONGEST_JSON if is_json else _LONGEST_NAME
+    most = longest_text(name)
     if name != "properties":  # of which a map may have long ones
         _refuse_texts(pc.greater(pc.utf8_length(texts), most), f"is longer than {most} characters", numbers, file, name)
-    if name in _TEXT_KEYS:
+    if name in TEXT_KEYS:
         _refuse_texts(pc.equal(texts, ""), "is empty", numbers, file, name)
     if name in ("class", "ego_class"):
         bad = [not (is_class(text) or (text == "" and name == "ego_class")) for text in texts.to_pylist()]
         _refuse_texts(bad, "is no class of the class tree", numbers, file, name)
-    if is_json and name != "properties":
-        problems = [None if text is None else _attributes_problem(text) for text in texts.to_pylist()]
+    if is_json(name) and name != "properties":
+        problems = [None if text is None else plain_object_problem(text) for text in texts.to_pylist()]
         for problem in dict.fromkeys(each for each in problems if each is not None):
             _refuse_texts([each == problem for each in problems], problem, numbers, file, name)
 
@@ -210,41 +194,6 @@ def _refuse_texts(bad: Sequence[bool] | ArrowArray, what: str, numbers: ArrowArr
         rows = np.isin(pc.fill_null(numbers, -1).to_numpy(zero_copy_only=False), wrong)
         if rows.any():
             invalid(file, what, int(np.argmax(rows)), column)
-
-
-def _attributes_problem(text: str) -> str | None:
-    """Why a text is no JSON object of plain values."""
-    values = json_object(text)
-    if values is None:
-        return "is no JSON object of finite numbers"
-    plain = all(isinstance(value, str | int | float | bool) for value in values.values())
-    return None if plain else "has a value that is neither text nor number nor truth value"
-
-
-def json_object(text: str) -> dict[str, Any] | None:
-    """The object that a JSON text is, with numbers that floats can hold; None where it is none."""
-    try:
-        value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_whole)
-    except (ValueError, RecursionError):
-        return None
-    return cast("dict[str, Any]", value) if isinstance(value, dict) else None
-
-
-def _refuse_constant(text: str) -> NoReturn:
-    raise ValueError(text)
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(text)
-    return value
-
-
-def _whole(text: str) -> int:
-    if len(text) > 300:  # 10**308 is the last that a float can hold
-        raise ValueError(text)
-    return int(text)
 
 
 def _refuse(bad: ArrowArray, what: str, file: str, column: str) -> None:
