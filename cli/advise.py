@@ -46,6 +46,8 @@ def advise(query: Query, *, asked: bool) -> None:
     found = advice(query, budget_s=math.inf if asked else _BUDGET_S, brief=not asked)
     funnel = query.funnel
     lines = [f"{count(funnel.matches, 'match')} in {count(funnel.frames, 'frame')}"]
+    if funnel.unknowns:
+        lines[0] += f", {funnel.unknowns:,} unknown"
     if found.without_map:
         lines[0] += f"; {found.without_map:,} lie on maps that lack what the program needs"
     if found.first:

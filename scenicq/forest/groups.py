@@ -62,11 +62,15 @@ class Group:
         constraints: In program order.
         variables: The random variables of all of them.
         objects: The objects whose features are compared or referred to, ascending.
+        doubtful: Those as the program has them that read what is not observed. `constraints` say only what may hold.
+        certain: All constraints, where `doubtful` ones hold only if they do whatever is not observed; empty without.
     """
 
     constraints: tuple[Constraint, ...]
     variables: tuple[Leaf, ...]
     objects: tuple[int, ...]
+    doubtful: tuple[Constraint, ...] = ()
+    certain: tuple[Constraint, ...] = ()
 
 
 def group_constraints(constraints: Iterable[Constraint]) -> tuple[Group, ...]:

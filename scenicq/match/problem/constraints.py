@@ -6,16 +6,20 @@ Depends on what label objects observe (their *signature*), not on their values, 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Container, Iterator, Mapping
+from dataclasses import replace
 
+from scenicq.forest import build
 from scenicq.forest.collisions import apart, boxes
 from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
 from scenicq.forest.nodes import Feature, Node
-from scenicq.forest.scenario import BuiltIn, Scenario, ScenarioObject
-from scenicq.forest.walk import features
+from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
+from scenicq.forest.unobserved import MOTION, certain_and_possible
+from scenicq.forest.walk import features, postorder
 from scenicq.match.options import MatchOptions
 
-__all__ = ["Signature", "build_groups", "describe_constraint", "relevant_properties"]
+__all__ = ["Signature", "build_groups", "describe_constraint", "relevant_properties", "unobserved_motion"]
 
 Signature = tuple[frozenset[str], ...]
 """What is observed of each object of the scenario, by index; of the parameters at the end."""
@@ -45,10 +49,13 @@ def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[froz
 
 
 def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, noisy: bool = False) -> Node | None:
-    """The expression of a feature that is not observed (or, unless `noisy`, whose observed value has noise added)."""
+    """The expression of a feature that is not observed (or, unless `noisy`, whose observed value has noise added).
+
+    None for one that is, and for how an object moves, which is only ever observed.
+    """
     owner = scenario.objects[feature.object]
     hidden = feature.property in owner.mutated and not noisy
-    if feature.property in signature[feature.object] and not hidden:
+    if feature.property in MOTION or (feature.property in signature[feature.object] and not hidden):
         return None
     return owner.properties[feature.property].value
 
@@ -97,7 +104,54 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
         for first, second in itertools.combinations(scenario.solid, 2):
             requirement = apart(scenario, frames, first, second)
             found.append(Condition(requirement, after_noise(requirement.condition)))
-    return group_constraints(found)
+
+    def unobserved(feature: Feature) -> bool:
+        return feature.property in MOTION and feature.property not in signature[feature.object]
+
+    return tuple(_with_doubts(group, unobserved) for group in group_constraints(found))
+
+
+def _with_doubts(group: Group, unobserved: Callable[[Feature], bool]) -> Group:
+    """A group whose constraints read only what is observed; see `Group.certain`."""
+    doubtful = [item for item in group.constraints if any(map(unobserved, _read(item)))]
+    if not doubtful:
+        return group
+    certain, possible = list[Constraint](), list[Constraint]()
+    for item in group.constraints:
+        if item not in doubtful:
+            certain.append(item)
+            possible.append(item)
+            continue
+        if isinstance(item, Condition):
+            requirement, ends = item.requirement, certain_and_possible(item.expression, unobserved)
+        else:
+            # no value of what is compared is known to be the label's, and none is known not to be
+            ends = build.constant(False), build.constant(True)
+            requirement = Requirement(item.expression, item.span)
+        certain.append(Condition(requirement, ends[0]))
+        possible.append(Condition(requirement, ends[1]))
+    return replace(group, constraints=tuple(possible), doubtful=tuple(doubtful), certain=tuple(certain))
+
+
+def _read(item: Constraint) -> Iterator[Feature]:
+    return (node for node in postorder((item.expression,)) if isinstance(node, Feature))
+
+
+def unobserved_motion(scenario: Scenario, seen: Mapping[int, Container[str]], constraint: Constraint) -> str:
+    """What of objects' motion a constraint reads and no label object observes, such as `ego.speed is not observed`.
+
+    Args:
+        scenario: The scenario.
+        seen: The properties that are observed of each object, by index.
+        constraint: The constraint.
+    """
+    read = sorted(features(constraint.expression))
+    names = [
+        f"{scenario.objects[index].name}.{name}"
+        for index, name in read
+        if name in MOTION and index in seen and name not in seen[index]
+    ]
+    return f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} not observed" if names else ""
 
 
 def describe_constraint(scenario: Scenario, constraint: Constraint) -> str:

@@ -8,7 +8,11 @@ from dataclasses import dataclass
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Identity, Value
 
-__all__ = ["Outcome", "Refuted", "Satisfied", "Undecided"]
+__all__ = ["UNOBSERVED", "Outcome", "Refuted", "Satisfied", "Undecided"]
+
+
+UNOBSERVED = "unobserved"
+"""Why a group is undecided that reads what the label does not tell."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,18 +81,19 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
                 pass
         return (type(node).__name__, own, below)
 
-    for node in postorder([item.expression for item in group.constraints]):
+    items = (*group.constraints, *group.certain, *group.doubtful)
+    for node in postorder([item.expression for item in items]):
         numbers[id(node)] = len(rows)
         rows.append(row(node))
     heads: list[Hashable] = []
-    for item in group.constraints:
+    for item in items:
         about = (
             (role(item.object), item.property, tolerance.scope(item.object, item.property))
             if isinstance(item, Comparison)
             else None
         )
         heads.append((about, numbers[id(item.expression)]))
-    return GroupShape((tuple(rows), tuple(heads)), tuple(roles))
+    return GroupShape((tuple(rows), tuple(heads), len(group.doubtful)), tuple(roles))
 
 
 def interchangeable(
@@ -155,7 +156,7 @@ class _Swaps:
 
     def _form(self, group: Group, forms: _Forms, swap: Mapping[int, int]) -> Hashable:
         items: Counter[Hashable] = Counter()
-        for item in group.constraints:
+        for item in (*group.constraints, *group.doubtful):
             about: Hashable = None
             if isinstance(item, Comparison):
                 scope = self.tolerance.scope(item.object, item.property)

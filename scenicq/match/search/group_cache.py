@@ -7,7 +7,7 @@ forty-eight holds for all.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from scenicq.budget import TimeIsUp, look
@@ -19,12 +19,12 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, condition_group
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.problem.radius import within_radius
 from scenicq.match.search.choice_search import decide_with_choices
 from scenicq.match.search.group_plan import GroupPlan
 
-__all__ = ["Asker", "GroupCache", "translated"]
+__all__ = ["Asker", "GroupCache", "known_of", "surely", "translated"]
 
 
 class Asker(Protocol):
@@ -75,6 +75,8 @@ class GroupCache:
         known = self._known.get(key)
         if known is None:
             outcome = self._in_closed_form(plan, assignment) or self._by_cascade(plan.group, assignment)
+            if plan.group.doubtful and isinstance(outcome, Satisfied):
+                outcome = known_of(plan.group, self._by_cascade(surely(plan.group), assignment))
             known = self._known[key] = (plan.group, outcome)
         return known
 
@@ -113,7 +115,18 @@ def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:
         return Satisfied(
             {new.identity: outcome.values[old.identity] for old, new in pairs if old.identity in outcome.values}
         )
-    constraint = target.constraints[source.constraints.index(outcome.constraint)]
+    sources, targets = ((*each.doubtful, *each.constraints, *each.certain) for each in (source, target))
+    constraint = targets[sources.index(outcome.constraint)]
     return (
         Refuted(constraint, outcome.detail) if isinstance(outcome, Refuted) else Undecided(constraint, outcome.reason)
     )
+
+
+def surely(group: Group) -> Group:
+    """The group that only those satisfy who satisfy it whatever is not observed."""
+    return replace(group, constraints=group.certain, doubtful=(), certain=())
+
+
+def known_of(group: Group, sure: Outcome) -> Outcome:
+    """The outcome of a group that may be satisfied, from that of `surely` of it."""
+    return Undecided(group.doubtful[0], UNOBSERVED) if isinstance(sure, Refuted) else sure

@@ -84,7 +84,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
             number = kinds.setdefault(small.key, len(kinds))
             parts.append(GroupPlan(part, number, small.roles, closed_form_of(part, scenario.ego)))
         number = kinds.setdefault(shape.key, len(kinds))
-        form = closed_form_of(group, scenario.ego)
+        form = None if group.doubtful else closed_form_of(group, scenario.ego)
         steps = steps_of(*(item.expression for item in group.constraints))
         groups.append(GroupPlan(group, number, shape.roles, form, tuple(parts), steps))
         paired = [part.roles for part in parts if len(part.roles) > 1]

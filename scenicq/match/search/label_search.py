@@ -22,7 +22,7 @@ from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import Asker, GroupCache, translated
+from scenicq.match.search.group_cache import Asker, GroupCache, known_of, surely, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 _FEW_STEPS = 64
@@ -324,7 +324,7 @@ class LabelSearch:
             if isinstance(outcome, Satisfied):
                 yield Solution(assignment, tuple((group, outcome) for group in plan.groups))
                 continue
-            group = next(each.group for each in plan.groups if outcome.constraint in each.group.constraints)
+            group = next(each.group for each in plan.groups if outcome.constraint in _all_of(each.group))
             failure = Failure(1, group, outcome, assignment)
             if isinstance(outcome, Refuted):
                 self._fail(failure)
@@ -335,9 +335,19 @@ class LabelSearch:
         if not plan.groups:
             return Satisfied({})
         try:
-            return self.ask([self.items(each.group, assignment) for each in plan.groups])
+            outcome = self.ask([self.items(each.group, assignment) for each in plan.groups])
+            doubtful = [each.group for each in plan.groups if each.group.doubtful]
+            if doubtful and isinstance(outcome, Satisfied):
+                sure = [surely(each.group) if each.group.doubtful else each.group for each in plan.groups]
+                outcome = known_of(doubtful[0], self.ask([self.items(group, assignment) for group in sure]))
+            return outcome
         except CannotEvaluate as error:
             return Undecided(plan.groups[0].group.constraints[0], f"unsupported: {error}")
+
+
+def _all_of(group: Group) -> tuple[Constraint, ...]:
+    """What may be to blame where a group is not satisfied."""
+    return (*group.constraints, *group.doubtful, *group.certain)
 
 
 def _without(slots: list[Slot], undecided: set[tuple[int, int]]) -> list[Slot]:

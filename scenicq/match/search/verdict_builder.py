@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.constraints import describe_constraint
-from scenicq.match.problem.outcome import Refuted
+from scenicq.match.problem.constraints import describe_constraint, unobserved_motion
+from scenicq.match.problem.outcome import UNOBSERVED, Refuted
 from scenicq.match.search.first_fit import FilledBatch, FirstFit
 from scenicq.match.search.label_search import Failure, LabelSearch, Solution
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
@@ -74,7 +74,12 @@ class VerdictBuilder:
         if search.undecided is not None:
             found = search.undecided
             reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
-            return _UNDECIDED, Unknown(reason, self._cause(found), self.names(label, ego | dict(found.assignment)))
+            assignment = ego | dict(found.assignment)
+            cause = self._cause(found)
+            if reason == UNOBSERVED:
+                seen = {index: search.problem.seen[number] for index, number in assignment.items()}
+                cause = replace(cause, detail=unobserved_motion(self.scenario, seen, found.constraint))
+            return _UNDECIDED, Unknown(reason, cause, self.names(label, assignment))
         if ended is not None:
             most = {
                 "budget": f"{self.options.budget:,} steps",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.scenario import Scenario
+from scenicq.forest.unobserved import MOTION
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import relevant_properties
@@ -36,9 +37,6 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
 
 _FIRST_BATCH, _BATCH = 16, 2048
 """Labels whose places are looked up together: few until it is known what matters."""
-_MOTION = frozenset({"speed", "velocity", "angularSpeed", "acceleration"})
-"""Properties that the store computes of tracks."""
-
 __all__ = ["CompiledMap", "Decided", "Decider", "every_label"]
 
 
@@ -68,7 +66,7 @@ class CompiledMap:
         empty = Plan(network.name, (), "", (), None)
         plan = make_plan(scenario, network, options, deciding=not proofs) if prefilter else empty
         observed = frozenset[str]().union(*relevant_properties(scenario, options))
-        return cls(scenario, network, plan, not _MOTION.isdisjoint(observed), observed)
+        return cls(scenario, network, plan, not MOTION.isdisjoint(observed), observed)
 
 
 @dataclass(frozen=True, slots=True)

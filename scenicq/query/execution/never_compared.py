@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from scenicq.errors import Diagnostic, Span
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.scenario import Scenario
+from scenicq.forest.unobserved import MOTION
 from scenicq.forest.walk import features
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT, class_matches, subclasses
@@ -34,8 +35,6 @@ _COLUMNS = {
     "speed": "motion_vx", "angularSpeed": "yaw_rate", "acceleration": "acceleration",
 }  # fmt: skip
 """Properties that have columns of their own; all others are attributes."""
-_READ = frozenset({"velocity", "speed", "angularSpeed", "acceleration"})
-"""Properties for which a library's default stands in where a requirement reads them, although it means nothing."""
 _NOT_SEEN = frozenset({
     "position", "behavior", "requireVisible", "allowCollisions", "regionContainedIn", "visibleDistance", "viewAngle",
     "cameraOffset", "mutationScale", "positionStdDev", "headingStdDev", "parentOrientation", "yaw", "baseOffset",
@@ -98,22 +97,30 @@ def _settings(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
         for name, span in owner.uncomparable.items():
             if name not in _NOT_SEEN:
                 yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, span, comparable=False)
-    for requirement in scenario.requirements:
-        for index, name in features(requirement.condition):
-            if index == PARAMS or name not in _READ:
-                continue
-            owner = scenario.objects[index]
-            if not owner.properties[name].explicit:
-                ego = index == scenario.ego and options.ego == "label"
-                told = f"read here: the library's default for `{name}` stands in"
-                yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, requirement.span, told)
-    for condition in scenario.dynamics.conditions if scenario.dynamics is not None else ():
-        for index, name in features(condition):
-            if index != PARAMS and name in _READ:
+    yield from _motion_read(scenario, options)
+
+
+def _motion_read(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
+    """What a scenario reads of how objects move: no default stands in where labels do not tell."""
+    frame, over_time = (
+        "read here: a frame that hangs on it is unknown",
+        "read here: an interval that hangs on it is unknown",
+    )
+    read = [(requirement.condition, requirement.span, frame) for requirement in scenario.requirements]
+    read += [
+        (given.value, given.span, frame)
+        for owner in scenario.objects
+        for name, given in owner.properties.items()
+        if given.explicit or name in ("position", "heading")
+    ]
+    dynamics = scenario.dynamics
+    read += [(condition, condition.span, over_time) for condition in (dynamics.conditions if dynamics else ())]
+    for root, span, told in read:
+        for index, name in features(root):
+            if index != PARAMS and name in MOTION:
                 owner = scenario.objects[index]
                 ego = index == scenario.ego and options.ego == "label"
-                told = "read here: an interval that hangs on it is unknown"
-                yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, condition.span, told)
+                yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, span, told)
 
 
 def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOptions) -> Coverage:

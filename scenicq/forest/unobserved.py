@@ -1,0 +1,128 @@
+"""Conditions on what a label does not observe: between what surely holds and what may hold lies what is unknown.
+
+How an object moves (`MOTION`) is only ever observed, as no default of a class says it. A condition that reads what is
+not observed is replaced by two that do not: one that holds only where the condition surely does, one that holds
+wherever it may (Kleene's logic).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from scenicq.forest import build
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import Compare, CompareOp, Constant, Feature, Logic, LogicOp, Node, Select
+from scenicq.forest.walk import children, postorder, transform
+
+__all__ = ["MOTION", "Truths", "certain_and_possible"]
+
+MOTION = frozenset({"speed", "velocity", "acceleration", "angularSpeed"})
+"""Properties that say how an object moves."""
+
+Truths = tuple[Node, Node]
+"""A condition that holds only where another surely holds, and one that holds wherever that may hold."""
+
+_MOST_SELECTS = 8
+"""Choices inside one comparison whose outcomes are told apart."""
+
+
+def certain_and_possible(root: Node, unobserved: Callable[[Feature], bool]) -> Truths:
+    """What a condition is known to be without what is not observed.
+
+    Args:
+        root: The condition.
+        unobserved: Whether a feature is not observed.
+
+    Returns:
+        The condition itself twice where it reads nothing unobserved.
+    """
+    return _Reader(unobserved).truths(root, _MOST_SELECTS)
+
+
+_FALSE, _TRUE = build.constant(False), build.constant(True)
+
+
+class _Reader:
+    def __init__(self, unobserved: Callable[[Feature], bool]) -> None:
+        self._unobserved = unobserved
+
+    def truths(self, root: Node, selects: int) -> Truths:
+        """As `certain_and_possible`; at most so many choices inside one comparison are told apart."""
+        reading: set[int] = set()
+        found: dict[int, Truths] = {}
+        for node in postorder((root,)):
+            below = children(node)
+            if (isinstance(node, Feature) and self._unobserved(node)) or any(id(each) in reading for each in below):
+                reading.add(id(node))
+            if kind_of(node) == "boolean" or node is root:
+                reads = id(node) in reading
+                found[id(node)] = self._one(node, found, reading, selects) if reads else (node, node)
+        return found[id(root)]
+
+    def _one(self, node: Node, found: dict[int, Truths], reading: set[int], selects: int) -> Truths:
+        """The same of a node that reads what is not observed, after those below it."""
+        match node:
+            case Logic(op=LogicOp.NOT, args=(arg,)) if id(arg) in found:
+                return _opposite(found[id(arg)])
+            case Logic() if node.op is not LogicOp.NOT and all(id(arg) in found for arg in node.args):
+                return _joined(node.op, *(found[id(arg)] for arg in node.args))
+            case Select() if all(id(option) in found for option in node.options):
+                return _chosen(node, found, index_known=id(node.index) not in reading)
+            case Compare(op=CompareOp.EQ | CompareOp.NE) if kind_of(node.left) == kind_of(node.right) == "boolean":
+                one, other = found[id(node.left)], found[id(node.right)]
+                same = _joined(LogicOp.OR, _joined(LogicOp.AND, one, other),
+                               _joined(LogicOp.AND, _opposite(one), _opposite(other)))  # fmt: skip
+                return same if node.op is CompareOp.EQ else _opposite(same)
+            case _:
+                return self._atom(node, reading, selects)
+
+    def _atom(self, node: Node, reading: set[int], selects: int) -> Truths:
+        """The same of a condition on values: what is the same for all outcomes of a choice inside is known."""
+        inside = (each for each in postorder((node,)) if isinstance(each, Select) and each is not node)
+        choice = next((each for each in inside if id(each) in reading), None)
+        if choice is None or selects == 0:
+            return _FALSE, _TRUE
+        outcomes: list[Node] = []
+        for number in range(len(choice.options)):
+
+            def outcome(each: Node, number: int = number, choice: Select = choice) -> Node:
+                return each.options[number] if isinstance(each, Select) and each.index is choice.index else each
+
+            outcomes.append(transform(node, outcome))
+        return self.truths(Select(choice.index, tuple(outcomes), span=node.span), selects - 1)
+
+
+def _opposite(truths: Truths) -> Truths:
+    certain, possible = truths
+    return build.opposite(possible), build.opposite(certain)
+
+
+def _is(node: Node, value: bool) -> bool:
+    return isinstance(node, Constant) and node.value is value
+
+
+def _joined(op: LogicOp, *args: Truths) -> Truths:
+    """`and` or `or`; what is known of the operands decides it where that is enough."""
+    return _connected(op, [certain for certain, _ in args]), _connected(op, [possible for _, possible in args])
+
+
+def _connected(op: LogicOp, args: list[Node]) -> Node:
+    decisive = op is LogicOp.OR
+    if any(_is(arg, decisive) for arg in args):
+        return build.constant(decisive)
+    left = [arg for arg in args if not _is(arg, not decisive)]
+    return build.logic(op, *left) if len(left) > 1 else left[0] if left else build.constant(not decisive)
+
+
+def _chosen(node: Select, found: dict[int, Truths], *, index_known: bool) -> Truths:
+    """A choice between conditions; where its index is not known, what all its options agree on."""
+    options = [found[id(option)] for option in node.options]
+    if index_known:
+        certain, possible = (tuple(option[place] for option in options) for place in (0, 1))
+        return Select(node.index, certain, span=node.span), Select(node.index, possible, span=node.span)
+    every, some = _joined(LogicOp.AND, *options)[0], _joined(LogicOp.OR, *options)[1]
+    if id(node.index) not in found:
+        return every, some
+    index, (no, yes) = found[id(node.index)], options
+    chosen = _joined(LogicOp.OR, _joined(LogicOp.AND, index, yes), _joined(LogicOp.AND, _opposite(index), no))
+    return _joined(LogicOp.OR, chosen, (every, every))[0], chosen[1]
