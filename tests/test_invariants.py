@@ -20,6 +20,7 @@ README = (LIBRARY / "README.md").read_text()
 PASSES = ("forest/", "match/", "query/prefilter/", "temporal/")
 """Where expressions are gone through. Syntax and compiler recurse over the program's text, which the parser limits."""
 RECURSIVE = {
+    "forest/unobserved.py": "choices inside one comparison, at most a stated number of them",
     "match/decide/cascade.py": "the discrete variables and truth values of a group, at most a stated number of them",
     "match/decide/decomposition.py": "each part has fewer constraints, or fewer distances of hidden points",
     "match/search/choice_search.py": "choices met only in what another choice leads to, to a stated depth",

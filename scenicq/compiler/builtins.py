@@ -16,7 +16,8 @@ from typing import Any, cast
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import LARGEST, hashed, is_random, plain_binary
 from scenicq.compiler.choices import distribute, is_choice
-from scenicq.compiler.coerce import to_scalar, to_vector
+from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
+from scenicq.compiler.courses import as_test
 from scenicq.compiler.distributions import DISTRIBUTIONS
 from scenicq.compiler.region_functions import REGION_FUNCTIONS
 from scenicq.compiler.rounding import rounded, truncated
@@ -216,8 +217,9 @@ def _dict(span: Span, pairs: ModelValue = (), **named: ModelValue) -> ModelValue
     return {**{hashed(key, span): value for key, value in found}, **named}
 
 
-def _known_truth(span: Span, value: ModelValue = False) -> ModelValue:
-    return truth(value, span)
+def _truth_value(span: Span, value: ModelValue = False) -> ModelValue:
+    test = as_test(value, span)
+    return test if is_node(test) and kind_of_model(test) == "boolean" else truth(test, span)
 
 
 def _abs(span: Span, value: ModelValue) -> ModelValue:
@@ -283,7 +285,7 @@ def language_names() -> dict[str, ModelValue]:
         "set": _set,
         "frozenset": _set,
         "dict": _dict,
-        "bool": _known_truth,
+        "bool": _truth_value,
         "range": _whole_numbers,
         "sin": _scalar_function(*_OPS["sin"]),
         "cos": _scalar_function(*_OPS["cos"]),

@@ -17,6 +17,7 @@ from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
 
 __all__ = [
+    "LACKING",
     "distribute",
     "each_existing",
     "each_option",
@@ -29,7 +30,7 @@ __all__ = [
 
 _MOST_OPTIONS = 20_000
 """Options of a choice, those of nested choices included."""
-_LACKING = frozenset({"map-lacks", "runtime-error"})
+LACKING = frozenset({"map-lacks", "runtime-error"})
 """Errors that only say that something is not there: a part of the map, an item of a list."""
 
 
@@ -72,7 +73,7 @@ def each_existing(run: Runner, choice: Choice, function: Callable[[ModelValue], 
             with run.excluded.assuming(choice.index, number, len(choice.options)):
                 found[number] = function(option)
         except ScenarioError as error:
-            if option is not None and error.diagnostics[0].code not in _LACKING:
+            if option is not None and error.diagnostics[0].code not in LACKING:
                 raise
             missing = missing or error
             if option is not None:

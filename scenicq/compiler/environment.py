@@ -12,11 +12,12 @@ from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.unavailable import unavailable_name
 from scenicq.compiler.values import Function, Instance, ModelValue, fail
 from scenicq.errors import Span
+from scenicq.forest.nodes import Node
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS, TURNS
 
-__all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Environment", "Runner"]
+__all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Course", "Environment", "Runner"]
 
 FIRST_LIBRARIES = frozenset({"gtaLib", "mars"})
 """The 2019 paper's libraries."""
@@ -191,6 +192,18 @@ class Environment:
         self.shared.get(name, self).names[name] = value
 
 
+class Course(Protocol):
+    """What decides the tests of a condition that is evaluated."""
+
+    def decide(self, test: Node, span: Span) -> bool:
+        """What a random test comes out as.
+
+        Raises:
+            ScenarioError: random-branch, where the condition may take one course alone.
+        """
+        ...
+
+
 class Runner(Protocol):
     """What evaluating an expression asks of the interpreter.
 
@@ -202,6 +215,8 @@ class Runner(Protocol):
         network: The road network that the program is compiled against.
         lookups: What the program asks about places of the map.
         excluded: Outcomes of random choices that no scene has.
+        course: Decides the tests of a condition on the scene while one is evaluated: there, no value of an object is
+            known before a label tells it. None while the program itself runs.
     """
 
     version: int
@@ -211,6 +226,7 @@ class Runner(Protocol):
     network: Network
     lookups: Lookups
     excluded: Exclusions
+    course: Course | None
 
     def ego(self, span: Span) -> Instance:
         """The ego.

@@ -20,7 +20,7 @@ from scenicq.compiler.coerce import to_region, to_scalar
 from scenicq.compiler.comparisons import binary, iterate
 from scenicq.compiler.deviations import deviation, leaves_the_plane
 from scenicq.compiler.element_lookups import Lookups
-from scenicq.compiler.environment import Budget, Environment
+from scenicq.compiler.environment import Budget, Course, Environment
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.imports import import_into
@@ -100,6 +100,7 @@ class Interpreter:
     timed: TimedStatements | None = None
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
+    course: Course | None = None
     workspace: Node = field(default_factory=lambda: build.constant(Everywhere()))
     _bound: dict[int, tuple[object, frozenset[str]]] = field(default_factory=dict[int, Any])
 

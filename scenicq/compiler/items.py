@@ -15,6 +15,7 @@ from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import kind_of_model, to_vector
 from scenicq.compiler.comparisons import iterate
 from scenicq.compiler.environment import Runner
+from scenicq.compiler.known_properties import decided
 from scenicq.compiler.values import Choice, ModelValue, Module, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -57,6 +58,8 @@ def subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> 
     value = value.names if isinstance(value, Module) and value.name == "globalParameters" else regions_apart(value)
     if isinstance(value, Choice):
         return each_existing(run, value, lambda option: subscript(run, option, index, span), span)
+    if run.course is not None and kind_of_model(index) == "boolean" and isinstance(value, list | tuple | dict | str):
+        index = decided(run, index, span)
     if is_random(index) and isinstance(value, list | tuple):
         raise fail("unsupported-construct", "a random index is not supported", span, "random here",
                    ("use `Uniform(*list)` to pick one of the items",))  # fmt: skip

@@ -1,7 +1,8 @@
 """What a program knows of its objects although labels observe it: properties that the program sets to known values.
 
 Objects' positions and the like are held by reference, because a label's value takes their place. Where the course of
-the program depends on one, only the program's own value can be meant.
+the program depends on one, only the program's own value can be meant. Not so in conditions on the scene, which are
+about what a label observes (`courses`), nor for how objects move, of which a class's default says nothing.
 """
 
 from __future__ import annotations
@@ -9,12 +10,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from scenicq.compiler.builtins import truth
+from scenicq.compiler.coerce import kind_of_model
+from scenicq.compiler.courses import as_test
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.values import ModelValue, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.condition import condition
 from scenicq.forest.nodes import Constant, Feature, Node, Value
+from scenicq.forest.unobserved import MOTION
 from scenicq.forest.walk import features, postorder
 
 __all__ = ["decided", "settled"]
@@ -22,7 +26,7 @@ __all__ = ["decided", "settled"]
 
 def settled(run: Runner, value: ModelValue) -> ModelValue:
     """A value with known properties of objects put in, if that leaves nothing random; else the value itself."""
-    if not is_node(value) or isinstance(value, Constant):
+    if run.course is not None or not is_node(value) or isinstance(value, Constant):
         return value
     reached = list(postorder((value,)))
     todo = list({(node.object, node.property): None for node in reached if isinstance(node, Feature)})
@@ -49,7 +53,10 @@ def settled(run: Runner, value: ModelValue) -> ModelValue:
 
 def _definition(run: Runner, key: tuple[int, str]) -> Node | None:
     """What the program says of a property, as far as it is an expression or a plain value."""
-    own = run.objects[key[0]].properties.get(key[1])
+    instance = run.objects[key[0]]
+    if key[1] in MOTION and key[1] not in instance.explicit:
+        return None
+    own = instance.properties.get(key[1])
     if is_node(own):
         return own
     plain = isinstance(own, int | float | str) and not isinstance(own, bool)
@@ -72,6 +79,11 @@ def decided(run: Runner, value: ModelValue, span: Span) -> bool:
     """The truth of a condition on which the program's course depends.
 
     Raises:
-        ScenarioError: random-branch, where it is random.
+        ScenarioError: random-branch, where it is random, unless a condition on the scene is evaluated.
     """
-    return truth(settled(run, value), span)
+    if run.course is None:
+        return truth(settled(run, value), span)
+    test = as_test(value, span)
+    if is_node(test) and not isinstance(test, Constant) and kind_of_model(test) == "boolean":
+        return run.course.decide(test, span)
+    return truth(test, span)

@@ -7,16 +7,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import ExitStack
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random
 from scenicq.compiler.builtins import truth
 from scenicq.compiler.choices import distribute, is_choice
-from scenicq.compiler.coerce import kind_of_model
+from scenicq.compiler.coerce import kind_of_model, to_boolean
+from scenicq.compiler.courses import as_test, split
 from scenicq.compiler.environment import Environment, Runner
-from scenicq.compiler.values import Delayed, ModelValue, fail
+from scenicq.compiler.known_properties import decided
+from scenicq.compiler.values import Delayed, ModelValue, fail, is_node
 from scenicq.errors import Span
+from scenicq.forest.nodes import Constant
 from scenicq.syntax import ast
+from scenicq.syntax.walk import walk
 
 __all__ = ["condition", "connected", "inverted"]
 
@@ -25,12 +30,20 @@ def condition(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
     """The value of an expression of which only the truth counts."""
     match node:
         case ast.BoolOp():
-            values = (condition(run, part, scope) for part in node.values)
-            return _joined(node.operator, _until_decided(node.operator, values, node.span), node.span)
+            # each operand takes its courses by itself, unless one names what another reads
+            alone = run.course is not None and not any(isinstance(each, ast.Walrus) for each in walk(node))
+            values = (_operand(run, part, scope) if alone else condition(run, part, scope) for part in node.values)
+            return _joined(node.operator, _until_decided(run, node.operator, values, node.span), node.span)
         case ast.UnaryOp(operator="not"):
             return inverted(condition(run, node.operand, scope), node.span)
         case _:
             return run.evaluate(node, scope)
+
+
+def _operand(run: Runner, node: ast.Expression, scope: Environment) -> ModelValue:
+    """The truth of an operand, with all its courses."""
+    found = split(run, lambda: to_boolean(condition(run, node, scope), node.span), node.span)
+    return found.value if isinstance(found, Constant) and isinstance(found.value, bool) else found
 
 
 def inverted(value: ModelValue, span: Span) -> ModelValue:
@@ -41,18 +54,25 @@ def inverted(value: ModelValue, span: Span) -> ModelValue:
 def connected(run: Runner, node: ast.BoolOp, scope: Environment) -> ModelValue:
     """The value of `a and b` or `a or b`: the operand that decides, else the last one."""
     values = (run.evaluate(part, scope) for part in node.values)
-    return _deciding(node.operator, _until_decided(node.operator, values, node.span), node.span)
+    return _deciding(run, node.operator, _until_decided(run, node.operator, values, node.span), node.span)
 
 
-def _until_decided(op: str, values: Iterable[ModelValue], span: Span) -> list[ModelValue]:
-    """Operands up to the first known one that decides: Python does not evaluate the others."""
+def _until_decided(run: Runner, op: str, values: Iterable[ModelValue], span: Span) -> list[ModelValue]:
+    """Operands up to the first known one that decides: Python does not evaluate the others.
+
+    What one of them lacks excludes scenes in which those before do not decide.
+    """
     found: list[ModelValue] = []
-    for value in values:
-        if isinstance(value, Delayed):
-            raise fail("wrong-type", "this needs the object's position, which is not known here", span)
-        found.append(value)
-        if not is_random(value) and truth(value, span) == (op == "or"):
-            break
+    with ExitStack() as around:
+        for value in values:
+            if isinstance(value, Delayed):
+                raise fail("wrong-type", "this needs the object's position, which is not known here", span)
+            found.append(value)
+            if not is_random(value):
+                if truth(value, span) == (op == "or"):
+                    break
+            elif is_node(test := as_test(value, span)):
+                around.enter_context(run.excluded.assuming(test, int(op == "and"), 2))
     return found
 
 
@@ -64,7 +84,7 @@ def _joined(op: str, values: list[ModelValue], span: Span) -> ModelValue:
     return operators.combine(op, pending, span)
 
 
-def _deciding(op: str, values: list[ModelValue], span: Span) -> ModelValue:
+def _deciding(run: Runner, op: str, values: list[ModelValue], span: Span) -> ModelValue:
     """The operand that Python would take.
 
     Raises:
@@ -77,8 +97,10 @@ def _deciding(op: str, values: list[ModelValue], span: Span) -> ModelValue:
     if any(map(is_choice, left[:-1])):
 
         def taken(*outcome: ModelValue) -> ModelValue:
-            return _deciding(op, _until_decided(op, outcome, span), span)
+            return _deciding(run, op, _until_decided(run, op, outcome, span), span)
 
         return distribute(taken, tuple(left), span, spread=is_choice)
+    if run.course is not None:
+        return next((value for value in left[:-1] if decided(run, value, span) == (op == "or")), left[-1])
     raise fail("random-branch", f"which operand `{op}` gives depends on a random value", span, "random here",
                ("compare the values, as in `a > 0`", "state conditions with `require`"))  # fmt: skip

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from scenicq.compiler.coerce import to_boolean
+from scenicq.compiler.courses import split
 from scenicq.compiler.environment import Environment, Runner
 from scenicq.compiler.logic import condition
 from scenicq.compiler.temporal import TimedStatements, is_temporal
@@ -68,6 +69,9 @@ def deferred(run: Requirer, wanted: ast.Expression, scope: Environment, span: Sp
     then = dict(module.names)
 
     def held() -> Node:
+        return split(run, evaluated, wanted.span)
+
+    def evaluated() -> Node:
         # names and the ego are those of the moment of the statement, also in the functions that the condition calls
         now, before = module.names, run.current_ego
         module.names, run.current_ego = now | then, ego

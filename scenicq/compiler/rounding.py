@@ -1,6 +1,8 @@
-"""`int` and `round` of random numbers, exactly, in terms of floor and ceiling."""
+"""`int`, `round` and `sorted` of random numbers, exactly, in terms of floor and ceiling, least and greatest."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -18,7 +20,18 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import children
 
-__all__ = ["rounded", "truncated"]
+__all__ = ["in_order", "rounded", "truncated"]
+
+
+def in_order(values: Sequence[Node], span: Span) -> list[Node]:
+    """Numbers from the least to the greatest."""
+    found = list(values)
+    for last in range(len(found) - 1, 0, -1):
+        for number in range(last):
+            pair = found[number], found[number + 1]
+            found[number] = build.arithmetic(ArithmeticOp.MIN, *pair, span=span)
+            found[number + 1] = build.arithmetic(ArithmeticOp.MAX, *pair, span=span)
+    return found
 
 
 def truncated(value: Node, span: Span) -> Node:

@@ -14,12 +14,14 @@ from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random, plain_binary
 from scenicq.compiler.builtins import extreme, language_names, truth
 from scenicq.compiler.choices import each_option
-from scenicq.compiler.comparisons import iterate
+from scenicq.compiler.coerce import kind_of_model, to_scalar
+from scenicq.compiler.comparisons import compare, iterate
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector
 from scenicq.compiler.known_properties import decided, settled
-from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail
+from scenicq.compiler.rounding import in_order
+from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail, lift
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
 
@@ -50,17 +52,28 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
         columns = [iterate(items, span) for items in lists]
         return [call(run, function, list(row), {}, span) for row in zip(*columns, strict=False)]
 
+    def less(one: ModelValue, other: ModelValue, span: Span) -> bool:
+        run.budget.step(span)
+        if is_random(one) or is_random(other):
+            return decided(run, lift(lambda a, b: compare("<", a, b, span), one, other), span)
+        return plain_binary("<", one, other, span)
+
     def ordered(span: Span, items: ModelValue, key: ModelValue = None, reverse: ModelValue = False) -> ModelValue:
         keyed = [(_plain(settled(run, apply(key, item, span))), item) for item in iterate(items, span)]
-        if any(is_random(value) for value, _ in keyed):
+        random, backwards = any(is_random(value) for value, _ in keyed), truth(reverse, span)
+        if random and key is None and all(kind_of_model(item) == "scalar" for _, item in keyed):
+            run.budget.step(span, len(keyed) ** 2)
+            numbers = in_order([to_scalar(item, span) for _, item in keyed], span)
+            return numbers[::-1] if backwards else numbers
+        if random and run.course is None:
             raise fail("random-branch", "random values have no known order", span, "random here",
-                       ("sort by something known",))  # fmt: skip
+                       ("sort by something known", "state conditions with `require`"))  # fmt: skip
 
         def before(a: tuple[ModelValue, ModelValue], b: tuple[ModelValue, ModelValue]) -> int:
-            run.budget.step(span)
-            return plain_binary("<", b[0], a[0], span) - plain_binary("<", a[0], b[0], span)
+            # all that sorting asks
+            return -1 if less(a[0], b[0], span) else 0
 
-        return [item for _, item in sorted(keyed, key=cmp_to_key(before), reverse=truth(reverse, span))]
+        return [item for _, item in sorted(keyed, key=cmp_to_key(before), reverse=backwards)]
 
     def quantified(op: str) -> Callable[..., ModelValue]:
         def decide(span: Span, items: ModelValue) -> ModelValue:
@@ -83,10 +96,17 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
                 return default
             if key is None:
                 return plain(span, *values)
-            first = ordered(span, values, key, name == "max")
-            if not first:
+            if not values:
                 raise fail("runtime-error", f"`{name}` of an empty list", span)
-            return first[0]
+            keys = [_plain(settled(run, apply(key, value, span))) for value in values]
+            if run.course is None and any(map(is_random, keys)):
+                raise fail("random-branch", "random values have no known order", span, "random here",
+                           ("compare by something known", "state conditions with `require`"))  # fmt: skip
+            best = 0
+            for number in range(1, len(values)):
+                one, other = (number, best) if name == "min" else (best, number)
+                best = number if less(keys[one], keys[other], span) else best
+            return values[best]
 
         return find
 

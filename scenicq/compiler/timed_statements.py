@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol, cast
 
 from scenicq.compiler.assignment import assign
+from scenicq.compiler.courses import without_courses
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.items import items_of
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition, graph_of
@@ -104,7 +105,9 @@ def _watch(run: Timer, timed: TimedStatements, call: MonitorCall, span: Span) ->
 
     def rounds(node: ast.For, around: Environment) -> list[Environment]:
         inner: list[Environment] = []
-        for item in items_of(run, run.evaluate(node.iterable, around), node.iterable.span):
+        with without_courses(run):
+            items = items_of(run, run.evaluate(node.iterable, around), node.iterable.span)
+        for item in items:
             run.budget.step(node.span)
             inner.append(Environment({}, around))
             assign(run, node.target, item, inner[-1])

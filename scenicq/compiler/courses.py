@@ -1,0 +1,177 @@
+"""Conditions whose course hangs on the scene: `if`, filters, `sorted` and their like in `require`, monitors and ends.
+
+Scenic evaluates such a condition on the drawn scene, on which everything is known. Here a label takes the scene's place
+later on. So the condition is evaluated once for each course that it may take, and becomes a choice between their
+values. What one course lacks excludes the scenes that take it.
+"""
+
+# Programs are dynamically typed: their values are `Any`.
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass, field
+
+from scenicq.compiler.choices import LACKING
+from scenicq.compiler.coerce import kind_of_model
+from scenicq.compiler.environment import Course, Runner
+from scenicq.compiler.exclusions import Exclusions
+from scenicq.compiler.values import Choice, ModelValue, fail, is_node
+from scenicq.errors import ScenarioError, Span
+from scenicq.forest import build
+from scenicq.forest.nodes import CompareOp, Constant, Feature, LogicOp, Node, Select
+from scenicq.forest.walk import leaves
+
+__all__ = ["as_test", "split", "without_courses"]
+
+_MOST_COURSES = 2_000
+
+
+@dataclass(eq=False, slots=True)
+class _Taken:
+    """One course.
+
+    Attributes:
+        given: What its first tests come out as; those after them come out as true.
+        tests: Its tests.
+        outcomes: What they came out as.
+        excluded: Told under which outcomes something is lacking.
+        around: Takes back what `excluded` was told.
+    """
+
+    given: tuple[tuple[Node, bool], ...]
+    excluded: Exclusions
+    around: ExitStack
+    tests: list[Node] = field(default_factory=list[Node])
+    outcomes: list[bool] = field(default_factory=list[bool])
+
+    def decide(self, test: Node, span: Span) -> bool:
+        """See `Course`."""
+        number, outcome = len(self.tests), True
+        if number < len(self.given):
+            before, outcome = self.given[number]
+            if [leaf.identity for leaf in leaves(test)] != [leaf.identity for leaf in leaves(before)]:
+                raise _refused(span, "what is drawn here is drawn anew in each course")
+            test = before
+        self.tests.append(test)
+        self.outcomes.append(outcome)
+        self.around.enter_context(self.excluded.assuming(test, int(outcome), 2))
+        return outcome
+
+
+class _None:
+    def decide(self, test: Node, span: Span) -> bool:
+        raise _refused(span, "how often a loop runs must be known")
+
+
+def _refused(span: Span, label: str) -> ScenarioError:
+    return fail("random-branch", "the program's course depends on a random value", span, label,
+                ("draw it before, outside of the condition",))  # fmt: skip
+
+
+@contextmanager
+def _on(run: Runner, course: Course) -> Generator[None]:
+    before, run.course = run.course, course
+    try:
+        yield
+    finally:
+        run.course = before
+
+
+def without_courses(run: Runner) -> AbstractContextManager[None]:
+    """While what is evaluated must have one course, although objects are read as a label shows them."""
+    return _on(run, _None())
+
+
+def split(run: Runner, evaluate: Callable[[], Node], span: Span) -> Node:
+    """The value of a condition as a choice between those of its courses.
+
+    Args:
+        run: The interpreter.
+        evaluate: Evaluates the condition.
+        span: The condition.
+
+    Raises:
+        ScenarioError: What is wrong with the condition; budget-exceeded, for too many courses.
+    """
+    tests: dict[tuple[bool, ...], Node] = {}
+    values: dict[tuple[bool, ...], Node] = {}
+    missing: ScenarioError | None = None
+    todo: list[tuple[tuple[Node, bool], ...]] = [()]
+    while todo:
+        if len(values) >= _MOST_COURSES:
+            raise fail("budget-exceeded", f"this condition has more than {_MOST_COURSES:,} courses", span, "",
+                       ("compare fewer objects with each other",))  # fmt: skip
+        given = todo.pop()
+        with ExitStack() as around:
+            course = _Taken(given, run.excluded, around)
+            try:
+                with _on(run, course):
+                    value = evaluate()
+            except ScenarioError as error:
+                if error.diagnostics[0].code not in LACKING or not course.tests:
+                    raise
+                missing = missing or error
+                value = None
+        taken = tuple(course.outcomes)
+        for number in range(len(given), len(taken)):
+            tests[taken[:number]] = course.tests[number]
+            known = tuple(zip(course.tests[:number], taken[:number], strict=True))
+            todo.append((*known, (course.tests[number], False)))
+        if value is None:
+            _exclude(run.excluded, course, span)
+        values[taken] = value or build.constant(False, span)
+    if missing is not None and all(isinstance(each, Constant) and each.value is False for each in values.values()):
+        raise missing
+    for path in sorted(tests, key=len, reverse=True):
+        values[path] = _either(tests[path], values.pop((*path, False)), values.pop((*path, True)), span)
+    return values[()]
+
+
+def _exclude(excluded: Exclusions, course: _Taken, span: Span) -> None:
+    """Exclude the scenes that take a course."""
+    steps = list(zip(course.tests, course.outcomes, strict=True))
+    with ExitStack() as around:
+        for test, outcome in steps[:-1]:
+            around.enter_context(excluded.assuming(test, int(outcome), 2))
+        excluded.add(steps[-1][0], [int(steps[-1][1])], 2, span)
+
+
+def _either(test: Node, no: Node, yes: Node, span: Span) -> Node:
+    """`yes if test else no`, as a connective where one of them is known."""
+    opposite = build.opposite(test)
+    match no, yes:
+        case Constant(value=bool(without)), Constant(value=bool(with_)):
+            return yes if without is with_ else test if with_ else opposite
+        case Constant(value=False), _:
+            return build.logic(LogicOp.AND, test, yes, span=span)
+        case Constant(value=True), _:
+            return build.logic(LogicOp.OR, opposite, yes, span=span)
+        case _, Constant(value=False):
+            return build.logic(LogicOp.AND, opposite, no, span=span)
+        case _, Constant(value=True):
+            return build.logic(LogicOp.OR, test, no, span=span)
+        case _:
+            return Select(test, (no, yes), span=span)
+
+
+def as_test(value: ModelValue, span: Span) -> ModelValue:
+    """The truth of a value, as an expression where it is random; the value itself where that has no such truth."""
+    if isinstance(value, Choice):
+        options = [as_test(option, span) for option in value.options]
+        if any(is_node(option) and kind_of_model(option) != "boolean" for option in options):
+            return value
+        known = [option if is_node(option) else build.constant(bool(option), span) for option in options]
+        return Select(value.index, tuple(known), span=span)
+    if not is_node(value) or isinstance(value, Constant):
+        return value
+    match kind_of_model(value):
+        case "scalar":
+            return build.compare(CompareOp.NE, value, build.constant(0.0, span), span)
+        case "boolean" if isinstance(value, Feature):
+            # a label may have anything in place of a truth value
+            return build.compare(CompareOp.EQ, value, build.constant(True, span), span)
+        case _:
+            return value
