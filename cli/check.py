@@ -16,6 +16,7 @@ from scenicq.errors import DataError, Diagnostic, ScenarioError, ScenicqError, S
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.show import show_forest
 from scenicq.geometry.network import Network
+from scenicq.lint.impossible import impossible_requirements
 from scenicq.lint.program import lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
@@ -145,11 +146,17 @@ def _found(
         lines += [_told(scenario), *(f"  {line}" for part in details for line in part(scenario))]
         rest += [*scenario.warnings, *scenario.ignored]
     if compiled:
+        written = [scenario.as_written or scenario for scenario, _ in compiled]
+        impossible = impossible_requirements(written, real=asked.real)
+        errors += impossible
+        lines = [] if impossible else lines
         rest += [replace(each, severity="warning") for each in lacking]
         remarks = lint(source, compiled[:LINTED_MAPS], asked.options, properties=asked.dataset is None)
         if asked.dataset is not None:
             scenarios = [ready(scenario) for scenario, _ in compiled]
             remarks = [*coverage(asked.dataset, scenarios, asked.options).warnings, *remarks]
+        never = {each.span for each in errors}
+        remarks = [each for each in remarks if each.span not in never]
         rest += [replace(each, severity="error") for each in remarks] if asked.strict else remarks
     else:
         # maps that all lack the same need not all be told

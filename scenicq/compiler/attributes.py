@@ -248,6 +248,8 @@ def _of_instance(run: Runner, value: Instance, name: str, span: Span) -> ModelVa
         found = property_node(value, name, span)
         turned = name == "heading" and run.version == 3 and is_node(found)
         return one_turn(cast(Node, found)) if turned else found
+    if name == "orientation" and value.oriented:
+        return to_heading(value, span)  # in the plane, it is the heading
     if name in _PART_NAMES and value.index is not None:
         return part_of(_PART_NAMES[name], value, span)
     if value.cls.derives_from("DrivingObject"):

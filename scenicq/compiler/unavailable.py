@@ -49,7 +49,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
 _REASONS = {name: reason for names, reason in _NAMES.items() for name in names.split()}
 
 _ATTRIBUTES: dict[str, tuple[str, ...]] = {
-    "orientation pitch roll": ("labels are matched in 2D", "use `heading`"),
+    "pitch roll": ("labels are matched in 2D", "use `heading`"),
     "onSurface topSurface bottomSurface leftSurface rightSurface frontSurface backSurface surface occupiedSpace "
     "boundingBox boundingPolygon inradius onDirection": (
         "labels are matched in 2D",

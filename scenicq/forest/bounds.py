@@ -13,11 +13,11 @@ from typing import TypeAlias, cast
 
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.interval_ends import FLOATS
-from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector
+from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector, can_hold
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import Constant, Identity, Node, PointIn, Rotate, Scale, VectorSum
 
-__all__ = ["Box", "FloatInterval", "leaf_boxes", "point_boxes", "scalar_bounds", "vector_bounds"]
+__all__ = ["Box", "FloatInterval", "leaf_boxes", "may_hold", "point_boxes", "scalar_bounds", "vector_bounds"]
 
 FloatInterval: TypeAlias = tuple[float, float]
 Box: TypeAlias = tuple[FloatInterval, FloatInterval]
@@ -53,6 +53,11 @@ def scalar_bounds(node: Node, leaves: Mapping[Identity, Box] | None = None) -> F
 def vector_bounds(node: Node, leaves: Mapping[Identity, Box] | None = None) -> Box:
     """Bounds of a vector expression, per coordinate; arguments as of `scalar_bounds`."""
     return _box(_bounds(node, leaves))
+
+
+def may_hold(condition: Node) -> bool:
+    """Whether a condition may hold for some values of its random variables; features in it are unbounded."""
+    return bool(can_hold(_bounds(condition, None)))
 
 
 def _bounds(node: Node, leaves: Mapping[Identity, Box] | None) -> IntervalValue[float]:

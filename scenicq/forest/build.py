@@ -19,6 +19,7 @@ from scenicq.forest.nodes import (
     Constant,
     Coordinate,
     DiscAt,
+    Feature,
     Logic,
     LogicOp,
     Node,
@@ -108,8 +109,20 @@ def vector_sum(left: Node, right: Node, span: Span | None = None) -> Node:
 
 
 def vector_difference(left: Node, right: Node, span: Span | None = None) -> Node:
-    """The difference of two vectors."""
+    """The difference of two vectors; of one place and itself the null vector, wherever it is."""
+    if _is_same_place(left, right):
+        return constant((0.0, 0.0), span)
     return vector_sum(left, scale(right, constant(-1.0), span), span)
+
+
+def _is_same_place(left: Node, right: Node) -> bool:
+    match left, right:
+        case Feature(object=one, property="position", current=now), Feature(
+            object=other, property="position", current=then
+        ):
+            return one == other and now == then
+        case _:
+            return left is right and not isinstance(left, Feature)
 
 
 def scale(value: Node, factor: Node, span: Span | None = None) -> Node:

@@ -62,7 +62,7 @@ from scenicq.forest.nodes import (
     VectorOf,
     VectorSum,
 )
-from scenicq.geometry.angles import heading_of_array, normalize_array
+from scenicq.geometry.angles import azimuth_array, normalize_array
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import SLACK, Region
@@ -205,7 +205,7 @@ class ColumnDomain:
         """The heading of a vector."""
         if not isinstance(vector.data, tuple):
             return self._each(partial(compute, Bearing(_NOTHING)), (vector,))
-        return Column(heading_of_array(*vector.data), vector.status)
+        return Column(azimuth_array(*vector.data), vector.status)
 
     # --- truth and choice
 

@@ -46,7 +46,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children, is_leaf
-from scenicq.geometry.angles import heading_of, normalize, rotate
+from scenicq.geometry.angles import azimuth, normalize, rotate
 from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.containment import covers, overlaps
 from scenicq.geometry.fields import VectorField
@@ -226,7 +226,7 @@ def _compute(node: Node, args: tuple[Value, ...]) -> Value:
         case Norm(), ((float() as x, float() as y),):
             return math.hypot(x, y)
         case Bearing(), ((float() as x, float() as y),):
-            return heading_of(x, y)
+            return azimuth(x, y)
         case VectorOf(), (float() as x, float() as y):
             return (x, y)
         case VectorSum(), ((float() as x, float() as y), (float() as u, float() as v)):

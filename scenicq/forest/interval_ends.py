@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar, cast
 import numpy as np
 
 from scenicq.forest.interval_values import FloatOrArray, Interval
-from scenicq.geometry.angles import heading_of, heading_of_array, normalize
+from scenicq.geometry.angles import azimuth, azimuth_array, normalize
 
 __all__ = ["ARRAYS", "FLOATS", "Ends"]
 
@@ -150,7 +150,7 @@ class _Floats:
         return abs(a)
 
     def heading(self, x: float, y: float) -> float:
-        return heading_of(x, y)
+        return azimuth(x, y)
 
     def turned(self, a: float) -> float:
         return normalize(a) if math.isfinite(a) else math.nan
@@ -227,7 +227,7 @@ class _Arrays:
         return np.abs(a)
 
     def heading(self, x: FloatOrArray, y: FloatOrArray) -> FloatOrArray:
-        return heading_of_array(x, y)
+        return azimuth_array(x, y)
 
     def turned(self, a: FloatOrArray) -> FloatOrArray:
         return np.remainder(a + math.pi, math.tau) - math.pi

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "azimuth",
+    "azimuth_array",
     "difference",
     "direction",
     "distance",
@@ -49,9 +51,9 @@ def distance(a: float, b: float) -> float:
 
 
 def heading_of(dx: float, dy: float) -> float:
-    """The heading in (-pi, pi] of a direction; 0 for the null vector."""
+    """The heading in (-pi, pi] of a direction; -pi/2 for the null vector, as Scenic's."""
     if dx == 0 and dy == 0:
-        return 0.0
+        return -math.pi / 2
     heading = math.atan2(-dx, dy)
     return math.pi if heading == -math.pi else heading
 
@@ -59,7 +61,19 @@ def heading_of(dx: float, dy: float) -> float:
 def heading_of_array(dx: NDArray[np.float64], dy: NDArray[np.float64]) -> NDArray[np.float64]:
     """`heading_of` of every direction of two arrays of one shape."""
     headings = np.arctan2(-dx, dy)
-    return np.where((dx == 0) & (dy == 0), 0.0, np.where(headings == -math.pi, math.pi, headings))
+    return np.where((dx == 0) & (dy == 0), -math.pi / 2, np.where(headings == -math.pi, math.pi, headings))
+
+
+def azimuth(dx: float, dy: float) -> float:
+    """The heading in [-pi, pi) of a line of sight, at its ends as Scenic's."""
+    heading = heading_of(dx, dy)
+    return -math.pi if heading == math.pi else heading
+
+
+def azimuth_array(dx: NDArray[np.float64], dy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`azimuth` of every line of sight of two arrays of one shape."""
+    headings = heading_of_array(dx, dy)
+    return np.where(headings == math.pi, -math.pi, headings)
 
 
 def direction(heading: float) -> tuple[float, float]:

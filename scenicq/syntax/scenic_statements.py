@@ -9,7 +9,7 @@ from scenicq.syntax import ast
 from scenicq.syntax.literals import decode, string_parts
 from scenicq.syntax.precedence import POWER
 from scenicq.syntax.statements import StatementParser
-from scenicq.syntax.tokens import INFIX_WORDS, Token
+from scenicq.syntax.tokens import CLOSERS, INFIX_WORDS, Token
 
 __all__ = ["ProgramParser"]
 
@@ -100,7 +100,7 @@ class ProgramParser(StatementParser):
             monitor = self.expression()
             return ast.RequireMonitor(self.span(start), monitor)
         probability: ast.Expression | None = None
-        if self.text == "[":
+        if self.text == "[" and self._is_probability():
             probability = self.subscript()
         self.temporal = True
         condition = self.expression()
@@ -111,6 +111,19 @@ class ProgramParser(StatementParser):
                 raise self.fail("the name of the requirement is missing", label=self.found())
             name = self.advance().text.strip("\"'")
         return ast.Require(self.span(start), condition, probability, name)
+
+    def _is_probability(self) -> bool:
+        """Whether the brackets after `require` stand before a condition, rather than begin it."""
+        if self.peek().kind == "number" and self.peek(2).text == "]":
+            return True
+        ahead, depth = 1, 1
+        while depth and self.peek(ahead).kind != "end":
+            text = self.peek(ahead).text
+            depth += (text in CLOSERS) - (text in CLOSERS.values())
+            ahead += 1
+        after = self.peek(ahead)
+        continues = after.text in ("[", "(", "-", "+") or after.text in INFIX_WORDS
+        return not continues and self.starts_operand(self.index + ahead)
 
     def mutate(self) -> ast.Statement:
         """Read `mutate`."""

@@ -98,7 +98,6 @@ FORMS: dict[str, tuple[str, ...]] = {
         "Normal({hidden}, {deviation})", "({number}) % {whole:3:9}", "round({number})",
         "{located}.distanceTo(Vector{place}) / {constant:3:9}", "len({nearlane}.maneuvers) + {number}",
         "{car}.lane.centerline.length / {constant:20:60}",
-        "next(k for k in range({whole:2:9}) if k >= 1) + {number}",
     ),
     "angle": (
         "({angle} relative to {oriented}.heading)", "({angle}) + {constant:-20:20} deg",

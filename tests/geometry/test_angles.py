@@ -51,7 +51,8 @@ def test_headings_are_counterclockwise_from_north() -> None:
     assert angles.heading_of(-1, 0) == pytest.approx(math.pi / 2)
     assert angles.heading_of(1, 0) == pytest.approx(-math.pi / 2)
     assert angles.heading_of(0.0, -1) == angles.heading_of(-0.0, -1) == math.pi
-    assert angles.heading_of(0, 0) == 0
+    assert angles.azimuth(0.0, -1) == angles.azimuth(-0.0, -1) == -math.pi
+    assert angles.heading_of(0, 0) == -math.pi / 2
 
 
 @given(st.floats(-math.pi + 1e-9, math.pi), st.floats(0.01, 100))
@@ -59,7 +60,7 @@ def test_direction_and_heading_are_inverse(heading: float, length: float) -> Non
     dx, dy = angles.direction(heading)
     assert angles.distance(angles.heading_of(length * dx, length * dy), heading) < 1e-12
     array = angles.heading_of_array(np.array([dx, 0.0]), np.array([dy, 0.0]))
-    assert array.tolist() == pytest.approx([angles.heading_of(dx, dy), 0.0], abs=1e-15)
+    assert array.tolist() == pytest.approx([angles.heading_of(dx, dy), -math.pi / 2], abs=1e-15)
 
 
 @given(finite, finite, finite)

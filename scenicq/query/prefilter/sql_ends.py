@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from scenicq.forest.interval_ends import FLOATS, Ends
 from scenicq.forest.interval_values import FloatOrArray, Interval
-from scenicq.geometry.angles import heading_of
+from scenicq.geometry.angles import azimuth
 from scenicq.match.tolerance import SLACK
 
 __all__ = ["SQL", "Expr", "all_of", "any_of", "between", "less", "modulo_turn", "number"]
@@ -107,7 +107,7 @@ class _Sql:
 
     def heading(self, x: Expr, y: Expr) -> Expr:
         if isinstance(x, float) and isinstance(y, float):
-            return heading_of(x, y)
+            return azimuth(x, y)
         return f"atan2(-{number(x)}, {number(y)})"
 
     def turned(self, a: Expr) -> Expr:
