@@ -20,6 +20,7 @@ from scenicq.importers.fields import LONGEST_TEXT
 __all__ = ["read_feather", "read_parquet"]
 
 _MOST_ROWS = 20_000_000
+_TEXTS = ("string", "large_string", "string_view")
 _TYPES: dict[str, Any] = {"integer": pa.int64(), "real": pa.float64(), "text": pa.string()}
 
 
@@ -117,4 +118,4 @@ def _kind(type_: Any) -> str:
         return "integer"
     if pa.types.is_floating(type_):
         return "real"
-    return "text" if pa.types.is_string(type_) or pa.types.is_large_string(type_) else str(type_)
+    return "text" if str(type_) in _TEXTS else str(type_)

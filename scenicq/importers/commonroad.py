@@ -1,7 +1,8 @@
 """CommonRoad scenarios, XML 2018b and 2020a: a file is a recording with its map.
 
 Conventions of the source: metres, orientations counter-clockwise from +x, times in steps of `timeStepSize`. There is no
-ego (a planning problem gives a start, no recorded car): see `ego_choice`. What is not exact is left out.
+ego (a planning problem gives a start, no recorded car): see `ego_choice`. What is not exact is left out. What is not
+read is counted (`specifications/commonroad.json`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import commonroad_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.importers.xml_tree import attribute, number, read_xml
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
@@ -72,6 +74,7 @@ def _read_map(file: Path, on_problem: ProblemSink) -> tuple[MapFeature, ...]:
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
     root = read_xml(file)
+    specification("commonroad").count_xml(root, report)
     step_s = _step(root)
     if step_s is None:
         report.left_out("recording", "record-invalid", f"{file.name}: `timeStepSize` is not a positive number")
@@ -87,6 +90,9 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
         except InvalidError as error:
             report.left_out("track", "record-invalid", f"{where}: {error}")
             continue
+        if sets := element.findall("occupancySet/occupancy"):
+            message = f"{where}: where it may be is known only as {len(sets)} areas; it is in no frame after the first"
+            report.left_out("object", "record-invalid", message)
         for index, state in enumerate(states):
             try:
                 member = _object(name, kind, size, state, classes)

@@ -110,8 +110,10 @@ def optional_text(fields: Record, key: str) -> str | None:
 
 
 def integer(fields: Record, key: str) -> int:
-    """A whole number that 64 bits hold."""
+    """A whole number that 64 bits hold; 3.0 is one, too."""
     value = _present(fields, key)
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
     if isinstance(value, bool) or not isinstance(value, int):
         raise InvalidError(f"`{key}` is not a whole number but {_kind(value)}")
     if abs(value) > _LARGEST:

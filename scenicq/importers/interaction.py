@@ -1,32 +1,34 @@
 """INTERACTION: `recorded_trackfiles/SCENE/vehicle_tracks_*.csv` and `pedestrian_tracks_*.csv`, `maps/SCENE.osm`.
 
+From version 1.2 on rows have a `case_id`, and each case is a recording; `SCENE_train.csv` holds all of a scene.
+
 Conventions of the source: metres, `psi_rad` counter-clockwise from +x, 10 Hz. There is no ego: see `ego_choice`. People
 have neither heading nor size, so none is observed.
 """
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
-from scenicq.errors import DataError, Diagnostic
+from scenicq.errors import DataError
 from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
+from scenicq.importers.interaction_cases import Case, Row, cases_of, columns_of, rows_of
 from scenicq.importers.lanelet2_map import read_lanelets
-from scenicq.importers.layouts import interaction_files
+from scenicq.importers.layouts import INTERACTION_PARTS, interaction_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
 __all__ = ["Interaction"]
 
 _COLUMNS = ("track_id", "frame_id", "timestamp_ms", "agent_type", "x", "y", "vx", "vy")
-_LARGEST_ROWS = 20_000_000
 
 
 class Interaction:
@@ -49,16 +51,17 @@ class Interaction:
         if not files:
             raise missing(path, "no `vehicle_tracks_*.csv`")
         maps = read_maps(options.maps, report)
-        choice = () if options.ego is None else (options.ego,)
+        choice = "" if options.ego is None else options.ego
         places: list[RecordingFiles] = []
         for file in files:
-            scene = file.resolve().parent.name
+            scene, number = _scene(file)
             if (map_file := _map_file(file, scene)) is not None:
                 take_map(scene, map_file, read_lanelets, maps, report)
-            number = file.stem.removeprefix("vehicle_tracks_")
-            walkers = file.with_name(f"pedestrian_tracks_{number}.csv")
-            both = (file, walkers) if walkers.is_file() else (file,)
-            places.append(RecordingFiles(f"{scene}/{number}", both, path, scene, choice))
+            try:
+                places += _places(file, path, scene, f"{scene}/{number}", choice, report)
+            except DataError as error:
+                for diagnostic in error.diagnostics:
+                    report.left_out("recording", diagnostic.code, diagnostic.message)
         return by_file_source(
             f"interaction-{path.resolve().name}",
             maps,
@@ -71,6 +74,35 @@ class Interaction:
         )
 
 
+def _scene(file: Path) -> tuple[str, str]:
+    """Names of the scene and of the file in it."""
+    scene, _, part = file.stem.rpartition("_")
+    if part in INTERACTION_PARTS:
+        return scene, part
+    return file.resolve().parent.name, file.stem.removeprefix("vehicle_tracks_")
+
+
+def _places(file: Path, root: Path, scene: str, name: str, choice: str, report: Report) -> Iterator[RecordingFiles]:
+    """The recordings of a file, with the people of another."""
+    walkers = file.with_name(file.name.replace("vehicle_tracks_", "pedestrian_tracks_"))
+    both = (file, walkers) if walkers != file and walkers.is_file() else (file,)
+    cases = [cases_of(each) for each in both]
+    for each, found in zip(both, cases, strict=True):
+        rows = sum(case.rows for case in found.values())
+        specification("interaction").count_columns("", columns_of(each), report, rows)
+    for case in dict.fromkeys(case for found in cases for case in found):
+        found = [each.get(case, Case()) for each in cases]
+        yield RecordingFiles(
+            f"{name}/{case}" if case else name,
+            both,
+            root,
+            scene,
+            (choice, *(each.text for each in found)),
+            sum(each.rows for each in found),
+            "".join(each.digest for each in found) + choice,
+        )
+
+
 def _map_file(file: Path, scene: str) -> Path | None:
     folders = list(file.resolve().parents)[:3]
     found = [folder / "maps" / f"{scene}.osm" for folder in folders]
@@ -80,39 +112,21 @@ def _map_file(file: Path, scene: str) -> Path | None:
 def _read_tracks(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     times: dict[int, int] = {}
     members: dict[int, list[LabelObject]] = {}
-    for file in place.files:
-        for number, row in _rows(file):
+    choice, *ranges = place.options
+    for file, text in zip(place.files, ranges, strict=True):
+        for number, row in rows_of(file, text, _COLUMNS):
             try:
                 frame, time = _integer(row, "frame_id"), _integer(row, "timestamp_ms")
                 if times.setdefault(frame, time) != time:
                     raise InvalidError(f"frame {frame} has another time than before")
                 members.setdefault(frame, []).append(_object(row, classes))
             except InvalidError as error:
-                report.left_out("object", "record-invalid", f"{file.name}:{number}: {error}")
+                report.left_out("object", "record-invalid", f"{file.name}: {place.name}: row {number}: {error}")
     moments = [Moment(f"{place.name}/{frame}", times[frame] * 1000, tuple(members[frame])) for frame in sorted(members)]
-    choice = next(iter(place.options), None)
-    return with_egos(moments, choice, place.name, place.map, place.name, report)
+    return with_egos(moments, choice or None, place.name, place.map, place.name, report)
 
 
-def _rows(file: Path) -> Iterator[tuple[int, Mapping[str, str | None]]]:
-    try:
-        with file.open(encoding="utf-8", newline="") as lines:
-            reader = csv.DictReader(lines)
-            lacking = [name for name in _COLUMNS if name not in (reader.fieldnames or ())]
-            if lacking:
-                listed = ", ".join(f"`{name}`" for name in lacking)
-                raise DataError(Diagnostic("file-invalid", f"{file} lacks the columns {listed}"))
-            for number, row in enumerate(reader, start=2):
-                if number > _LARGEST_ROWS:
-                    raise DataError(Diagnostic("file-invalid", f"{file} has too many rows"))
-                yield number, row
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise DataError(Diagnostic("file-invalid", f"{file} is not a CSV file: {error}")) from error
-    except OSError as error:
-        raise DataError(Diagnostic("file-missing", f"{file} cannot be read: {error.strerror}")) from error
-
-
-def _object(row: Mapping[str, str | None], classes: ClassNames) -> LabelObject:
+def _object(row: Row, classes: ClassNames) -> LabelObject:
     name, kind = row.get("track_id") or "", row.get("agent_type") or ""
     if not name or not kind:
         raise InvalidError("`track_id` or `agent_type` is missing")
@@ -136,7 +150,7 @@ def _object(row: Mapping[str, str | None], classes: ClassNames) -> LabelObject:
     )
 
 
-def _number(row: Mapping[str, str | None], key: str) -> float:
+def _number(row: Row, key: str) -> float:
     try:
         value = float(row.get(key) or "")
     except ValueError as error:
@@ -146,7 +160,7 @@ def _number(row: Mapping[str, str | None], key: str) -> float:
     return value
 
 
-def _integer(row: Mapping[str, str | None], key: str) -> int:
+def _integer(row: Row, key: str) -> int:
     value = _number(row, key)
     if value != int(value) or value < 0:
         raise InvalidError(f"`{key}` is not a whole number")

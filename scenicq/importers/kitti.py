@@ -26,6 +26,9 @@ __all__ = ["Kitti"]
 _MAP = "none"
 _STEP_US = 100_000
 _REACH_US, _LONGEST_STEP_US = 250_000, 550_000
+_MATRICES = (("R_rect", "R0_rect"), ("Tr_velo_cam", "Tr_velo_to_cam"), ("Tr_imu_velo", "Tr_imu_to_velo"))
+"""The rectified camera, the scanner in the camera, the inertial unit in the scanner: both spellings are in use."""
+
 _EARTH_M = 6378137.0
 _LARGEST_BYTES = 256 << 20
 _FORWARD_CAMERA = Rigid((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -175,11 +178,15 @@ def _camera(file: Path) -> Rigid:
         for row in _rows(file):
             if row and len(row) in (10, 13):
                 found[row[0].rstrip(":")] = _numbers(row[1:])
-        steps = [_rows_of(found[name]) for name in ("R_rect", "Tr_velo_cam", "Tr_imu_velo")]
+        steps = [_rows_of(next(found[name] for name in names if name in found)) for names in _MATRICES]
         rectified, velodyne, unit = (matrix(step) for step in steps)
         return rectified.then(velodyne).then(unit).inverse()
-    except (InvalidError, KeyError) as error:
+    except InvalidError as error:
         raise DataError(Diagnostic("file-invalid", f"{file}: no sound calibration: {error}")) from error
+    except StopIteration:
+        lacking = [" or ".join(f"`{name}`" for name in names) for names in _MATRICES if found.keys().isdisjoint(names)]
+        message = f"{file}: no sound calibration: there is no {lacking[0]}"
+        raise DataError(Diagnostic("file-invalid", message)) from None
 
 
 def _rows_of(values: list[float]) -> list[list[float]]:

@@ -15,13 +15,15 @@ from typing import Any, cast
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
+from shapely.ops import substring
 
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.fields import InvalidError
+from scenicq.importers.lane_parts import LanePart
 
-__all__ = ["BoundedLane", "Points", "centerline", "lane_features", "sound_area"]
+__all__ = ["BoundedLane", "Points", "centerline", "lane_features", "lengths_along", "sound_area"]
 
 Points = NDArray[np.float64]
 """A polyline: array (n, 2), metres."""
@@ -41,6 +43,7 @@ class BoundedLane:
         left_is_opposite, right_is_opposite: Whether that neighbour runs the other way.
         predecessors, successors: Ids; some may be of lanes outside of the map.
         in_intersection: Whether the source says that it crosses an intersection.
+        parts: Where neighbours change along the lane: each part with its own.
         properties: What else the source says.
     """
 
@@ -54,6 +57,7 @@ class BoundedLane:
     predecessors: tuple[str, ...] = ()
     successors: tuple[str, ...] = ()
     in_intersection: bool = False
+    parts: tuple[LanePart, ...] = ()
     properties: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
@@ -63,7 +67,7 @@ def centerline(left: Points, right: Points) -> list[list[float]]:
     Raises:
         InvalidError: A boundary has no length.
     """
-    length = max(_lengths(left)[-1], _lengths(right)[-1])
+    length = max(lengths_along(left)[-1], lengths_along(right)[-1])
     count = min(_MOST_POINTS, max(2, math.ceil(length / _STEP_M) + 1))
     middle = (_resampled(left, count) + _resampled(right, count)) / 2
     apart = np.hypot(*np.diff(middle, axis=0).T) > 1e-6
@@ -114,6 +118,7 @@ def lane_features(lanes: Sequence[BoundedLane], on_problem: ProblemSink) -> list
         )
         for name, (_, area, line) in sound.items()
     ]
+    made += _section_features(kept)
     made += _group_features(groups, roads, areas)
     made += _road_features(groups, roads, areas, crossing_of)
     return made + _intersection_features(roads, areas, groups, crossing_of)
@@ -129,6 +134,7 @@ class _Linked:
             return name in present
 
         self.lane = lane
+        self._present = present
         self.left = lane.beside_left if there(lane.beside_left, "left") else None
         self.right = lane.beside_right if there(lane.beside_right, "right") else None
         self.properties: dict[str, Any] = {
@@ -140,8 +146,47 @@ class _Linked:
         }
 
     def beside(self, *, opposite: bool) -> Iterator[str]:
-        pairs = ((self.left, self.lane.left_is_opposite), (self.right, self.lane.right_is_opposite))
-        return (name for name, way in pairs if name is not None and way == opposite)
+        pairs = [(self.left, self.lane.left_is_opposite), (self.right, self.lane.right_is_opposite)]
+        for part in self.lane.parts:
+            pairs += [(part.left and part.left[0], self.lane.left_is_opposite)]
+            pairs += [(part.right and part.right[0], self.lane.right_is_opposite)]
+        found = dict.fromkeys(name for name, way in pairs if name is not None and way == opposite)
+        return (name for name in found if name in self._present)
+
+
+def _section_features(lanes: Mapping[str, _Linked]) -> Iterator[MapFeature]:
+    """The parts of lanes that have several, or lie beside parts of others."""
+    several = {name for name, linked in lanes.items() if len(linked.lane.parts) > 1}
+    cut = several | {
+        name
+        for name, linked in lanes.items()
+        if any(
+            side is not None and side[0] in several for part in linked.lane.parts for side in (part.left, part.right)
+        )
+    }
+
+    def called(part: tuple[str, int] | None) -> str | None:
+        if part is None or part[0] not in lanes:
+            return None
+        return f"{part[0]}_sec{part[1]}" if part[0] in cut else part[0]
+
+    for name in (name for name in lanes if name in cut):
+        lane = lanes[name].lane
+        for number, part in enumerate(lane.parts):
+            left, right = (_between(line, part.start, part.end) for line in (lane.left, lane.right))
+            try:
+                area = sound_area(Polygon(np.concatenate([left, right[::-1]])))
+                line = centerline(left, right)
+            except (InvalidError, ValueError):  # bent back on itself; the lane has its shape
+                continue
+            beside = {"left": called(part.left), "right": called(part.right)}
+            links = {key: other for key, other in beside.items() if other is not None}
+            yield MapFeature(f"{name}_sec{number}", "lane_section", area, {"lane": name, "centerline": [line], **links})
+
+
+def _between(line: Points, start: float, end: float) -> Points:
+    """A stretch of a polyline, by shares of its length."""
+    return shapely.get_coordinates(substring(LineString(line), start, end, normalized=True))
 
 
 def _groups(lanes: Mapping[str, _Linked]) -> dict[str, str]:
@@ -259,13 +304,13 @@ def _intersection_features(
     ]
 
 
-def _lengths(line: Points) -> Points:
+def lengths_along(line: Points) -> Points:
     """Length along a polyline at each of its points."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
 
 
 def _resampled(line: Points, count: int) -> Points:
     """Points at equal distances along a polyline."""
-    along = _lengths(line)
+    along = lengths_along(line)
     wanted: Points = np.linspace(0.0, float(along[-1]), count)
     return np.stack([np.interp(wanted, along, line[:, 0]), np.interp(wanted, along, line[:, 1])], axis=1)

@@ -15,6 +15,7 @@ from scenicq.importers.folders import first_files, read_bytes
 
 __all__ = [
     "ARGOVERSE2_FILES",
+    "INTERACTION_PARTS",
     "argoverse2_logs",
     "argoverse2_scenarios",
     "commonroad_files",
@@ -29,6 +30,9 @@ __all__ = [
 
 ARGOVERSE2_FILES = ("annotations.feather", "city_SE3_egovehicle.feather")
 """What every log of Argoverse 2 has: the boxes, and the poses of the ego."""
+
+INTERACTION_PARTS = ("train", "val", "obs")
+"""The ends of names of files in which INTERACTION has all cases of a scene."""
 
 _HEAD = 4096
 
@@ -58,7 +62,12 @@ def commonroad_files(path: Path) -> list[Path]:
 def interaction_files(path: Path) -> list[Path]:
     """Tracks of INTERACTION."""
     name = "vehicle_tracks_*.csv"
-    return first_files(path, name, f"*/{name}", f"recorded_trackfiles/*/{name}")
+    if found := first_files(path, name, f"*/{name}", f"recorded_trackfiles/*/{name}"):
+        return found
+    # The challenge of version 1.2 has all cases of a scene in one file.
+    patterns = [f"{above}*_{part}.csv" for above in ("", "*/") for part in INTERACTION_PARTS]
+    found = {file for pattern in patterns for file in first_files(path, pattern)}
+    return sorted(file for file in found if b"case_id,track_id,frame_id" in _head(file))
 
 
 def is_interchange(path: Path) -> bool:

@@ -24,6 +24,7 @@ from scenicq.importers.report import Report
 
 __all__ = ["Tables"]
 
+_LARGEST_TIME = 1 << 62
 _ZONE = re.compile(r"([+-])(\d\d)(\d\d)$")
 """At the end of a log's name, as in `n015-2018-07-24-11-22-45+0800`: hours and minutes ahead of UTC."""
 
@@ -137,12 +138,26 @@ class Tables:
 
     def _add_sample(self, token: str, row: Record, place: _Place) -> None:
         scene = fields.text(row, "scene_token")
-        sample = _Sample(token, fields.integer(row, "timestamp"), str(place))
+        sample = _Sample(token, self._time(row), str(place))
         found(self.scenes, scene, "scene")
         if token in self.samples:
             raise InvalidError(f"sample `{token}` is there twice")
         self.samples[token] = (scene, sample)
         self.samples_of[scene].append(sample)
+
+    def _time(self, row: Record) -> int:
+        """Microseconds; some datasets in this layout have shares of one."""
+        try:
+            return fields.integer(row, "timestamp")
+        except InvalidError:
+            if not isinstance(row.get("timestamp"), float):
+                raise
+            time = round(fields.number(row, "timestamp"))
+            if abs(time) > _LARGEST_TIME:
+                raise
+            message = "times are no whole numbers of microseconds; they are rounded"
+            self._report.assumed("sample", "rounded times", message)
+            return time
 
     def _read_sensor_files(self) -> dict[str, tuple[float, float, float, float]]:
         """Fill in the files of each sample; the result is x, y, heading and z of its ego."""

@@ -7,6 +7,8 @@ properties say. Lanes that only join others (`interpolating`) lie in intersectio
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -14,7 +16,8 @@ from shapely.geometry import LineString, Polygon
 
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.fields import InvalidError
-from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, sound_area
+from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, lengths_along, sound_area
+from scenicq.importers.lane_parts import Beside, cut_lanes
 from scenicq.importers.protobuf import Message, Value, integers, parse, signed
 
 __all__ = ["LANE_WIDTH_M", "scenario_features"]
@@ -25,6 +28,19 @@ _BIKE_LANE = 3
 _LANE_KINDS = {1: "freeway", 2: "surface_street", 3: "bike_lane"}
 _AREAS = {8: "crossing", 9: "speed_bump", 10: "driveway"}
 _TOLERANCE_M = 0.02
+_SHORTEST_PART_M = 0.75
+"""The lines of the source have a point every half metre, and neighbours begin and end at points."""
+
+
+class _Neighbour(NamedTuple):
+    """As the source says it: places are numbers of points of either line."""
+
+    lane: str
+    is_left: bool
+    start: int
+    end: int
+    its_start: int
+    its_end: int
 
 
 def scenario_features(messages: Sequence[Value], on_problem: ProblemSink) -> tuple[MapFeature, ...]:
@@ -35,6 +51,8 @@ def scenario_features(messages: Sequence[Value], on_problem: ProblemSink) -> tup
         on_problem: Called with the id of a feature and what is wrong with it.
     """
     lanes: dict[str, BoundedLane] = {}
+    lines: dict[str, Points] = {}
+    neighbours: dict[str, list[_Neighbour]] = {}
     others: dict[str, MapFeature] = {}
     for value in messages:
         name = ""
@@ -44,7 +62,10 @@ def scenario_features(messages: Sequence[Value], on_problem: ProblemSink) -> tup
             if name in lanes or name in others:
                 raise InvalidError("the id is used twice")
             if 3 in feature:
-                lanes[name] = _lane(name, _message(feature[3][0]))
+                lane = _message(feature[3][0])
+                line = _points(lane.get(8, []), 2)
+                neighbours[name] = list(_neighbours(lane))
+                lanes[name], lines[name] = _lane(name, lane, line), line
                 continue
             for number, kind in _AREAS.items():
                 if number in feature:
@@ -52,20 +73,48 @@ def scenario_features(messages: Sequence[Value], on_problem: ProblemSink) -> tup
                     others[name] = MapFeature(name, kind, sound_area(Polygon(points)))
         except (InvalidError, ValueError) as error:
             on_problem(name, str(error))
-    return (*lane_features(list(lanes.values()), on_problem), *others.values())
+    return (*lane_features(_cut(lanes, lines, neighbours), on_problem), *others.values())
 
 
-def _lane(name: str, lane: Message) -> BoundedLane:
+def _cut(
+    lanes: dict[str, BoundedLane], lines: dict[str, Points], neighbours: dict[str, list[_Neighbour]]
+) -> list[BoundedLane]:
+    """The lanes with their parts, between which neighbours change."""
+    along = {name: lengths_along(line) for name, line in lines.items()}
+    shares = {name: lengths / lengths[-1] for name, lengths in along.items()}
+
+    def stretch(lane: str, start: int, end: int) -> tuple[float, float]:
+        # A stretch goes on to where the next begins.
+        last = len(shares[lane]) - 1
+        low, high = (min(max(place, 0), last) for place in (start, end + 1))
+        return float(shares[lane][low]), float(shares[lane][high])
+
+    beside = {
+        name: [
+            Beside(
+                each.lane, each.is_left, *stretch(name, each.start, each.end),
+                *stretch(each.lane, each.its_start, each.its_end),
+            )
+            for each in found
+            if each.lane in shares
+        ]
+        for name, found in neighbours.items()
+    }  # fmt: skip
+    parts = cut_lanes({name: float(lengths[-1]) for name, lengths in along.items()}, beside, _SHORTEST_PART_M)
+    return [replace(lane, parts=parts[name]) for name, lane in lanes.items()]
+
+
+def _lane(name: str, lane: Message, line: Points) -> BoundedLane:
     kind = signed(lane.get(2, [0])[0])
     width = _BIKE_LANE_WIDTH_M if kind == _BIKE_LANE else LANE_WIDTH_M
-    line = _simplified(_points(lane.get(8, []), 2))
+    line = _simplified(line)
     left, right = _offset(line, width / 2), _offset(line, -width / 2)
     return BoundedLane(
         id=name,
         left=left,
         right=right,
-        beside_left=next(_neighbours(lane.get(11, [])), None),
-        beside_right=next(_neighbours(lane.get(12, [])), None),
+        beside_left=next((each.lane for each in _neighbours(lane) if each.is_left), None),
+        beside_right=next((each.lane for each in _neighbours(lane) if not each.is_left), None),
         predecessors=tuple(str(other) for other in integers(lane.get(9, []))),
         successors=tuple(str(other) for other in integers(lane.get(10, []))),
         in_intersection=signed(lane.get(3, [0])[0]) == 1,
@@ -73,10 +122,13 @@ def _lane(name: str, lane: Message) -> BoundedLane:
     )
 
 
-def _neighbours(values: Sequence[Value]) -> Iterator[str]:
-    for value in values:
-        if 1 in (neighbour := _message(value)):
-            yield str(signed(neighbour[1][0]))
+def _neighbours(lane: Message) -> Iterator[_Neighbour]:
+    for number, is_left in ((11, True), (12, False)):
+        for value in lane.get(number, []):
+            found = _message(value)
+            places = [signed(found.get(field, [0])[0]) for field in (2, 3, 4, 5)]
+            if 1 in found:
+                yield _Neighbour(str(signed(found[1][0])), is_left, *places)
 
 
 def _message(value: Value) -> Message:

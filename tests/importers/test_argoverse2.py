@@ -209,3 +209,22 @@ def test_real_vehicles_head_where_they_move_and_along_their_lane(tmp_path: Path)
     assert len(along) > 2000
     assert sum(angle < math.radians(15) for angle in motion) >= 0.99 * len(motion)
     assert sum(angle < math.radians(15) for angle in along) >= 0.95 * len(along)
+
+
+@pytest.mark.parametrize("kind", ["large_string", "string_view", "dictionary"])
+def test_every_kind_of_text_of_arrow(kind: str, tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    shutil.copytree(SAMPLE, source)
+    for file in source.rglob("annotations.feather"):
+        table = pa.feather.read_table(file)
+        types = {"large_string": pa.large_string(), "string_view": pa.string_view()}
+        types["dictionary"] = pa.dictionary(pa.int32(), pa.string())
+        fields = [pa.field(each.name, types[kind] if each.type == pa.string() else each.type) for each in table.schema]
+        table = table.cast(pa.schema(fields))
+        with pa.ipc.new_file(str(file), table.schema) as writer:
+            writer.write_table(table)
+    ingest(SAMPLE, tmp_path / "plain")
+    ingest(source, tmp_path / "d")
+    plain, found = (list(open_dataset(tmp_path / name).labels()) for name in ("plain", "d"))
+    assert found == plain
+    assert len(found) == 6

@@ -47,6 +47,31 @@ def test_both_versions_say_the_same(tmp_path: Path) -> None:
     assert new[0].params == {"weather": "sunny"}
 
 
+def test_what_is_not_exact_or_no_object_is_counted(file: Path, tmp_path: Path) -> None:
+    shape = "<shape><rectangle><length>4.5</length><width>1.8</width></rectangle></shape>"
+    start = (
+        "<initialState><position><point><x>5</x><y>1</y></point></position><orientation><exact>0</exact></orientation>"
+        "<time><exact>0</exact></time></initialState>"
+    )
+    area = "<occupancy>" + shape + "<time><exact>1</exact></time></occupancy>"
+    more = (
+        f'<dynamicObstacle id="900"><type>car</type>{shape}{start}<occupancySet>{area}{area}</occupancySet>'
+        f'</dynamicObstacle><environmentObstacle id="901"><type>building</type>{shape}</environmentObstacle>'
+        f'<phantomObstacle id="902"><occupancySet>{area}</occupancySet></phantomObstacle>'
+        '<trafficLight id="903"/><newThing/>'
+    )
+    file.write_text(file.read_text().replace("</commonRoad>", f"{more}</commonRoad>"))
+    summary = ingest(file, tmp_path / "d", ego="100")
+    labels = list(open_dataset(tmp_path / "d").labels())
+    assert [sum(member.track == "900" for member in label.objects) for label in labels] == [1, 0, 0, 0, 0, 0]
+    counts = {entry.name: entry.count for entry in summary.left_out if entry.code == "not-read"}
+    assert {
+        "dynamicObstacle/occupancySet/occupancy": 2, "environmentObstacle": 1, "phantomObstacle": 1, "trafficLight": 1,
+        "newThing": 1,
+    }.items() <= counts.items()  # fmt: skip
+    assert any("obstacle `900`: where it may be" in diagnostic.message for diagnostic in summary.diagnostics)
+
+
 def test_map() -> None:
     source = CommonRoad().read(SAMPLE, Options(), Report())
     old, new = (Network(name, source.maps[name]) for name in (OLD, NEW))

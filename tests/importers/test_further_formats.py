@@ -69,6 +69,26 @@ class TestKitti:
         assert len(labels) == 4
         assert [entry.count for entry in summary.left_out if entry.what == "object"] == [4]
 
+    def test_both_spellings_of_calibrations(self, tmp_path: Path) -> None:
+        plain, _ = read(SAMPLES / "kitti_tiny", tmp_path)
+        source = copy("kitti_tiny", tmp_path)
+        file = source / "training" / "calib" / "0000.txt"
+        text = file.read_text()
+        for old, new in (
+            ("R_rect", "R0_rect:"),
+            ("Tr_velo_cam", "Tr_velo_to_cam:"),
+            ("Tr_imu_velo", "Tr_imu_to_velo:"),
+        ):
+            assert old in text
+            text = text.replace(old, new)
+        file.write_text(text)
+        (tmp_path / "d").rename(tmp_path / "plain")
+        labels, _ = read(source, tmp_path)
+        assert [label.objects for label in labels] == [label.objects for label in plain]
+        file.write_text(text.replace("Tr_imu_to_velo", "Tr_other"))
+        with pytest.raises(DataError, match="there is no `Tr_imu_velo` or `Tr_imu_to_velo`"):
+            ingest(source, tmp_path / "e")
+
 
 class TestOpenLabel:
     def edited(self, tmp_path: Path, edit: Callable[[dict[str, Any]], object]) -> Path:
@@ -124,6 +144,30 @@ class TestOpenLabel:
 
 
 class TestInteraction:
+    @pytest.mark.parametrize("name", ["recorded_trackfiles/DR_X/vehicle_tracks_000.csv", "train/DR_X_train.csv"])
+    def test_a_recording_a_case(self, name: str, tmp_path: Path) -> None:
+        head = "case_id,track_id,frame_id,timestamp_ms,agent_type,x,y,vx,vy,psi_rad,length,width,track_to_predict"
+        lines = [head]
+        # Cases need not be in one piece.
+        for case, frames, x in (("1.0", (1, 2), 10), ("2.0", (1, 2), 50), ("1.0", (3,), 10)):
+            for frame in frames:
+                for track in (1, 2):
+                    lines.append(f"{case},{track},{frame},{frame}00,car,{x + frame},{2 * track},1,0,0,4.5,1.8,1")
+        file = tmp_path / "s" / name
+        file.parent.mkdir(parents=True)
+        file.write_text("\n".join(lines) + "\n")
+        labels, summary = read(tmp_path / "s", tmp_path, ego="1")
+        scene = "DR_X/train" if "train" in name else "DR_X/000"
+        found = [(label.recording, label.timestamp_us, label.ego.x, len(label.objects)) for label in labels]
+        assert found == [
+            (f"{scene}/{case}", 100_000 * frame, x + frame, 1)
+            for case, x, frames in (("1", 10, (1, 2, 3)), ("2", 50, (1, 2)))
+            for frame in frames
+        ]
+        assert {entry.name: entry.count for entry in summary.left_out if entry.code == "not-read"} == {
+            "track_to_predict": 10
+        }
+
     def test_people_have_neither_heading_nor_size(self, tmp_path: Path) -> None:
         labels, _ = read(SAMPLES / "interaction_tiny", tmp_path, ego="1")
         walkers = [member for label in labels for member in label.objects if member.category == "Pedestrian"]

@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 
 from scenicq.errors import DataError
 from scenicq.importers import nuscenes_tables
+from scenicq.importers.ingest import ingest
 from scenicq.importers.nuscenes_tables import Tables
 from scenicq.importers.report import Report
+from scenicq.store.dataset import open_dataset
 
 TINY = Path(__file__).parents[2] / "sample_data" / "nuscenes_tiny" / "v1.0-tiny"
 DECODERS = {"sample_annotation": "ANNOTATIONS", "sample_data": "SENSOR_FILES", "ego_pose": "EGO_POSES"}
@@ -97,3 +99,19 @@ def test_sound_tables_need_no_json(folder: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(nuscenes_tables, "read_list", read_list)
     read(folder)
     assert not {path.stem for path in asked} & set(DECODERS)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.0, False), (0.8, True)])
+def test_times_as_floats(share: float, told: bool, tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    shutil.copytree(TINY.parent, source)
+    (file,) = source.glob("*/sample.json")
+    rows = json.loads(file.read_text())
+    whole = [row["timestamp"] for row in rows]
+    for row in rows:
+        row["timestamp"] += share
+    file.write_text(json.dumps([{**row, "timestamp": float(row["timestamp"])} for row in rows]))
+    summary = ingest(source, tmp_path / "d")
+    found = sorted(label.timestamp_us for label in open_dataset(tmp_path / "d").labels())
+    assert found == sorted(time + round(share) for time in whole)
+    assert any(entry.name == "rounded times" for entry in summary.left_out) == told
