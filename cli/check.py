@@ -34,6 +34,7 @@ from .manual import Manual
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import LINTED_MAPS
 from .report import as_json, count, show
+from .streams import say
 
 __all__ = ["check", "networks_of", "read_version"]
 
@@ -221,10 +222,10 @@ def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
             raise
         diagnostics = list(error.diagnostics)
     if format_ == "json":
-        click.echo(json.dumps([as_json(diagnostic) for diagnostic in diagnostics], indent=1))
+        say(json.dumps([as_json(diagnostic) for diagnostic in diagnostics], indent=1))
     else:
         show(diagnostics)
         for line in lines:
-            click.echo(line)
+            say(line)
     if any(diagnostic.severity == "error" for diagnostic in diagnostics):
         ctx.exit(ERROR)

@@ -12,6 +12,7 @@ from scenicq.report.changes import changes, changes_page, changes_text, check_da
 from .manual import Manual
 from .output import destination, writing
 from .report import plain, show
+from .streams import say
 
 __all__ = ["report"]
 
@@ -39,7 +40,7 @@ def report(before: Path, after: Path, *, every: bool, output: Path | None) -> No
         show([doubt])
     found = changes(old, new)
     if output is None or str(output) == "-":
-        click.echo(plain(changes_text(found, every=every)))
+        say(plain(changes_text(found, every=every)))
         return
     with destination(output) as sink, writing(output):
         sink.write(changes_page(found, (str(before), str(after))).encode())

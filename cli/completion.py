@@ -7,6 +7,7 @@ from click.shell_completion import get_completion_class
 
 from .main import cli
 from .manual import Manual
+from .streams import say
 
 __all__ = ["completion"]
 
@@ -29,4 +30,4 @@ def completion(shell: str) -> None:
     """
     found = get_completion_class(shell)
     assert found is not None
-    click.echo(found(cli, {}, "scenicq", "_SCENICQ_COMPLETE").source())
+    say(found(cli, {}, "scenicq", "_SCENICQ_COMPLETE").source())

@@ -15,6 +15,7 @@ from scenicq.smt.solver import available
 from .main import ERROR
 from .manual import Manual
 from .report import columns
+from .streams import say
 
 __all__ = ["doctor"]
 
@@ -47,15 +48,15 @@ def doctor(ctx: click.Context, *, format_: str) -> None:
     solvers = available()
     if format_ == "json":
         content = {"platform": platform.platform(), "versions": versions, "solvers": [asdict(each) for each in solvers]}
-        click.echo(json.dumps(content, indent=1))
+        say(json.dumps(content, indent=1))
     else:
-        click.echo(f"on {platform.platform()}")
-        click.echo("\n".join(columns([(name, number or "not installed") for name, number in versions.items()])))
-        click.echo("solvers")
+        say(f"on {platform.platform()}")
+        say("\n".join(columns([(name, number or "not installed") for name, number in versions.items()])))
+        say("solvers")
         for solver in solvers:
             mark = click.style("loads", fg="green") if solver.ok else click.style("does not load", fg="yellow")
-            click.echo(f"  {solver.name} {mark}: {solver.detail}")
+            say(f"  {solver.name} {mark}: {solver.detail}")
             for hint in filter(None, solver.hint.split("; ")):
-                click.echo(f"    hint: {hint}")
+                say(f"    hint: {hint}")
     if not any(solver.ok for solver in solvers):
         ctx.exit(ERROR)

@@ -26,6 +26,7 @@ from .options import ONE_FRAME, SHARED, query_options
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import plain
+from .streams import say
 
 __all__ = ["explain"]
 
@@ -81,7 +82,7 @@ def explain(
     if query.is_over_time() and (recording := _recording(query, str(named))) is not None:
         with LazySolver(query.options.solver) as solver:
             told = explain_recording(query, solver, *recording)
-        click.echo(plain(told.text()))
+        say(plain(told.text()))
         if not told.matches and not exit_zero:
             ctx.exit(NOTHING)
         return
@@ -90,7 +91,7 @@ def explain(
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)
-    click.echo(plain(show_explanation(explanation)))
+    say(plain(show_explanation(explanation)))
     if smt2 is not None:
         try:
             smt2.mkdir(parents=True, exist_ok=True)

@@ -19,6 +19,7 @@ from .datasets import open_checked
 from .ingest import defects
 from .manual import Manual
 from .report import columns, count, is_date, moment, plain
+from .streams import say
 
 __all__ = ["info"]
 
@@ -125,9 +126,9 @@ def info(dataset: str, *, verify: bool, format_: str) -> None:
         check_dataset(opened)
         verify_computed(opened)
     if format_ == "json":
-        click.echo(opened.manifest.to_json(), nl=False)
+        say(opened.manifest.to_json(), nl=False)
     else:
-        click.echo(
+        say(
             plain(
                 "\n".join(
                     [

@@ -23,6 +23,7 @@ from .failures import refused_by_system
 from .interrupts import Interrupts
 from .manual import write_examples, write_exit_codes
 from .report import show
+from .streams import only_results
 
 __all__ = ["COMMANDS", "NOTHING", "cli", "main"]
 
@@ -66,7 +67,8 @@ class Commands(click.Group):
         """Import a subcommand."""
         if cmd_name not in COMMANDS:
             return None
-        module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
+        with only_results():
+            module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
         if not gc.isenabled():
             # the process is our own (`main`), and what is loaded stays: neither now nor at the end need the collector
             # go through it; DuckDB, which reports what is never freed, is loaded later
@@ -190,8 +192,6 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # until the subcommand is loaded there is no garbage to be looked for
     gc.disable()
-    if sys.stdout is None:  # pyright: ignore[reportUnnecessaryComparison] - the caller closed it
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
     try:
         cli(prog_name="scenicq")
     except OSError as error:

@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from .streams import only_results
+
 __all__ = ["Manual", "write_examples", "write_exit_codes"]
 
 _ALWAYS = {2: "an error, which standard error explains", 130: "interrupted; nothing is left half-written"}
@@ -60,6 +62,11 @@ class Manual(click.Command):
         self.arguments = arguments
         self.exits = exits or _DONE
         self.topics = topics or {}
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; standard output is for its results alone."""
+        with only_results():
+            return super().invoke(ctx)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the arguments, the options by topic, and the exit codes."""

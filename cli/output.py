@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, BinaryIO, NoReturn, Self
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.atomic_files import WholeFile
 
+from .streams import results
+
 if TYPE_CHECKING:
     from tqdm import tqdm
 
@@ -27,7 +29,7 @@ def choose_format(name: str | None, file: Path | None) -> str:
     Raises:
         DataError: option-invalid: the extension names no format, or the format is not for terminals.
     """
-    terminal = file is None and sys.stdout.isatty()
+    terminal = file is None and results().isatty()
     if name == "parquet" and terminal:
         hint = "`-o FILE` writes it to a file"
         raise DataError(Diagnostic("option-invalid", "Parquet cannot be shown on a terminal", hints=(hint,)))
@@ -69,7 +71,7 @@ def destination(file: Path | None, folder: Path | None = None) -> Generator[Bina
         DataError: target-unwritable.
     """
     if file is None:
-        yield sys.stdout.buffer
+        yield results().buffer
     elif file.exists() and not file.is_file() and not file.is_dir():
         with writing(file):
             device = file.open("wb")
@@ -124,7 +126,7 @@ class ProgressBar:
 
     def aside(self) -> contextlib.AbstractContextManager[None]:
         """Takes the bar away while results are written to the same terminal."""
-        return contextlib.nullcontext() if self._bar is None else self._bar.external_write_mode(file=sys.stdout)
+        return contextlib.nullcontext() if self._bar is None else self._bar.external_write_mode(file=sys.stderr)
 
     def __enter__(self) -> Self:
         """Return the bar itself."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import click
-
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.prefilter_counts import prefilter_counts
 
 from .report import columns
+from .streams import say
 
 __all__ = ["show_plan"]
 
@@ -23,9 +22,9 @@ def show_plan(query: Query) -> None:
             (f"{estimated:,}", f"{frames:,}", step.what, step.span.place if step.span else "")
             for estimated, frames, step in zip(found.estimated[1:], left[1:], plan.steps, strict=True)
         ]
-        click.echo(f"map {plan.map}: {left[0]:,} frames, {left[-1]:,} left for the matcher")
+        say(f"map {plan.map}: {left[0]:,} frames, {left[-1]:,} left for the matcher")
         lines = columns([("estimated", "left", "after", "place"), *rows], right=frozenset({0, 1}))
-        click.echo("\n".join([*lines, ""]))
+        say("\n".join([*lines, ""]))
         for statement in plan.statements:
-            click.echo(f"  {statement};")
-        click.echo()
+            say(f"  {statement};")
+        say()

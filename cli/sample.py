@@ -14,6 +14,7 @@ from scenicq.query.execution.program_files import sibling_loader
 from .check import networks_of, read_version
 from .manual import Manual
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
+from .streams import say
 
 __all__ = ["sample"]
 
@@ -72,4 +73,4 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
         write_sample(labels, network, Path(source.name.strip("<>")).stem, output)
         return
     for label in labels:
-        click.echo(sample_record(label))
+        say(sample_record(label))

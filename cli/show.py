@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from .output import destination, writing
 from .programs import read_scenario
 from .remarks import remarks, show_remarks
 from .sources import SENSORS, sensor_root
+from .streams import results, say
 
 __all__ = ["show"]
 
@@ -120,8 +120,8 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
             data = picture.encode()
     with destination(file) as sink, writing(file):
         sink.write(data)
-    if file is None and sys.stdout.isatty():
-        click.echo()
+    if file is None and results().isatty():
+        say()
 
 
 show.params += [option for option in match.params if option.name in SHARED]

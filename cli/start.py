@@ -1,12 +1,16 @@
 """Where the process begins: whatever goes wrong while the program loads ends it with 2, never with Python's own 1.
 
 1 means that nothing matched, and whoever runs a query in a script must be able to believe it.
+
+Standard output holds results and nothing else: they have a descriptor of their own from the start, and what any library
+writes to descriptor 1, here or in a process that is started from here, goes where messages go.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+from typing import TextIO
 
 __all__ = ["main"]
 
@@ -18,6 +22,7 @@ _LEAST_GB = 2
 def main() -> None:
     """Run the command line of this process, and choose the exit code."""
     _fill_streams()
+    results = _set_results_apart()
     if (limit := _address_space()) is not None and limit < _LEAST_GB * 10**9:
         _end(f"error[resources-exhausted]: {_LEAST_GB} GB of address space are needed (see `ulimit -v`)", _ERROR)
     try:
@@ -25,6 +30,8 @@ def main() -> None:
             _take_memory_of_linear_algebra()
         from .main import main as run  # noqa: PLC0415 - loading may fail, too
 
+        # what has been loaded may have printed
+        sys.stdout = sys.__stdout__ = results
         run()
     except SystemExit:
         raise
@@ -43,6 +50,15 @@ def _fill_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
     if sys.stderr is None:  # pyright: ignore[reportUnnecessaryComparison] - the caller closed it
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
+
+
+def _set_results_apart() -> TextIO:
+    """Standard output as a duplicate of descriptor 1, which no other process has; 1 leads to 2 from now on."""
+    caller = sys.stdout
+    results = os.dup(1)
+    os.dup2(2, 1)
+    encoding, errors = ("utf-8", None) if caller is None else (caller.encoding, caller.errors)  # pyright: ignore[reportUnnecessaryComparison] - the caller closed it
+    return open(results, "w", encoding=encoding, errors=errors, buffering=1 if os.isatty(results) else -1)
 
 
 def _address_space() -> int | None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:  # whoever starts no process need not load what starts them
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
-__all__ = ["Lost", "Work", "Workers", "as_many_as_pay", "processors"]
+__all__ = ["Lost", "Work", "Workers", "as_many_as_pay", "discard_output", "lead_output_away", "processors"]
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -281,6 +281,7 @@ def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]
     import multiprocessing  # noqa: PLC0415
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    lead_output_away()
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _interrupts())
     parent = multiprocessing.parent_process()
@@ -306,6 +307,30 @@ def _end_with(sentinel: int) -> None:
 
     wait([sentinel])
     os._exit(1)
+
+
+def lead_output_away() -> None:
+    """Have what libraries write to descriptor 1 go to 2 from now on, in a process of our own: results are elsewhere."""
+    with contextlib.suppress(OSError):
+        os.dup2(2, 1)
+
+
+@contextlib.contextmanager
+def discard_output() -> Generator[None]:
+    """Drop what is written to descriptor 1 within the block, which must be short: the process may be the user's."""
+    try:
+        before = os.dup(1)
+    except OSError:  # it is closed
+        yield
+        return
+    try:
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, 1)
+        os.close(nothing)
+        yield
+    finally:
+        os.dup2(before, 1)
+        os.close(before)
 
 
 def processors() -> int:

@@ -47,10 +47,13 @@ ANSWER_BYTES = 16 * 2**20
 """Length of an answer at most."""
 
 _BOOTSTRAP = (
-    "import pickle, sys\n"
+    "import os, pickle, sys\n"
+    # whatever a module prints that is loaded from here on is no answer
+    "answers = os.dup(1)\n"
+    "os.dup2(2, 1)\n"
     "sys.path[:] = pickle.load(sys.stdin.buffer)\n"
     "from scenicq.smt.worker import serve\n"
-    "serve(pickle.load(sys.stdin.buffer), sys.stdin.buffer)\n"
+    "serve(pickle.load(sys.stdin.buffer), sys.stdin.buffer, answers)\n"
 )
 
 

@@ -1,4 +1,4 @@
-"""The inside of a worker process: reads problems from standard input, writes answers to standard output.
+"""The inside of a worker process: reads problems from standard input, writes answers to what was standard output.
 
 Problems arrive pickled, answers leave as one line of JSON each. What a solver's library prints goes nowhere. The
 process ends when its standard input is closed, that is, at the latest with its parent. Read `pool` next.
@@ -61,18 +61,16 @@ class Request:
     deadline_s: float
 
 
-def serve(setup: Setup, requests: IO[bytes]) -> None:
+def serve(setup: Setup, requests: IO[bytes], descriptor: int) -> None:
     """Answer requests until there are no more; never returns.
 
     Args:
         setup: What to run.
         requests: The stream that the setup came from.
+        descriptor: Where answers go. Those of standard output and standard error go nowhere.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    answers = os.fdopen(os.dup(1), "wb")
-    with open(os.devnull, "wb") as nothing:
-        os.dup2(nothing.fileno(), 1)
-        os.dup2(nothing.fileno(), 2)
+    answers = os.fdopen(descriptor, "wb")
     check = _load(setup, answers)
     inbox: queue.SimpleQueue[Request] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(requests, inbox), daemon=True).start()

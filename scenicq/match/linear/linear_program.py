@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib import import_module
 from typing import Any
 
 from scenicq.match.linear.affine_forms import Affine, VariableAxis
+from scenicq.processes import discard_output
 
 __all__ = ["LinearSystem", "NotLinear", "NotSolved", "Row"]
 
@@ -97,11 +99,20 @@ def _settled(rows: list[Row]) -> bool:
 _MARGIN = 1e-7
 
 
+@cache
+def _load_highs() -> Any:
+    """HiGHS, which most runs never need; the first solver of a process prints before it can be told to be silent."""
+    highs: Any = import_module("highspy")
+    with discard_output():
+        highs.Highs()
+    return highs
+
+
 def _solve(
     rows: list[Row], variables: list[VariableAxis], least: tuple[VariableAxis, float] | None = None
 ) -> Mapping[VariableAxis, float] | None:
     """A solution, the one in which a variable times a factor is least if one is given."""
-    highs: Any = import_module("highspy")  # most runs never get here
+    highs = _load_highs()
     column = {variable: number for number, variable in enumerate(variables)}
     strict = any(row.strict for row in rows)
     margin = len(variables)

@@ -1,0 +1,194 @@
+"""Standard output holds results alone, whatever libraries print: in C or in Python, in any process of a command.
+
+The oracle is the same command where no library prints: its bytes are compared.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SAMPLES = Path(__file__).parents[2] / "sample_data"
+
+# Linear programs decide frames of this program and, where it is asked for, a solver does.
+PROGRAM = """
+model scenic.domains.driving.model
+x = Range(-30, 30)
+ego = new Car
+other = new Car offset by (x, Range(-40, 40)), facing Range(0, 360) deg
+third = new Car offset by (x + Range(-10, 10), Range(-40, 40)), facing Range(0, 360) deg
+"""
+
+# Prints in each process that loads one of some modules: past every buffer, through that of C, and in Python. Solvers
+# start without `site`, so their start is prefixed with the same.
+NOISE = """
+import ctypes, os, subprocess, sys
+class Noise:
+    def find_spec(self, name, path=None, target=None):
+        if name in {modules!r}:
+            library = ctypes.CDLL(None)
+            library.write(1, b"written by C\\n", 13)
+            library.puts(b"put by C")
+            print("printed by Python")
+            with open({log!r}, "a") as log:
+                log.write(f"{{os.getpid()}} {{name}}\\n")
+sys.meta_path.insert(0, Noise())
+"""
+SITE = """
+noise = {noise!r}
+exec(noise)
+started = subprocess.Popen.__init__
+def start(self, words, *more, **options):
+    bare = isinstance(words, list) and "-S" in words
+    started(self, [*words[:-1], noise + words[-1]] if bare else words, *more, **options)
+subprocess.Popen.__init__ = start
+"""
+NOISES = {"written by C", "put by C", "printed by Python"}
+MODULES = {"scenicq_cli.failures", "shapely", "highspy", "scenicq.match.matcher", "scenicq.smt.portable"}
+
+ENGINES = {
+    "one process": (("--jobs", "1"), 1),
+    "workers": (("--jobs", "2"), 2),
+    "solvers": (("--jobs", "1", "--method", "smt", "--solver", "portable"), 2),
+    "dask": (("--jobs", "2", "--engine", "dask"), 2),
+}
+"""Options, and how many processes print at least."""
+FORMATS = ("jsonl", "csv", "ids", "parquet")
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    file = tmp_path_factory.mktemp("program") / "between.scenic"
+    file.write_text(PROGRAM)
+    return file
+
+
+@pytest.fixture
+def noisy(tmp_path):
+    """The surroundings in which libraries print, and the file that says which processes have."""
+    log = tmp_path / "noise.log"
+    site = tmp_path / "site"
+    site.mkdir()
+    noise = NOISE.format(modules=MODULES, log=str(log))
+    (site / "sitecustomize.py").write_text(SITE.format(noise=noise))
+    return {**os.environ, "PYTHONPATH": str(site)}, log
+
+
+def outcome(words, env=None, cwd=None):
+    done = subprocess.run(list(map(str, words)), capture_output=True, env=env, cwd=cwd, timeout=280, check=False)
+    return done.returncode, done.stdout, done.stderr.decode()
+
+
+@pytest.fixture(scope="module")
+def quiet(command, program, crossroads):
+    """The bytes of results where no library prints."""
+    found = {name: outcome([command, "match", program, crossroads, "--limit", 5, "--format", name]) for name in FORMATS}
+    assert all(code == 0 and data and not told for code, data, told in found.values()), found
+    return {name: data for name, (_, data, _) in found.items()}
+
+
+def test_a_linear_program_prints_nothing(quiet):
+    """HiGHS writes its name to descriptor 1 as soon as it is made; see `quiet` for the command."""
+    lines = quiet["jsonl"].decode().splitlines()
+    assert len(lines) > 3
+    assert all(line.startswith('{"frame"') for line in lines)
+
+
+def test_nor_does_one_in_a_process_of_somebody_else(program, crossroads):
+    code = (
+        "import sys, scenicq\n"
+        "found = scenicq.open(sys.argv[1]).match(open(sys.argv[2]).read())\n"
+        "print(*[each.frame for each in found], sep='\\n', flush=True)\n"
+        "assert 'highspy' in sys.modules\n"
+        "import os; os.write(1, b'mine\\n')"
+    )
+    status, data, told = outcome([sys.executable, "-c", code, crossroads, program])
+    assert (status, told) == (0, "")
+    *frames, last = data.decode().splitlines()
+    assert last == "mine"
+    assert len(frames) > 3
+    assert all("/" in frame for frame in frames)
+
+
+@pytest.mark.parametrize(
+    ("engine", "form"),
+    [
+        pytest.param(engine, form, marks=[pytest.mark.slow] if engine == "dask" and form != "parquet" else [])
+        for engine in ENGINES
+        for form in FORMATS
+    ],
+)
+def test_results_are_the_same_bytes_where_libraries_print(engine, form, command, program, crossroads, quiet, noisy):
+    if engine == "dask":
+        pytest.importorskip("distributed")
+    env, log = noisy
+    options, least = ENGINES[engine]
+    words = [command, "match", program, crossroads, "--limit", 5, "--format", form, *options]
+    expected = quiet[form] if engine != "solvers" else outcome(words)[1]
+    status, data, told = outcome(words, env)
+    assert (status, data) == (0, expected)
+    assert set(told.splitlines()) <= NOISES
+    assert "printed by Python" in told
+    assert told.count("written by C") >= 1
+    printed = [line.split() for line in log.read_text().splitlines()]
+    assert len({process for process, _ in printed}) >= least
+    if engine == "solvers":
+        assert "scenicq.smt.portable" in {name for _, name in printed}
+
+
+COMMANDS = {
+    "match a file": "match PROGRAM DATASET --summary -o out.jsonl",
+    "match, a table": "match PROGRAM DATASET --format table",
+    "shard": "match PROGRAM DATASET --shard 1/1 -o pieces",
+    "gather": "gather pieces",
+    "ingest": "ingest SOURCE made --jobs 2 --force",
+    "check": "check PROGRAM DATASET --forest",
+    "check as json": "check PROGRAM DATASET --format json",
+    "sample": "sample PROGRAM DATASET --seed 1 -n 2",
+    "explain": "explain PROGRAM DATASET 03-busy-intersection/10 --exit-zero",
+    "show": "show DATASET 03-busy-intersection/10",
+    "report": "report out.jsonl out.jsonl",
+    "info": "info DATASET --format json",
+    "completion": "completion bash",
+    "help": "match --help",
+}
+
+
+@pytest.mark.timeout(1200)
+def test_every_command_prints_its_results_alone(command, program, crossroads, noisy, tmp_path):
+    env, _ = noisy
+    named = {"PROGRAM": program, "DATASET": crossroads, "SOURCE": SAMPLES / "crossroads"}
+    folders = tmp_path / "quiet", tmp_path / "noisy"
+    for folder in folders:
+        folder.mkdir()
+    for what, line in COMMANDS.items():
+        words = [command, *(named.get(word, word) for word in line.split())]
+        first, second = (outcome(words, e, f) for e, f in zip((None, env), folders, strict=True))
+        assert second[:2] == first[:2], what
+        assert second[0] in (0, 1), (what, second)
+    assert (folders[0] / "out.jsonl").read_bytes() == (folders[1] / "out.jsonl").read_bytes()
+
+
+def test_commands_write_to_standard_output_in_one_way():
+    """Each writes with `say`, or to `destination`; only messages are written otherwise."""
+    cli = Path(__file__).parents[2] / "cli"
+    found: set[str] = set()
+    for file in cli.glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            match node:
+                case ast.Attribute(value=ast.Name(id="sys"), attr="stdout" | "__stdout__"):
+                    found.add(f"{file.name}: sys.stdout")
+                case ast.Call(func=ast.Attribute(attr="echo" | "secho"), keywords=given) if not {
+                    each.arg for each in given
+                } & {"err", "file"}:
+                    found.add(f"{file.name}: echo")
+                case ast.Call(func=ast.Name(id="print")):
+                    found.add(f"{file.name}: print")
+                case _:
+                    pass
+    assert found == {"main.py: sys.stdout", "start.py: sys.stdout", "streams.py: sys.stdout"}
