@@ -27,6 +27,7 @@ from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.regions import read_features
+from scenicq.store.scans import allowed_paths, scan
 from scenicq.store.sql import sql_list
 
 if TYPE_CHECKING:
@@ -125,6 +126,17 @@ class Dataset:
         """A table's Parquet files, in the order of their rows; absolute paths where they are on this machine."""
         return tuple(map(self.place.file, self.manifest.tables[table]))
 
+    def scan(self, table: str, part: int | None = None, *, numbered: bool = False) -> str:
+        """What SQL selects from to read a table; see `scans.scan`.
+
+        Args:
+            table: Name of the table.
+            part: Number of the part; all by default.
+            numbered: Whether there is also `file_row_number`, the number of each row in its file.
+        """
+        files = self.files(table)
+        return scan(table, files if part is None else [files[part]], numbered=numbered)
+
     def connect(
         self, *, threads: int | None = None, memory_limit: str | None = None, views: bool = True
     ) -> duckdb.DuckDBPyConnection:
@@ -147,13 +159,10 @@ class Dataset:
         # shapes are not for SQL, and DuckDB 1.5.0 refuses those without a coordinate reference system
         connection.execute("SET enable_geoparquet_conversion = false")
         self.place.admit(connection, (part for parts in self.manifest.tables.values() for part in parts))
-        every: list[str] = []
-        for table in self.manifest.tables:
-            paths = [str(path) for path in self.files(table)]
-            every += paths
-            if views:
-                connection.execute(f"CREATE VIEW {table} AS SELECT * FROM read_parquet({sql_list(paths)})")
-        connection.execute(f"SET allowed_paths = {sql_list(every)}")
+        for table in self.manifest.tables if views else ():
+            connection.execute(f"CREATE VIEW {table} AS FROM {self.scan(table)}")
+        every = [file for table in self.manifest.tables for file in self.files(table)]
+        connection.execute(f"SET allowed_paths = {sql_list(allowed_paths(every))}")
         connection.execute("SET enable_external_access = false")
         return connection
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, Self
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 import pyarrow.parquet as pq
 
@@ -168,7 +168,8 @@ def find_place(address: str | Path) -> Place:
     if isinstance(address, Path) or "://" not in text:
         return LocalFolder.at(Path(address))
     if text.startswith("file://"):
-        return LocalFolder.at(Path(unquote(urlsplit(text).path)))
+        # all of it is the path: a question mark begins no query
+        return LocalFolder.at(Path(unquote(text.removeprefix("file://").removeprefix("localhost"))))
     return RemoteFolder.at(text)
 
 

@@ -22,10 +22,10 @@ def locate(dataset: Dataset, recording: str) -> tuple[int, int, int]:
         DataError: option-invalid: there is no such recording.
     """
     with closing(dataset.connect()) as connection:
-        for part, path in enumerate(dataset.files("labels")):
+        for part in range(len(dataset.files("labels"))):
             found = connection.execute(
                 "SELECT min(file_row_number), max(file_row_number) + 1 "
-                f"FROM read_parquet({sql_text(str(path))}, file_row_number = true) WHERE recording = ?",
+                f"FROM {dataset.scan('labels', part, numbered=True)} WHERE recording = ?",
                 [recording],
             ).fetchone()
             if found is not None and found[0] is not None:

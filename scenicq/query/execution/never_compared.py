@@ -23,7 +23,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.dataset import Dataset
 from scenicq.store.place import open_parquet
-from scenicq.store.sql import sql_list, sql_text
+from scenicq.store.sql import sql_text
 
 if TYPE_CHECKING:
     import duckdb
@@ -212,19 +212,10 @@ def _own(each: _Setting, options: MatchOptions) -> str:
     return f"{'ego_class' if each.ego else 'class'} IN {_classes(each.category, options)}" if each.category else "true"
 
 
-def _paths(dataset: Dataset, table: str) -> str:
-    return sql_list(map(str, dataset.files(table)))
-
-
-def _read(dataset: Dataset, table: str) -> str:
-    """What SQL reads a table from."""
-    return f"read_parquet({_paths(dataset, table)})"
-
-
 def _row(dataset: Dataset, connection: duckdb.DuckDBPyConnection, columns: list[str], table: str) -> tuple[int, ...]:
     if not columns:
         return ()
-    row = connection.execute(f"SELECT {', '.join(columns)} FROM {_read(dataset, table)}").fetchone()
+    row = connection.execute(f"SELECT {', '.join(columns)} FROM {dataset.scan(table)}").fetchone()
     assert row is not None
     return row
 
@@ -262,7 +253,7 @@ def _full_columns(dataset: Dataset, table: str, names: Collection[str | None]) -
 
 def _known(dataset: Dataset, connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> list[str]:
     """The properties that labels have of such an object beside class and position, or the parameters that they have."""
-    table, prefix = (_read(dataset, "labels"), "ego_") if each.ego else (_read(dataset, "objects"), "")
+    table, prefix = (dataset.scan("labels"), "ego_") if each.ego else (dataset.scan("objects"), "")
     own = f"{prefix}class IN {_classes(each.category, options)}" if each.category else "true"
     names: list[str] = []
     if each.category:

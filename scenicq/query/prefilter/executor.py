@@ -109,10 +109,10 @@ def extents(dataset: Dataset, connection: duckdb.DuckDBPyConnection) -> dict[str
         connection: To it.
     """
     found: dict[str, list[Extent]] = {}
-    for part, path in enumerate(dataset.files("labels")):
+    for part in range(len(dataset.files("labels"))):
         rows = connection.execute(
             "SELECT map, min(file_row_number), max(file_row_number) + 1, min(recording), max(recording) "
-            f"FROM read_parquet({sql_text(str(path))}, file_row_number = true) GROUP BY map"
+            f"FROM {dataset.scan('labels', part, numbered=True)} GROUP BY map"
         ).fetchall()
         for name, first, end, low, high in rows:
             found.setdefault(name, []).append(Extent(part, first, end, (low, high)))
@@ -182,10 +182,10 @@ def whole_recordings(dataset: Dataset, connection: duckdb.DuckDBPyConnection, cu
         blocks_ = list(group)
         size = max(block.end - block.first for block in blocks_)
         whole = replace(blocks_[0], end=blocks_[-1].end)
-        path = sql_text(str(dataset.files("labels")[part]))
+        labels = dataset.scan("labels", part, numbered=True)
         rows = connection.execute(
             "SELECT min(file_row_number), max(file_row_number) + 1 "
-            f"FROM read_parquet({path}, file_row_number = true) WHERE {whole.where} GROUP BY recording ORDER BY 1"
+            f"FROM {labels} WHERE {whole.where} GROUP BY recording ORDER BY 1"
         ).fetchall()
         run: list[tuple[int, int]] = []
         for number, (first, end) in enumerate(rows):
@@ -207,26 +207,25 @@ def _rows_of(
 
     That of the labels comes first, and the rest costs nothing until it is asked for.
     """
-    files = {view: sql_text(str(dataset.files(table)[block.part])) for view, table in _TABLES.items()}
-    numbered = "SELECT *, {} + file_row_number AS number FROM read_parquet({}, file_row_number = true)"
-    yield LABELS, f"{numbered.format(offset, files[LABELS])} WHERE {block.where}"
+    scans = {view: dataset.scan(table, block.part, numbered=True) for view, table in _TABLES.items()}
+    selected = f"SELECT *, {offset} + file_row_number AS number FROM "
+    yield LABELS, f"{selected}{scans[LABELS]} WHERE {block.where}"
     (ends,) = connection.execute(
         "SELECT min(first_object), max(first_object + object_count), min(first_sensor), "
-        f"max(first_sensor + sensor_count) FROM read_parquet({files[LABELS]}, file_row_number = true) "
-        f"WHERE {block.where}"
+        f"max(first_sensor + sensor_count) FROM {scans[LABELS]} WHERE {block.where}"
     ).fetchall()
     limits = {OBJECTS: ends[:2], SENSORS: ends[2:]}
-    for view, path in files.items():
+    for view, rows in scans.items():
         where = ""
         if view == LABELS:
             continue
         if view in limits and None not in limits[view]:
             where = " WHERE file_row_number BETWEEN {} AND {} - 1".format(*limits[view])
         elif view == MEMBERSHIPS and block.end - block.first <= _MOST_NAMED:
-            selected = f"SELECT frame FROM read_parquet({files[LABELS]}, file_row_number = true) WHERE {block.where}"
-            named = [sql_text(name) for (name,) in connection.execute(selected).fetchall()]
+            frames = connection.execute(f"SELECT frame FROM {scans[LABELS]} WHERE {block.where}").fetchall()
+            named = [sql_text(name) for (name,) in frames]
             where = f" WHERE frame IN ({', '.join(named) or 'NULL'})"
-        yield view, numbered.format(offset, path) + where
+        yield view, selected + rows + where
 
 
 def _open(connection: duckdb.DuckDBPyConnection, views: Iterable[tuple[str, str]]) -> None:
