@@ -17,7 +17,7 @@ from scenicq.importers.fields import InvalidError, check_characters, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
-from scenicq.store.columns import RecordingColumns, columns_of
+from scenicq.store.columns import RecordingColumns, columns_of, second_of_track
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.value_rules import LONGEST_NAME, find_problems, json_object
 from scenicq.store.wkb import FARTHEST_M
@@ -188,7 +188,7 @@ class Labels:
             recording: The recording.
         """
         name, map_name, frames = recording.name, recording.map, recording.frames
-        if find_problems(recording):
+        if find_problems(recording) or second_of_track(recording) is not None:
             return False
         unique = set(frames)
         if len(unique) < len(frames) or unique & self._frames or any((name, frame) in self._taken for frame in frames):
@@ -249,18 +249,21 @@ class Labels:
     def _with_sound_objects(self, label: Label, of_objects: _Facts, of_sensors: _Facts, place: str) -> Label:
         """A label without the objects and sensor files of which something is wrong."""
         ids = {"ego"}
+        tracks: dict[str, str] = {}
         sound: list[LabelObject] = []
         owner = f"of label `{label.frame}`"
-        for member, problem in zip(label.objects, of_objects, strict=True):
+        for member, fact in zip(label.objects, of_objects, strict=True):
+            problem = fact
+            if problem is None and member.track is not None and member.track in tracks:
+                problem = f"has the track `{member.track}` of object `{tracks[member.track]}`, which is kept"
             if member.id in ids:
                 why = "is kept for the ego" if member.id == "ego" else "is used twice"
-                message = f"{place}: object id `{member.id}` {owner} {why}"
-                self._report.left_out("object", "record-invalid", message)
+                self._report.left_out("object", "record-invalid", f"{place}: object id `{member.id}` {owner} {why}")
             elif problem is not None:
-                message = f"{place}: object `{member.id}` {owner}: {problem}"
-                self._report.left_out("object", "record-invalid", message)
+                self._report.left_out("object", "record-invalid", f"{place}: object `{member.id}` {owner}: {problem}")
             else:
                 ids.add(member.id)
+                tracks |= {} if member.track is None else {member.track: member.id}
                 sound.append(member)
         sensors = dict(label.sensors)
         for channel, problem in zip(label.sensors, of_sensors, strict=True):

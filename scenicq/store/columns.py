@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 from scenicq.geometry.camera import Camera
 from scenicq.store.labels import LabelObject, OutOfPlane, Recording
 
-__all__ = ["OUT_OF_PLANE", "MemberColumns", "Memberships", "RecordingColumns", "columns_of", "to_json"]
+__all__ = [
+    "OUT_OF_PLANE",
+    "MemberColumns",
+    "Memberships",
+    "RecordingColumns",
+    "columns_of",
+    "second_of_track",
+    "to_json",
+]
 
 OUT_OF_PLANE = ("z", "pitch", "roll")
 """Columns of height and tilt."""
@@ -112,6 +120,18 @@ def columns_of(recording: Recording) -> RecordingColumns:
         paths=[path for label in labels for path in label.sensors.values()],
         cameras=[label.cameras.get(channel) for label in labels for channel in label.sensors],
     )
+
+
+def second_of_track(recording: RecordingColumns) -> int | None:
+    """The first row of `objects` whose track another object of its label has, too; None if there is none."""
+    labels = np.repeat(np.arange(len(recording.object_counts)), recording.object_counts).tolist()
+    seen: set[tuple[int, str]] = set()
+    for row, (label, track) in enumerate(zip(labels, recording.objects.track, strict=True)):
+        if track is not None:
+            if (label, track) in seen:
+                return row
+            seen.add((label, track))
+    return None
 
 
 def to_json(values: Mapping[str, Any]) -> str | None:

@@ -49,7 +49,8 @@ def recording_rows(
     xy[object_at] = np.column_stack((objects.x, objects.y))
     placed = _placed(index, xy)
     times = np.array(columns.times_us, dtype=np.int64)
-    one_track = ["ego"] * len(counts)
+    # no motion crosses a label without an ego
+    one_track = ["ego" if category else None for category in egos.category]
     return {
         "labels": _table(
             "labels",

@@ -155,7 +155,11 @@ class TrackBlock:
             # a label object without a track is one of its own; so is the ego of a recording
             alone = np.arange(self._m) + len(self.runs) * (len(self._names) + 1)
             objects = np.where(codes < len(self._names), known, alone)
-            egos = len(self.runs) * len(self._names) + self.recording_of
+            # so is what a label without an ego has in its place, which is a mere point to look from
+            codes, classes = self.categories()
+            there = np.array([*map(bool, classes), False])[codes[self._m :]]
+            nobody = int(alone[-1] + 1 if self._m else len(self.runs) * (len(self._names) + 1)) + np.arange(len(there))
+            egos = np.where(there, len(self.runs) * len(self._names) + self.recording_of, nobody)
             self._tracks = np.concatenate((objects, egos))
         return self._tracks[members]
 

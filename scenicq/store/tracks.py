@@ -74,7 +74,9 @@ class RecordingTracks:
         key = track, name
         if key not in self._columns:
             if track[0] == "ego":
-                self._columns[key] = _reals(self.labels[f"ego_{name}"])
+                # in place of an ego that is absent stands a mere point to look from, of no class
+                there = np.array([bool(each) for each in self.labels["ego_class"].to_pylist()], dtype=np.bool_)
+                self._columns[key] = np.where(there, _reals(self.labels[f"ego_{name}"]), np.nan)
             else:
                 if name not in self._numbers:
                     self._numbers[name] = _reals(self.objects[name])
@@ -110,7 +112,7 @@ class TrackReader:
         prefixed = [f"ego_{name}" for name in (*_NUMBERS, "attributes")]
         self._labels = RowFile(
             dataset.files("labels")[part],
-            ["frame", "recording", "timestamp_us", "object_count", "first_object", *prefixed],
+            ["frame", "recording", "timestamp_us", "object_count", "first_object", "ego_class", *prefixed],
         )
         self._objects = RowFile(dataset.files("objects")[part], ["id", "track", "attributes", *_NUMBERS])
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 
+from scenicq.store.columns import second_of_track
 from scenicq.store.dataset import Dataset
 from scenicq.store.rebuild import recordings_of
 from scenicq.store.regions import lane_rows
@@ -40,6 +41,9 @@ def verify_computed(dataset: Dataset) -> None:
         pieces: dict[str, list[ArrowTable]] = {table: [] for table in SEGMENT_TABLES}
         first: dict[str, int] = dict.fromkeys(SEGMENT_TABLES, 0)
         for columns in recordings_of(found["labels"], found["objects"], found["sensors"]):
+            if (second := second_of_track(columns)) is not None:
+                row = first["objects"] + second
+                invalid(parts["objects"].path, "has two objects of one track in a label", row=row, column="track")
             index = indexes.of(columns.map)
             rows = recording_rows(columns, index, first_object=first["objects"], first_sensor=first["sensors"])
             for table, more in rows.items():

@@ -1,0 +1,78 @@
+"""Where a label has no ego, nothing is known of it: no point that stands in is read, and no motion crosses it."""
+
+import pytest
+
+from scenicq.compiler.default_street import street
+from scenicq.errors import Source
+from scenicq.match.verdict import Match, Unknown
+from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.labels import Label, LabelObject, Recording
+from scenicq.store.writer import write_dataset
+from scenicq.temporal.interval_options import IntervalOptions
+
+STREET = street()
+ABSENT = (3, 4)
+HEAD = """model scenic.domains.driving.model
+ego = new Car in everywhere, facing Range(0, 360) deg
+c = new Car in everywhere, facing Range(0, 360) deg
+"""
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory) -> Dataset:
+    """An ego that drives at 4 m/s, 30 m behind a car, but for two labels that have none."""
+    labels: list[Label] = []
+    for number in range(8):
+        car = LabelObject("car", "Car", "car", 0.0, 30.0 + 2 * number, 0.0, 2.0, 4.5, 1.5, None, "c")
+        ego = LabelObject("ego", "Car", "car", 0.0, 2.0 * number, 0.0, 2.0, 4.5, 1.5, None)
+        point = LabelObject("ego", "", "", car.x, car.y)
+        labels.append(
+            Label(f"f{number}", "r", 10**12 + number * 500_000, STREET.name, point if number in ABSENT else ego, (car,))
+        )
+    folder = tmp_path_factory.mktemp("absent") / "d"
+    recording = Recording("r", STREET.name, tuple(labels))
+    write_dataset(folder, iter([recording]), {STREET.name: STREET.features}, name="absent")
+    return open_dataset(folder)
+
+
+def told(dataset: Dataset, text: str, **more: object) -> list[tuple[type, str, str]]:
+    options = QueryOptions(time=IntervalOptions(**more))
+    found = Query(dataset, Source("absent.scenic", HEAD + text), options).results()
+    return [(type(each.verdict), each.frame, each.interval.last) for each in found]
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "(distance to c) < 2",
+        "ego.position.y > 20",
+        "ego.speed > 20",
+        "ego.speed < 3",
+        "abs(ego.acceleration) > 1",
+        "abs(ego.angularSpeed) > 0.1",
+        "abs(relative heading of ego from c) > 1",
+        "ego.velocity.y > 20",
+    ],
+)
+def test_what_stands_in_for_an_absent_ego_is_not_read(dataset, condition):
+    assert {verdict for verdict, _, _ in told(dataset, f"require eventually {condition}")} == {Unknown}
+    kept = told(dataset, f"require always not ({condition})")
+    assert (Match, "f0", "f2") in kept
+    assert all(verdict is not Match or not (first <= "f3" <= last) for verdict, first, last in kept)
+
+
+def test_no_motion_crosses_a_label_without_an_ego(dataset):
+    motions = [label.ego.motion for label in dataset.labels()]
+    for number, motion in enumerate(motions):
+        if number in ABSENT:
+            assert motion is None or motion.velocity is None
+        else:
+            assert motion is not None
+            assert motion.velocity == pytest.approx((0.0, 4.0))
+            assert motion.acceleration == pytest.approx(0.0)
+
+
+def test_frames_of_a_static_program_without_an_ego_are_in_no_interval_that_matches(dataset):
+    found = told(dataset, "", min_duration_s=1.0)
+    assert [(first, last) for verdict, first, last in found if verdict is Match] == [("f0", "f2"), ("f5", "f7")]
