@@ -21,10 +21,10 @@ from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.values import Choice, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
-from scenicq.forest.nodes import CompareOp, Constant, Feature, LogicOp, Node, Select
+from scenicq.forest.nodes import CompareOp, Constant, Feature, Index, LogicOp, Node, Select
 from scenicq.forest.walk import leaves
 
-__all__ = ["as_test", "split", "without_courses"]
+__all__ = ["as_test", "option_of", "split", "without_courses"]
 
 _MOST_COURSES = 2_000
 
@@ -155,6 +155,28 @@ def _either(test: Node, no: Node, yes: Node, span: Span) -> Node:
             return build.logic(LogicOp.OR, test, no, span=span)
         case _:
             return Select(test, (no, yes), span=span)
+
+
+def option_of(run: Runner, value: ModelValue, span: Span) -> ModelValue:
+    """The option of a random choice that the course takes, found by halving; anything else as it is.
+
+    Raises:
+        ScenarioError: random-branch, where only one course may be taken.
+    """
+    while isinstance(value, Choice) and run.course is not None:
+        options, low, high = value.options, 0, len(value.options)
+        while any(option is not options[low] for option in options[low:high]):
+            middle = (low + high) // 2
+            low, high = (low, middle) if run.course.decide(_comes_before(value, middle), span) else (middle, high)
+        value = options[low]
+    return value
+
+
+def _comes_before(choice: Choice, number: int) -> Node:
+    """Whether a choice comes out as one of its first options."""
+    if isinstance(choice.index, Index):
+        return Select(choice.index, tuple(build.constant(each < number) for each in range(len(choice.options))))
+    return build.compare(CompareOp.LT, choice.index, build.constant(float(number)))
 
 
 def as_test(value: ModelValue, span: Span) -> ModelValue:

@@ -19,6 +19,7 @@ from scenicq.compiler.attributes import attribute
 from scenicq.compiler.choices import each_existing, map_choice
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
 from scenicq.compiler.constructs import construct
+from scenicq.compiler.courses import option_of
 from scenicq.compiler.distributions import interval
 from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
 from scenicq.compiler.items import items_of, length_of, subscript
@@ -157,12 +158,18 @@ def _compare_chain(run: Runner, node: ast.ComparisonChain, scope: Environment) -
         if results and results[-1] is False:
             return False
         right = evaluate(run, comparison.right, scope)
+        if comparison.operator in ("in", "not in") and _holds_lists(right):
+            right = option_of(run, right, comparison.right.span)
         run.budget.pay(length_of(left) + length_of(right), node.span)
         results.append(lift(lambda a, b, op=comparison.operator: compare(op, a, b, node.span), left, right))
         left = right
     if len(results) == 1:
         return results[0]
     return lift(lambda *values: _all(list(values), node.span), *results)
+
+
+def _holds_lists(value: ModelValue) -> bool:
+    return isinstance(value, Choice) and any(isinstance(each, list | tuple | dict | set) for each in value.options)
 
 
 def _all(values: list[ModelValue], span: Span) -> ModelValue:

@@ -14,6 +14,7 @@ from scenicq.compiler.attributes import corner
 from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import kind_of_model, to_vector
 from scenicq.compiler.comparisons import iterate
+from scenicq.compiler.courses import option_of
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.known_properties import decided
 from scenicq.compiler.values import Choice, ModelValue, Module, describe, fail, is_node
@@ -46,7 +47,7 @@ def items_of(run: Runner, value: ModelValue, span: Span) -> list[ModelValue]:
     Raises:
         ScenarioError: wrong-type or random-branch.
     """
-    return list(components(run, value, span)) if is_vector(value) else iterate(value, span)
+    return list(components(run, value, span)) if is_vector(value) else iterate(option_of(run, value, span), span)
 
 
 def subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:

@@ -15,10 +15,10 @@ from scenicq.compiler.arithmetic import is_random, plain_binary
 from scenicq.compiler.builtins import extreme, language_names, truth
 from scenicq.compiler.choices import each_option
 from scenicq.compiler.coerce import kind_of_model, to_scalar
-from scenicq.compiler.comparisons import compare, iterate
+from scenicq.compiler.comparisons import compare
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.expressions import call
-from scenicq.compiler.items import components, is_vector
+from scenicq.compiler.items import components, is_vector, items_of
 from scenicq.compiler.known_properties import decided, settled
 from scenicq.compiler.rounding import in_order
 from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail, lift
@@ -46,10 +46,10 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
     def filtered(span: Span, function: ModelValue, items: ModelValue) -> ModelValue:
         if isinstance(items, Choice):
             return each_option(run, items, lambda option: filtered(span, function, option), span)
-        return [item for item in iterate(items, span) if decided(run, apply(function, item, span), span)]
+        return [item for item in items_of(run, items, span) if decided(run, apply(function, item, span), span)]
 
     def mapped(span: Span, function: ModelValue, *lists: ModelValue) -> ModelValue:
-        columns = [iterate(items, span) for items in lists]
+        columns = [items_of(run, items, span) for items in lists]
         return [call(run, function, list(row), {}, span) for row in zip(*columns, strict=False)]
 
     def less(one: ModelValue, other: ModelValue, span: Span) -> bool:
@@ -59,7 +59,7 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
         return plain_binary("<", one, other, span)
 
     def ordered(span: Span, items: ModelValue, key: ModelValue = None, reverse: ModelValue = False) -> ModelValue:
-        keyed = [(_plain(settled(run, apply(key, item, span))), item) for item in iterate(items, span)]
+        keyed = [(_plain(settled(run, apply(key, item, span))), item) for item in items_of(run, items, span)]
         random, backwards = any(is_random(value) for value, _ in keyed), truth(reverse, span)
         if random and key is None and all(kind_of_model(item) == "scalar" for _, item in keyed):
             run.budget.step(span, len(keyed) ** 2)
@@ -77,7 +77,7 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
 
     def quantified(op: str) -> Callable[..., ModelValue]:
         def decide(span: Span, items: ModelValue) -> ModelValue:
-            values = iterate(items, span)
+            values = items_of(run, items, span)
             run.budget.step(span, len(values) // 2)
             known = [truth(value, span) for value in values if not is_random(value)]
             random = [value for value in values if is_random(value)]
@@ -91,7 +91,7 @@ def sequence_functions(run: Runner) -> dict[str, ModelValue]:
         plain = extreme(name)
 
         def find(span: Span, *items: ModelValue, key: ModelValue = None, default: ModelValue = None) -> ModelValue:
-            values = iterate(items[0], span) if len(items) == 1 else list(items)
+            values = items_of(run, items[0], span) if len(items) == 1 else list(items)
             if not values and default is not None:
                 return default
             if key is None:
