@@ -35,6 +35,10 @@ class OpenedDataset:
     dataset: Dataset
     _connection: duckdb.DuckDBPyConnection | None = field(default=None, init=False)
 
+    def __reduce__(self) -> tuple[type[OpenedDataset], tuple[Dataset]]:
+        """A copy, also in another process, has connections of its own."""
+        return OpenedDataset, (self.dataset,)
+
     def match(self, program: str | Path, **options: Unpack[OptionTexts]) -> Matches:
         """Find the frames that match a program.
 

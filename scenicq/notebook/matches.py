@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -43,57 +43,65 @@ _LETTERS = 2 * LETTERS
 _TILE = f"display:inline-block;margin:4px;vertical-align:top;width:{_SMALL}px;overflow-wrap:anywhere"
 
 
-@dataclass(frozen=True, slots=True)
-class FrameResult:
-    """The verdict on one frame.
+class _Origin:
+    """What a result came out of: no field of it, as tables and copies of a result are about its frame alone."""
 
-    Attributes:
-        matches: The query that it came out of.
-        result: Frame, verdict and sensor files.
-    """
-
+    __slots__ = ("matches", "result")
     matches: Matches
     result: Result
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class FrameResult(_Origin):
+    """The verdict on one frame, as plain values: `dataclasses.asdict`, pandas and Polars take it as it is.
+
+    Attributes:
+        frame: Name of the frame.
+        recording: Name of the recording.
+        timestamp_us: When, in microseconds.
+        verdict: `match`, `no_match` or `unknown`.
+        roles: The label object of each object of the program.
+        witness: A value of each random variable that proves a match, by its place in the program.
+        sensors: The sensor file of each channel.
+    """
+
+    frame: str
+    recording: str
+    timestamp_us: int
+    verdict: str
+    roles: Mapping[str, str]
+    witness: Mapping[str, Any]
+    sensors: Mapping[str, str]
+
+    @staticmethod
+    def of(matches: Matches, result: Result) -> FrameResult:
+        """The result of a query.
+
+        Args:
+            matches: The query that it came out of.
+            result: Frame, verdict and sensor files.
+        """
+        told = record(result)
+        made = FrameResult(
+            result.frame, result.recording, result.timestamp_us, told["verdict"], dict(told["correspondence"]),
+            dict(told["witness"]), dict(told.get("sensors", {})),
+        )  # fmt: skip
+        object.__setattr__(made, "matches", matches)
+        object.__setattr__(made, "result", result)
+        return made
+
+    def __hash__(self) -> int:
+        """By the frame."""
+        return hash((self.frame, self.recording, self.timestamp_us, self.verdict))
+
+    def __reduce__(self) -> tuple[Callable[..., FrameResult], tuple[Matches, Result]]:
+        """Pickled with the query that it came out of, but not with its other results."""
+        return FrameResult.of, (self.matches.without_results(), self.result)
 
     @property
     def record(self) -> Mapping[str, Any]:
         """The values that a line of `scenicq match --format jsonl` has."""
         return record(self.result) | {ORIGIN: self.matches.origin}
-
-    @property
-    def frame(self) -> str:
-        """Name of the frame."""
-        return self.result.frame
-
-    @property
-    def recording(self) -> str:
-        """Name of the recording."""
-        return self.result.recording
-
-    @property
-    def timestamp_us(self) -> int:
-        """When, in microseconds."""
-        return self.result.timestamp_us
-
-    @property
-    def verdict(self) -> str:
-        """`match`, `no_match` or `unknown`."""
-        return self.record["verdict"]
-
-    @property
-    def roles(self) -> Mapping[str, str]:
-        """The label object of each object of the program."""
-        return self.record["correspondence"]
-
-    @property
-    def witness(self) -> Mapping[str, Any]:
-        """A value of each random variable that proves a match, by its place in the program."""
-        return self.record["witness"]
-
-    @property
-    def sensors(self) -> Mapping[str, str]:
-        """The sensor file of each channel."""
-        return self.record["sensors"]
 
     def explain(self) -> DisplayedText:
         """Why the frame matches, or what keeps it from it."""
@@ -134,6 +142,35 @@ class Matches(Sequence[FrameResult]):
         self.query.plans()
         self.origin = name_origin(self.query.dataset)
 
+    @classmethod
+    def restored(cls, query: Query, origin: str, results: Sequence[Result] | None) -> Matches:
+        """Matches as they were; the program is compiled when it is needed.
+
+        Args:
+            query: Dataset, program and options.
+            origin: The dataset and its version, as results name it.
+            results: What was found, None if it was not looked for.
+        """
+        made = object.__new__(cls)
+        made.query, made.origin, made._backdrops = query, origin, {}
+        made._rest = None if results is None else iter(())
+        made._found = [FrameResult.of(made, each) for each in results or ()]
+        return made
+
+    def without_results(self) -> Matches:
+        """The same query, whose results are still to be found."""
+        return Matches.restored(self.query, self.origin, None)
+
+    def __reduce__(self) -> tuple[Callable[..., Matches], tuple[Query, str, list[Result] | None]]:
+        """Pickled with all its results; of a query that was not asked yet, without."""
+        query = self.query
+        bare = Query(query.dataset, query.source, query.options, query.recordings, query.funnel, query.file)
+        return Matches.restored, (
+            bare,
+            self.origin,
+            [each.result for each in self._all()] if self._rest is not None else None,
+        )
+
     def __iter__(self) -> Iterator[FrameResult]:
         """The results in the order of recording, time and frame."""
         number = 0
@@ -146,7 +183,7 @@ class Matches(Sequence[FrameResult]):
         if self._rest is None:
             self._rest = self.query.results()
         for result in self._rest:
-            self._found.append(FrameResult(self, result))
+            self._found.append(FrameResult.of(self, result))
             return True
         return False
 

@@ -32,6 +32,7 @@ class Reading:
         Args:
             folder: Of the dataset.
         """
+        self._folder = folder
         self._handle: int | None = None
         if fcntl is None:
             return
@@ -51,9 +52,14 @@ class Reading:
 
     def end(self) -> None:
         """End."""
-        handle, self._handle = self._handle, None
+        # of what could not be made nothing is there
+        handle, self._handle = getattr(self, "_handle", None), None
         if handle is not None:
             os.close(handle)
+
+    def __reduce__(self) -> tuple[type[Reading], tuple[Path]]:
+        """A copy, also in another process, has a lock of its own: the number of a file means nothing elsewhere."""
+        return Reading, (self._folder,)
 
     def __del__(self) -> None:
         self.end()
