@@ -9,12 +9,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Compare, CompareOp, Constant, Feature, Logic, LogicOp, Node, Select
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Compare,
+    CompareOp,
+    Constant,
+    Feature,
+    Logic,
+    LogicOp,
+    Node,
+    Normal,
+    Select,
+    VectorOf,
+)
 from scenicq.forest.walk import children, postorder, transform
 
-__all__ = ["MOTION", "Truths", "certain_and_possible"]
+__all__ = ["MOTION", "Truths", "certain_and_possible", "with_any_value"]
 
 MOTION = frozenset({"speed", "velocity", "acceleration", "angularSpeed"})
 """Properties that say how an object moves."""
@@ -39,7 +53,29 @@ def certain_and_possible(root: Node, unobserved: Callable[[Feature], bool]) -> T
     return _Reader(unobserved).truths(root, _MOST_SELECTS)
 
 
+def with_any_value(root: Node, unobserved: Callable[[Feature], bool]) -> Node:
+    """An expression that may come out as whatever it does for some values of what is not observed."""
+    any_value: dict[tuple[int, str], Node] = {}
+
+    def number() -> Node:
+        # any real number
+        return Normal(build.constant(0.0), build.constant(1.0))
+
+    def step(node: Node) -> Node:
+        if not (isinstance(node, Feature) and unobserved(node)):
+            return node
+        made = VectorOf(number(), number()) if node.kind == "vector" else number()
+        return any_value.setdefault((node.object, node.property), made)
+
+    return transform(root, step)
+
+
 _FALSE, _TRUE = build.constant(False), build.constant(True)
+
+
+_MIRRORED = {
+    CompareOp.LT: CompareOp.GT, CompareOp.LE: CompareOp.GE, CompareOp.GT: CompareOp.LT, CompareOp.GE: CompareOp.LE,
+}  # fmt: skip
 
 
 class _Reader:
@@ -73,8 +109,20 @@ class _Reader:
                 same = _joined(LogicOp.OR, _joined(LogicOp.AND, one, other),
                                _joined(LogicOp.AND, _opposite(one), _opposite(other)))  # fmt: skip
                 return same if node.op is CompareOp.EQ else _opposite(same)
+            case Compare(left=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme) if node.op in _MIRRORED:
+                return self._of_extreme(node.op, extreme, node.right, node.span, selects)
+            case Compare(right=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme) if node.op in _MIRRORED:
+                return self._of_extreme(_MIRRORED[node.op], extreme, node.left, node.span, selects)
             case _:
                 return self._atom(node, reading, selects)
+
+    def _of_extreme(
+        self, op: CompareOp, extreme: Arithmetic, bound: Node, span: Span | None, selects: int
+    ) -> Truths:  # fmt: skip
+        """The same of `min(a, b) < c` and its like: one operand, or each, must be beyond the bound."""
+        least, below = extreme.op is ArithmeticOp.MIN, op in (CompareOp.LT, CompareOp.LE)
+        parts = [self.truths(build.compare(op, arg, bound, span), selects) for arg in extreme.args]
+        return _joined(LogicOp.OR if least is below else LogicOp.AND, *parts)
 
     def _atom(self, node: Node, reading: set[int], selects: int) -> Truths:
         """The same of a condition on values: what is the same for all outcomes of a choice inside is known."""

@@ -15,7 +15,7 @@ from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
 from scenicq.forest.nodes import Feature, Node
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
-from scenicq.forest.unobserved import MOTION, certain_and_possible
+from scenicq.forest.unobserved import MOTION, certain_and_possible, with_any_value
 from scenicq.forest.walk import features, postorder
 from scenicq.match.options import MatchOptions
 
@@ -123,13 +123,13 @@ def _with_doubts(group: Group, unobserved: Callable[[Feature], bool]) -> Group:
             possible.append(item)
             continue
         if isinstance(item, Condition):
-            requirement, ends = item.requirement, certain_and_possible(item.expression, unobserved)
+            sure, may = certain_and_possible(item.expression, unobserved)
+            certain.append(Condition(item.requirement, sure))
+            possible.append(Condition(item.requirement, may))
         else:
-            # no value of what is compared is known to be the label's, and none is known not to be
-            ends = build.constant(False), build.constant(True)
-            requirement = Requirement(item.expression, item.span)
-        certain.append(Condition(requirement, ends[0]))
-        possible.append(Condition(requirement, ends[1]))
+            # no value of what is compared is known to be the label's
+            certain.append(Condition(Requirement(item.expression, item.span), build.constant(False)))
+            possible.append(replace(item, expression=with_any_value(item.expression, unobserved)))
     return replace(group, constraints=tuple(possible), doubtful=tuple(doubtful), certain=tuple(certain))
 
 
