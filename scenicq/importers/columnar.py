@@ -16,10 +16,10 @@ import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import LONGEST_TEXT
+from scenicq.store.unpacked import Bound, check_claims, decoded_bytes, feather_batches, text_columns
 
 __all__ = ["read_feather", "read_parquet"]
 
-_MOST_ROWS = 20_000_000
 _TEXTS = ("string", "large_string", "string_view")
 _TYPES: dict[str, Any] = {"integer": pa.int64(), "real": pa.float64(), "text": pa.string()}
 
@@ -35,14 +35,10 @@ def read_feather(path: Path, columns: Mapping[str, str], optional: Mapping[str, 
     Raises:
         DataError: `file-missing`, or `file-invalid` where it is none, is cut off or has other columns.
     """
-    with _told(path, "a feather file"), pa.ipc.open_file(pa.BufferReader(path.read_bytes())) as file:
-        rows, table = 0, []
-        for number in range(file.num_record_batches):
-            batch = file.get_batch(number)
-            rows += batch.num_rows
-            _check_rows(path, rows)
-            table.append(batch)
-        return _columns(path, pa.Table.from_batches(table, file.schema), columns, optional or {})
+    with _told(path, "a feather file"):
+        bound = Bound(path)
+        schema, batches = feather_batches(path.read_bytes(), bound)
+        return _columns(path, pa.Table.from_batches(batches, schema), columns, optional or {}, bound)
 
 
 def read_parquet(path: Path, columns: Mapping[str, str], optional: Mapping[str, str] | None = None) -> dict[str, Any]:
@@ -52,9 +48,12 @@ def read_parquet(path: Path, columns: Mapping[str, str], optional: Mapping[str, 
         DataError: `file-missing` or `file-invalid`.
     """
     with _told(path, "a Parquet file"), pq.ParquetFile(path) as file:
-        _check_rows(path, file.metadata.num_rows)
+        bound = Bound(path)
         there = [name for name in {**columns, **(optional or {})} if name in file.schema_arrow.names]
-        return _columns(path, file.read(columns=there), columns, optional or {})
+        check_claims(file, bound, there)
+        texts = [name for name in text_columns(file) if name in there]
+    with _told(path, "a Parquet file"), pq.ParquetFile(path, read_dictionary=texts) as file:
+        return _columns(path, file.read(columns=there), columns, optional or {}, bound)
 
 
 class _told:  # noqa: N801 - reads as a statement
@@ -82,12 +81,9 @@ def _first_line(error: object) -> str:
     return (str(error).splitlines() or ["unreadable"])[0][:200]
 
 
-def _check_rows(path: Path, rows: int) -> None:
-    if rows > _MOST_ROWS:
-        raise DataError(Diagnostic("file-invalid", f"{path} claims {rows} rows, more than a recording has"))
-
-
-def _columns(path: Path, table: Any, wanted: Mapping[str, str], optional: Mapping[str, str]) -> dict[str, Any]:
+def _columns(
+    path: Path, table: Any, wanted: Mapping[str, str], optional: Mapping[str, str], bound: Bound
+) -> dict[str, Any]:
     twice = [name for name in (*wanted, *optional) if table.schema.names.count(name) > 1]
     if twice:
         raise DataError(Diagnostic("file-invalid", f"{path} has the column `{twice[0]}` more than once"))
@@ -100,6 +96,8 @@ def _columns(path: Path, table: Any, wanted: Mapping[str, str], optional: Mappin
     for name, kind in {**wanted, **optional}.items():
         if name in table.schema.names:
             column = table[name]
+            for chunk in column.chunks:
+                bound.add(decoded_bytes(chunk))
             if pa.types.is_dictionary(column.type):
                 column = column.cast(column.type.value_type)
             if _kind(column.type) not in ({"integer"} if kind == "integer" else {kind, "integer"}):

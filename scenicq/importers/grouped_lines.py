@@ -28,6 +28,7 @@ import pyarrow.parquet as pq
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import InvalidError, parse_json
 from scenicq.importers.report import Report
+from scenicq.store.unpacked import Bound, check_claims, decoded_bytes, text_columns
 
 __all__ = ["GroupedLines", "Runs", "group_lines"]
 
@@ -41,8 +42,6 @@ _LONGEST_LINE = 1 << 26
 """Bytes of a line; a label of a hundred thousand objects has a third of that."""
 _MOST_EMPTY = 1_000_000
 """Empty lines of a file."""
-_LEAST_UNPACKED, _MOST_TIMES = 1 << 28, 200
-"""Bytes that a packed file may always unpack to, and how many times its size beyond; labels pack to a tenth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,15 +199,11 @@ def _seekable(file: Path, scratch: Path | None, number: int, report: Report) -> 
 
 
 def _gzip_lines(file: Path) -> Iterator[bytes]:
-    most = max(_LEAST_UNPACKED, _MOST_TIMES * file.stat().st_size)
-    unpacked = 0
+    bound = Bound(file)
     with gzip.open(file) as lines:
         try:
             while piece := lines.read(1 << 20):
-                unpacked += len(piece)
-                if unpacked > most:
-                    message = f"{file} unpacks to more than {most:,} bytes, {_MOST_TIMES} times its size"
-                    raise DataError(Diagnostic("file-invalid", message))
+                bound.add(len(piece))
                 yield piece
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise DataError(Diagnostic("file-invalid", f"{file} is not a whole gzip file: {error}")) from error
@@ -217,8 +212,14 @@ def _gzip_lines(file: Path) -> Iterator[bytes]:
 def _parquet_lines(file: Path, report: Report) -> Iterator[bytes]:
     try:
         with pq.ParquetFile(file) as table:
+            texts = text_columns(table)
+            bound = Bound(file)
+            check_claims(table, bound)
+        with pq.ParquetFile(file, read_dictionary=texts) as table:
             row = 0
             for batch in table.iter_batches(batch_size=1024):
+                for column in batch.columns:
+                    bound.add(decoded_bytes(column))
                 for fields in batch.to_pylist(maps_as_pydicts="strict"):
                     row += 1
                     try:

@@ -23,6 +23,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.prediction_checks import NEEDED, check_predictions, duplicate_error
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, PLAIN, Predictions, Protocol
 from scenicq.store.schema import ArrowTable
+from scenicq.store.unpacked import Bound, check_claims, decoded_bytes, feather_batches, text_columns
 
 __all__ = ["read_predictions"]
 
@@ -241,9 +242,20 @@ def _line_row(box: _Object) -> tuple[_Number, ...]:
 def _table(path: Path) -> ArrowTable:
     data = _bytes(path)
     try:
+        bound = Bound(path, len(data))
         if path.suffix.lower() == ".feather":
-            return pa.ipc.open_file(pa.BufferReader(data)).read_all()
-        return pq.read_table(pa.BufferReader(data))
+            schema, batches = feather_batches(data, bound)
+            table = pa.Table.from_batches(batches, schema)
+        else:
+            with pq.ParquetFile(pa.BufferReader(data)) as parquet:
+                check_claims(parquet, bound)
+                texts = text_columns(parquet)
+            table = pq.read_table(pa.BufferReader(data), read_dictionary=texts)
+        for column in table.columns:
+            for chunk in column.chunks:
+                bound.add(decoded_bytes(chunk))
+        plain = [field.type.value_type if pa.types.is_dictionary(field.type) else field.type for field in table.schema]
+        return table.cast(pa.schema(list(zip(table.schema.names, plain, strict=True))))
     except (pa.ArrowException, OSError) as error:
         raise _invalid(path, error) from None
 

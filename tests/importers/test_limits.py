@@ -19,6 +19,7 @@ from scenicq.importers.grouped_lines import group_lines
 from scenicq.importers.ingest import ingest
 from scenicq.importers.opendrive import convert_xodr
 from scenicq.importers.report import Report
+from scenicq.store import unpacked
 from scenicq.store.dataset import open_dataset
 
 SOURCE = Path(__file__).parents[2] / "sample_data/crossroads"
@@ -58,7 +59,7 @@ def test_nothing_but_empty_lines_is_no_source(source, monkeypatch):
 
 
 def test_a_packed_file_that_grows_beyond_all_measure_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(grouped_lines, "_LEAST_UNPACKED", 1 << 20)
+    monkeypatch.setattr(unpacked, "_LEAST", 1 << 20)
     bomb = tmp_path / "labels.jsonl.gz"
     with gzip.open(bomb, "wb") as file:
         file.write(b"x" * (8 << 20))

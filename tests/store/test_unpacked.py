@@ -1,0 +1,132 @@
+"""Small files that unpack to a lot are refused before they do; what they would take is counted without taking it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from pyarrow import feather
+
+from scenicq.errors import DataError
+from scenicq.importers.columnar import read_feather, read_parquet
+from scenicq.importers.ingest import ingest
+from scenicq.importers.prediction_files import read_predictions
+from scenicq.query.execution.result_files import read_records
+from scenicq.store import unpacked
+from scenicq.store.unpacked import decoded_bytes
+
+SAMPLES = Path(__file__).parents[2] / "sample_data"
+LEAST = 1 << 20
+"""Bytes that are always allowed, here."""
+ROWS = 3000
+TEXT = "x" * 4000
+
+
+@pytest.fixture(autouse=True)
+def little(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unpacked, "_LEAST", LEAST)
+
+
+def dictionary(text: str = TEXT, rows: int = ROWS) -> Any:
+    return pa.DictionaryArray.from_arrays(pa.array([0] * rows, pa.int32()), pa.array([text]))
+
+
+ARRAYS: dict[str, Callable[[], Any]] = {
+    "texts of a dictionary": dictionary,
+    "texts": lambda: pa.array([TEXT] * ROWS),
+    "numbers": lambda: pa.array([1.0] * 100_000),
+    "nothing": lambda: pa.nulls(100_000),
+    "lists": lambda: pa.array([[0] * 1000] * 100),
+    "lists of texts": lambda: pa.ListArray.from_arrays(pa.array(range(0, ROWS + 1, 10), pa.int32()), dictionary()),
+    "structs": lambda: pa.StructArray.from_arrays([dictionary()], ["a"]),
+    "maps": lambda: pa.array([[("k" * 1000, TEXT)]] * ROWS, pa.map_(pa.string(), pa.string())),
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_what_is_counted_is_at_least_what_python_takes(name: str) -> None:
+    array = ARRAYS[name]()
+    assert decoded_bytes(array) >= len(json.dumps(array.to_pylist()))
+    assert decoded_bytes(array.slice(1, 10)) < decoded_bytes(array) / 5
+
+
+def test_views_are_counted_where_they_lead() -> None:
+    if not hasattr(pa, "string_view"):
+        pytest.skip("this pyarrow has no views")
+    array = pa.array([TEXT] * ROWS).cast(pa.string_view())
+    assert decoded_bytes(array) >= ROWS * len(TEXT)
+
+
+def write(path: Path, table: Any, compression: str = "zstd") -> Path:
+    if path.suffix == ".parquet":
+        pq.write_table(table, path, compression=compression)
+    else:
+        feather.write_feather(table, path, compression=compression)
+    assert path.stat().st_size * 200 < LEAST * 8
+    return path
+
+
+@pytest.mark.parametrize("name", ["texts of a dictionary", "texts", "numbers"])
+@pytest.mark.parametrize("suffix", [".parquet", ".feather"])
+def test_columns_that_unpack_to_too_much_are_refused(tmp_path: Path, suffix: str, name: str) -> None:
+    path = write(tmp_path / f"t{suffix}", pa.table({"a": ARRAYS[name]()}))
+    read = read_parquet if suffix == ".parquet" else read_feather
+    before = pa.total_allocated_bytes()
+    with pytest.raises(DataError, match="unpacks to more than"):
+        read(path, {"a": "real" if name == "numbers" else "text"})
+    assert pa.total_allocated_bytes() - before < 4 * LEAST
+
+
+def test_buffers_of_feather_are_not_unpacked_to_be_counted(tmp_path: Path) -> None:
+    path = write(tmp_path / "t.feather", pa.table({"a": [0.0] * 10_000_000}))
+    bound = unpacked.Bound(path)
+    before = pa.total_allocated_bytes()
+    with pytest.raises(DataError, match="unpacks to more than"):
+        unpacked.feather_batches(path.read_bytes(), bound)
+    assert pa.total_allocated_bytes() - before < 4 * LEAST
+
+
+@pytest.mark.parametrize("compression", ["uncompressed", "lz4", "zstd"])
+def test_feather_files_are_read_as_pyarrow_reads_them(tmp_path: Path, compression: str) -> None:
+    table = pa.table({"a": [1, None, 3], "b": ["x", "y", None], "c": dictionary("z", 3), "d": [[1.5], [], None]})
+    feather.write_feather(table, tmp_path / "t.feather", compression=compression, chunksize=2)
+    data = (tmp_path / "t.feather").read_bytes()
+    schema, batches = unpacked.feather_batches(data, unpacked.Bound(tmp_path / "t.feather"))
+    assert pa.Table.from_batches(batches, schema).to_pylist() == table.to_pylist()
+    for end in range(8, len(data), 7):
+        with pytest.raises((pa.ArrowException, OSError, ValueError)):
+            unpacked.feather_batches(data[:end], unpacked.Bound(tmp_path / "t.feather"))
+
+
+@pytest.mark.parametrize("where", ["id", "class", "attributes"])
+def test_labels_in_parquet(tmp_path: Path, where: str) -> None:
+    source = Path(shutil.copytree(SAMPLES / "crossroads", tmp_path / "source"))
+    (source / "labels.jsonl").unlink()
+    member = {"id": "o", "class": "Car", "position": [0.0, 0.0], "heading": 0.0, "attributes": {"a": "b"}}
+    label = {"id": "f", "recording": "r", "timestamp_us": 0, "map": "crossroads", "ego": member, "objects": [member]}
+    if where == "id":
+        label["id"] = TEXT
+    elif where == "class":
+        member["class"] = TEXT
+    else:
+        member["attributes"] = {"a": TEXT}
+    write(source / "labels.parquet", pa.Table.from_pylist([label] * ROWS))
+    with pytest.raises(DataError, match="unpacks to more than"):
+        ingest(source, tmp_path / "made")
+    assert not (tmp_path / "made").exists()
+
+
+def test_results_and_predictions(tmp_path: Path) -> None:
+    results = write(tmp_path / "r.parquet", pa.table({"frame": [TEXT] * ROWS, "recording": ["r"] * ROWS}))
+    with pytest.raises(DataError, match="unpacks to more than"):
+        list(read_records(results))
+    for suffix in (".parquet", ".feather"):
+        predictions = write(tmp_path / f"p{suffix}", pa.table({"frame": [TEXT] * ROWS, "class": ["Car"] * ROWS}))
+        with pytest.raises(DataError, match="unpacks to more than"):
+            read_predictions(predictions)
