@@ -20,10 +20,10 @@ from scenicq.evaluate.evaluation import Evaluation
 from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview, tables
+from scenicq.query.execution.csv_cells import quote_cell
 from scenicq.report.write import check_target
 
 from .datasets import open_checked
-from .formats import safe_cell
 from .manual import Manual
 from .output import choose_format, destination, writing
 from .report import columns, plain, show
@@ -125,7 +125,7 @@ def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
             lines = io.StringIO(newline="")
             rows = csv.DictWriter(lines, COLUMNS, lineterminator="\n")
             rows.writeheader()
-            rows.writerows({name: safe_cell(value) for name, value in row.items()} for row in flat_rows(found))
+            rows.writerows({name: quote_cell(value) for name, value in row.items()} for row in flat_rows(found))
             text = lines.getvalue()
         case "parquet":
             _write_parquet(found, sink)

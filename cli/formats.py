@@ -10,23 +10,22 @@ import csv
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, BinaryIO, Protocol
 
+from scenicq.errors import CONTROL
+from scenicq.query.execution.csv_cells import quote_cell
 from scenicq.query.execution.result_lines import json_line, json_text
 from scenicq.query.execution.result_origin import ORIGIN
 from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
 from scenicq.query.execution.results import Result, record
 from scenicq.store.frame_names import ShortNames
 
-from .report import CONTROL as _CONTROL
 from .report import plain
 from .table import Table, TextStream
 
-__all__ = ["FORMATS", "Writer", "make_writer", "result_writer", "safe_cell"]
+__all__ = ["FORMATS", "Writer", "make_writer", "result_writer"]
 
 FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
 """Names of the formats."""
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What makes a spreadsheet take a cell for a formula."""
 _COLUMNS: tuple[str, ...] = (
     "frame",
     "recording",
@@ -97,7 +96,9 @@ class _JsonLines(_Lines):
 def _flat(record: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     """A row of plain cells; nested values and truth values become JSON text."""
     cells = {name: record.get(name, {}) for name in names}
-    return {name: json_text(cell) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()}
+    return {
+        name: _escaped(json_text(cell)) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()
+    }
 
 
 def _name(record: Mapping[str, Any]) -> str | None:
@@ -109,15 +110,7 @@ def _name(record: Mapping[str, Any]) -> str | None:
 
 def _escaped(text: str) -> str:
     """JSON in which nothing moves a cursor or turns text round; what it says is the same."""
-    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
-
-
-def safe_cell(value: Any) -> Any:
-    """A text that a terminal shows as it is, and that no spreadsheet takes for a formula."""
-    if not isinstance(value, str):
-        return value
-    shown = plain(value)
-    return f"'{shown}" if shown.startswith(_FORMULA) else shown
+    return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 class _Csv:
@@ -130,7 +123,7 @@ class _Csv:
         row = _flat(record, self._names) | {
             name: record.get(name) for name in (*DENSITY_COLUMNS, ORIGIN) if name in self._names
         }
-        self._rows.writerow({name: safe_cell(value) for name, value in row.items()})
+        self._rows.writerow({name: quote_cell(value) for name, value in row.items()})
         self._text.flush()
 
     def finish(self) -> None:

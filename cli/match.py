@@ -176,7 +176,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     if chosen == "ids" and not (report or export or rank or sample or shard or engine or resume or options.all_matches):
         options = replace(options, proofs=False)
     if deadline is not None:
-        options = replace(options, until=time.time() + deadline)
+        options = replace(options, until=time.monotonic() + deadline)
     query = Query(open_checked(str(target)), source, options)
     check_over_time(ctx, together, query.is_over_time)
     if explain:

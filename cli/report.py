@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
@@ -10,9 +9,9 @@ from typing import Any
 
 import click
 
-from scenicq.errors import Diagnostic, Span, render
+from scenicq.errors import Diagnostic, Span, plain, render
 
-__all__ = ["CONTROL", "as_json", "columns", "count", "is_date", "moment", "plain", "show", "show_few"]
+__all__ = ["as_json", "columns", "count", "is_date", "moment", "plain", "show", "show_few"]
 
 _FEW = 5
 """Diagnostics of one code shown at most, where there may be many."""
@@ -20,16 +19,6 @@ _FEW = 5
 
 _FIRST_US, _LAST_US = 946_684_800_000_000, 4_102_444_800_000_000
 """Start of the years 2000 and 2100: no label was recorded before, or will be after."""
-
-CONTROL = re.compile(
-    "[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff]"
-)
-"""What moves a terminal's cursor, changes its colours or turns text round, except a new line."""
-
-
-def plain(text: str) -> str:
-    """A text of somebody else's as it is safe on a terminal: control characters are shown, not obeyed."""
-    return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def show(diagnostics: Iterable[Diagnostic]) -> None:

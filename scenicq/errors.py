@@ -6,6 +6,7 @@ datasets or terminals; every other module of the package may import it.
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from bisect import bisect_right
 from collections.abc import Iterable
@@ -14,6 +15,7 @@ from functools import cached_property
 
 __all__ = [
     "CODES",
+    "CONTROL",
     "DataError",
     "Diagnostic",
     "Note",
@@ -22,6 +24,7 @@ __all__ = [
     "SolverError",
     "Source",
     "Span",
+    "plain",
     "render",
 ]
 
@@ -102,6 +105,16 @@ CODES: dict[str, str] = {
     "unused-variable": "a variable that nothing reads",
 }
 """Every diagnostic code with its meaning."""
+
+CONTROL = re.compile(
+    "[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff]"
+)
+"""What moves a terminal's cursor, changes its colours or turns text round, except a new line."""
+
+
+def plain(text: str) -> str:
+    """A text of somebody else's as it is safe on a terminal: control characters are shown, not obeyed."""
+    return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,13 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import platform
 import tempfile
 import threading
+import time
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
+from dataclasses import replace
 from importlib.util import find_spec
 from itertools import islice
 from typing import Any
@@ -31,6 +34,8 @@ __all__ = ["dask_engine"]
 
 _LOOPBACK = "127.0.0.1"
 _CONNECT_S = 20
+_LOOK_S, _NOBODY_S = 2, 60
+"""Seconds between looks at who is there, and how long nobody may be."""
 _RETRIES = 2
 """How often a piece is done again after an error of the operating system, such as a disk that does not answer."""
 
@@ -117,14 +122,15 @@ def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tup
         while True:
             room = 3 * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) - len(pending)
             for piece in islice(waiting, max(0, room)):
-                pending.append(
-                    (piece, client.submit(_work, question, piece, __version__, pure=False, retries=_RETRIES))
+                work = client.submit(
+                    _work, question, piece, __version__, platform.node(), _left_s(query), pure=False, retries=_RETRIES
                 )
+                pending.append((piece, work))
             if not pending:
                 return
             piece, future = pending.popleft()
             try:
-                done = future.result()
+                done = _taken(client, future)
             except KilledWorker:
                 done = alone(query, piece)
             future.release()
@@ -137,14 +143,41 @@ def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tup
             client.cancel([future for _, future in pending], force=True)
 
 
+def _taken(client: Any, future: Any) -> Done:
+    """What a piece gave; where nobody is there to do it for long, an error.
+
+    Raises:
+        DataError: engine-failed.
+    """
+    since = time.monotonic()
+    while True:
+        try:
+            return future.result(timeout=_LOOK_S)
+        except TimeoutError:
+            if client.scheduler_info(n_workers=-1)["workers"]:
+                since = time.monotonic()
+            elif time.monotonic() - since > _NOBODY_S:
+                message = f"the Dask cluster has had no worker for {_NOBODY_S} s"
+                hints = ("start workers of this scheduler, such as `dask worker ADDRESS`", *_LATER)
+                raise DataError(Diagnostic("engine-failed", message, hints=hints)) from None
+
+
+def _left_s(query: Query) -> float | None:
+    """Seconds until the deadline of a query, for machines with another clock."""
+    return None if query.options.until is None else query.options.until - time.monotonic()
+
+
 _known = threading.local()
 
 
-def _work(question: Question, piece: Partition, client_version: str) -> Done:
+def _work(question: Question, piece: Partition, client_version: str, machine: str, left_s: float | None) -> Done:
     """Run a piece in a worker, which keeps what it has compiled."""
     if __version__ != client_version:
         message = f"a worker has version {__version__} of scenicq, the client {client_version}"
         raise DataError(Diagnostic("engine-failed", message, hints=("install the same version on both",)))
     if getattr(_known, "fingerprint", None) != question.fingerprint:
-        _known.query, _known.fingerprint = question.query(), question.fingerprint
+        query = question.query()
+        if left_s is not None and machine != platform.node():
+            query.options = replace(query.options, until=time.monotonic() + left_s)
+        _known.query, _known.fingerprint = query, question.fingerprint
     return run_shard(_known.query, piece)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from time import time
+from time import monotonic
 
 __all__ = ["DeadlineError", "check_deadline"]
 
@@ -15,10 +15,11 @@ def check_deadline(until: float | None) -> None:
     """Look at the clock.
 
     Args:
-        until: When the time is over, in seconds since 1970 so that other processes can tell, too; None for never.
+        until: When the time is over, as of `time.monotonic`, which never jumps and which all processes of a machine
+            share; None for never.
 
     Raises:
         DeadlineError: It is over.
     """
-    if until is not None and time() >= until:
+    if until is not None and monotonic() >= until:
         raise DeadlineError

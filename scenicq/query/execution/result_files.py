@@ -17,8 +17,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.query.execution.csv_cells import unquote_cell
 from scenicq.query.execution.result_origin import METADATA, ORIGIN
 from scenicq.query.execution.result_tables import read_row
+from scenicq.store.unpacked import Bound, check_claims, decoded_bytes, text_columns
 
 __all__ = ["Record", "read_records", "read_results"]
 
@@ -27,7 +29,7 @@ Record = Mapping[str, Any]
 
 _TEXTS = ("frame", "recording", "verdict")
 _NEEDED = (*_TEXTS, "timestamp_us", "correspondence", "cause")
-_NESTED = ("correspondence", "cause", "witness", "frames")
+_NESTED = ("correspondence", "cause", "sensors", "witness", "frames")
 _TIMES = ("timestamp_us", "start_us", "end_us")
 _LONGEST = 10_000_000
 """Characters of a cell of CSV."""
@@ -111,7 +113,9 @@ def _of_csv(path: Path, text: str) -> Iterator[tuple[str, Record]]:
     try:
         rows = csv.DictReader(io.StringIO(text, newline=""), strict=True)
         for number, row in enumerate(rows, 1):
-            yield f"row {number}", _row(path, f"row {number}", row)
+            # a row that is too long or too short has cells that are no texts
+            cells = {name: unquote_cell(cell) if isinstance(cell, str) else cell for name, cell in row.items()}
+            yield f"row {number}", _row(path, f"row {number}", cells)
     except csv.Error as error:
         raise _invalid(path, f"it is not CSV: {error}") from None
     finally:
@@ -120,7 +124,14 @@ def _of_csv(path: Path, text: str) -> Iterator[tuple[str, Record]]:
 
 def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[tuple[str, Record]]:
     try:
-        table = pq.read_table(pa.BufferReader(data), columns=None if columns is None else list(columns))
+        bound = Bound(path, len(data))
+        with pq.ParquetFile(pa.BufferReader(data)) as parquet:
+            check_claims(parquet, bound, columns)
+            texts = text_columns(parquet)
+        chosen = None if columns is None else list(columns)
+        table = pq.read_table(pa.BufferReader(data), columns=chosen, read_dictionary=texts)
+        for chunk in (chunk for column in table.columns for chunk in column.chunks):
+            bound.add(decoded_bytes(chunk))
     except (pa.ArrowException, OSError) as error:
         raise _invalid(path, f"it is not Parquet with results: {str(error).partition(chr(10))[0]}") from None
     origin = (table.schema.metadata or {}).get(METADATA, b"").decode(errors="replace")

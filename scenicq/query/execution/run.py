@@ -69,7 +69,7 @@ class QueryOptions:
         model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
         proofs: Whether somebody reads how frames match; if not, a match that SQL decides names nobody and nothing.
-        until: When the time is over, in seconds since 1970; None for never. What is decided by then are the results.
+        until: When the time is over, as of `time.monotonic`; None for never. What is decided by then are the results.
     """
 
     match: MatchOptions = MatchOptions()

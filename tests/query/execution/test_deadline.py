@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ def dataset(crossroads: Path) -> Dataset:
 def clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """A clock that goes on by a second whenever it is looked at."""
     seconds = itertools.count()
-    monkeypatch.setattr(deadline, "time", lambda: float(next(seconds)))
+    monkeypatch.setattr(deadline, "monotonic", lambda: float(next(seconds)))
 
 
 def query(dataset: Dataset, **changes: Any) -> Query:
@@ -96,3 +97,11 @@ def test_a_shard_is_kept_whole_or_not_at_all(run: Any, crossroads: Path, tmp_pat
     assert found.exit_code == 2
     assert "error[deadline-passed]" in found.stderr
     assert not list(tmp_path.glob("*-of-*"))
+
+
+def test_a_clock_that_is_set_ends_nothing_and_delays_nothing() -> None:
+    """Nothing that limits time reads the clock of the wall."""
+    root = Path(__file__).parents[3]
+    for file in (file for folder in ("scenicq", "cli") for file in (root / folder).rglob("*.py")):
+        text = file.read_text(encoding="utf-8")
+        assert not re.search(r"\btime\.time\(|from time import (.*\b)?time\b", text), file

@@ -1,0 +1,37 @@
+"""Texts in cells of CSV: no spreadsheet takes one for a formula, no terminal obeys one, and each can be read back.
+
+A text that would be either begins with `'` in its cell, with backslashes and what a terminal would obey escaped.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from scenicq.errors import CONTROL, plain
+
+__all__ = ["quote_cell", "unquote_cell"]
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What makes a spreadsheet take a cell for a formula."""
+_ESCAPED = re.compile(r"\\(?:\\|t|r|x[0-9a-f]{2}|u[0-9a-f]{4}|U[0-9a-f]{8})")
+
+
+def quote_cell(value: Any) -> Any:
+    """What stands in a cell for a value; for what is no text, the value."""
+    if not isinstance(value, str):
+        return value
+    if not value.startswith((*_FORMULA, "'")) and not CONTROL.search(value):
+        return value
+    return "'" + plain(value.replace("\\", "\\\\"))
+
+
+def unquote_cell(cell: str) -> str:
+    """The text of a cell."""
+    if not cell.startswith("'"):
+        return cell
+    return _ESCAPED.sub(_unescaped, cell[1:])
+
+
+def _unescaped(found: re.Match[str]) -> str:
+    return found[0].encode().decode("unicode_escape")

@@ -1,0 +1,53 @@
+"""Whatever a text is, its cell is no formula and moves no cursor, and the text comes back."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenicq.query.execution.csv_cells import quote_cell, unquote_cell
+from scenicq.query.execution.result_files import read_records
+from scenicq_cli.formats import make_writer
+
+EVIL = ["-1", "=1+1", "+1", "@x", "'x", "''", "'=x", "\tx", "x\r", "\x1b[31m", "\u202ex", "-\\n\\u202e", "\\", "'\\t"]
+
+
+@given(st.one_of(st.text(), st.text("=+-@'\\tnrxu0123\t\r\n\x1b\x9b\u202e\ufeff,\"")))
+def test_texts_come_back(text: str) -> None:
+    cell = quote_cell(text)
+    assert not cell.startswith(("=", "+", "-", "@", "\t", "\r"))
+    assert not {"\x1b", "\x9b", "\u202e", "\r", "\t"} & set(cell)
+    assert unquote_cell(cell) == text
+    lines = io.StringIO(newline="")
+    csv.writer(lines, lineterminator="\n").writerow([cell, "x"])
+    assert next(csv.reader(io.StringIO(lines.getvalue(), newline="")))[0] == cell
+
+
+@pytest.mark.parametrize("name", EVIL)
+def test_records_come_back(tmp_path: Path, name: str) -> None:
+    record = {
+        "frame": name,
+        "recording": name,
+        "timestamp_us": 0,
+        "verdict": "match",
+        "dataset": f"{name}@1",
+        "correspondence": {"ego": "ego", "other": name},
+        "witness": {name: 1.0},
+        "sensors": {name: name},
+    }
+    read = {}
+    for form in ("csv", "jsonl"):
+        sink = io.BytesIO()
+        writer = make_writer(form, sink, lambda: ("ego", "other"), origin=f"{name}@1")
+        writer.write(record)
+        writer.finish()
+        (tmp_path / f"r.{form}").write_bytes(sink.getvalue())
+        (found,) = read_records(tmp_path / f"r.{form}")
+        read[form] = {key: found[key] for key in record}
+    assert read["csv"] == read["jsonl"] == json.loads(json.dumps(record))
