@@ -17,12 +17,14 @@ from scenicq.forest.nodes import Node
 from scenicq.forest.temporal import End, Goto, Monitor, MonitorStep, Reject, Terminate, Test, Wait
 from scenicq.syntax import ast
 
-__all__ = ["Deferred", "MonitorCall", "MonitorDefinition", "Rounds", "graph_of"]
+__all__ = ["Deferred", "MonitorCall", "MonitorDefinition", "Rounds", "Seconds", "graph_of"]
 
 Deferred = Callable[[ast.Expression, Environment], Callable[[], Node]]
 """Gives what computes a condition over some names once the whole program has run."""
 Rounds = Callable[[ast.For, Environment], list[Environment]]
 """The names in each round of a loop."""
+Seconds = Callable[[ast.DynamicStatement, Environment], float]
+"""The time that a statement names, in seconds."""
 
 _MOST_STEPS = 1_000
 """Steps of a monitor: each takes time at each sample."""
@@ -59,6 +61,7 @@ class _Graph:
     timed: TimedStatements
     deferred: Deferred
     rounds: Rounds
+    seconds: Seconds
     steps: list[MonitorStep] = field(default_factory=list[MonitorStep])
 
     def add(self, step: MonitorStep) -> int:
@@ -88,6 +91,13 @@ class _Graph:
                 return then
             case ast.DynamicStatement(kind="wait"):
                 return self.add(Wait(then))
+            case ast.DynamicStatement(kind="wait for"):
+                time_s = self.seconds(node, scope)
+                return self.add(Wait(then, time_s)) if time_s > 0 else then
+            case ast.DynamicStatement(kind="wait until") if node.operand is not None:
+                head = self.add(End())
+                self.steps[head] = Goto(self.test(node.operand, then, self.add(Wait(head)), scope))
+                return head
             case ast.DynamicStatement(kind="terminate"):
                 return self.add(Terminate(node.span))
             case ast.DynamicStatement(kind="terminate simulation", operand=None):
@@ -121,7 +131,7 @@ class _Graph:
 
 def graph_of(
     timed: TimedStatements, body: tuple[ast.Statement, ...], scope: Environment, deferred: Deferred, rounds: Rounds,
-    span: Span,
+    seconds: Seconds, span: Span,
 ) -> Monitor:  # fmt: skip
     """The graph of a monitor.
 
@@ -131,13 +141,14 @@ def graph_of(
         scope: The names at its beginning.
         deferred: Gives what computes a condition later on.
         rounds: The names in each round of a loop.
+        seconds: The time that a `wait for` names.
         span: Where the program requires it.
 
     Raises:
         ScenarioError: unsupported-construct, for what does more than wait, test and terminate; runtime-error for a loop
             that never waits; budget-exceeded.
     """
-    graph = _Graph(timed, deferred, rounds)
+    graph = _Graph(timed, deferred, rounds, seconds)
     first = graph.add(Goto(0))
     graph.steps[first] = Goto(graph.block(body, graph.add(End()), None, scope))
     if _spins(graph.steps):

@@ -267,7 +267,7 @@ def _scenario(
             Requirement(_at_the_end(each.condition, each.span), each.span, probability=each.probability)
             for each in soft
         ),
-        tuple(run.ignored), (*warnings, *(run.timed.remarks() if run.timed is not None else ())),
+        tuple(run.ignored), warnings,
         dynamics=dynamics,
     )  # fmt: skip
 

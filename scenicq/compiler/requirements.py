@@ -39,14 +39,15 @@ def requirement(run: Requirer, node: ast.Require, scope: Environment) -> Require
     """The requirement that a statement makes; None where it is about time and ignored.
 
     Raises:
-        ScenarioError: wrong-value for what is no probability.
+        ScenarioError: wrong-value for what is no probability, or one that a requirement over time cannot have.
     """
     probability = 1.0 if node.probability is None else _probability(run, node.probability, scope)
     wanted = node.condition
+    if is_temporal(wanted) and node.probability is not None and probability != 1:
+        raise fail("wrong-value", "a requirement with operators of time has no probability", node.probability.span,
+                   "only 1 can stand here", ("leave the probability out",))  # fmt: skip
     if run.timed is not None and is_temporal(wanted):
-        run.timed.require(
-            lambda expression: deferred(run, expression, scope, node.span), wanted, node.span, probability
-        )
+        run.timed.require(lambda expression: deferred(run, expression, scope, node.span), wanted, node.span)
         return None
     if isinstance(wanted, ast.Temporal | ast.UntilOperator):
         run.dynamic(f"require {wanted.operator if isinstance(wanted, ast.Temporal) else 'until'}", wanted.span)

@@ -10,7 +10,7 @@ from scenicq.compiler.coerce import read_over_time
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.values import fail
-from scenicq.errors import Diagnostic, Span
+from scenicq.errors import Span
 from scenicq.forest.nodes import Constant, Feature, Node
 from scenicq.forest.temporal import (
     Always,
@@ -63,15 +63,11 @@ class TimedStatements:
     _requirements: list[TemporalRequirement] = field(default_factory=list[TemporalRequirement])
     _terminations: list[Termination] = field(default_factory=list[Termination])
     _monitors: list[Monitor] = field(default_factory=list[Monitor])
-    _soft: list[Span] = field(default_factory=list[Span])
 
-    def require(self, deferred: Deferred, wanted: ast.Expression, span: Span, probability: float) -> None:
-        """Add a requirement with an operator of time; one that may be broken excludes nothing."""
+    def require(self, deferred: Deferred, wanted: ast.Expression, span: Span) -> None:
+        """Add a requirement with an operator of time."""
         self.used = True
-        if probability < 1:
-            self._soft.append(span)
-        else:
-            self._requirements.append(TemporalRequirement(self._formula(deferred, wanted), span))
+        self._requirements.append(TemporalRequirement(self._formula(deferred, wanted), span))
 
     def end(self, span: Span, *, condition: Callable[[], Node] | None = None, after_s: float | None = None) -> None:
         """Add what ends a run."""
@@ -127,15 +123,6 @@ class TimedStatements:
                 nodes.append(condition)
         monitors = tuple(_guarded(monitor, guards) for monitor in self._monitors)
         return Dynamics(tuple(nodes), tuple(requirements), tuple(self._terminations), monitors), excluded
-
-    def remarks(self) -> list[Diagnostic]:
-        """What the author should know."""
-        hint = "a run that breaks it is still possible: write `require` for what must hold"
-        return [
-            Diagnostic("soft-requirement", "this requirement excludes nothing", span, "holds only with a probability",
-                       hints=(hint,), severity="warning")
-            for span in self._soft
-        ]  # fmt: skip
 
     def _formula(self, deferred: Deferred, node: ast.Expression) -> Formula:
         if not is_temporal(node):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol, cast
 
 from scenicq.compiler.assignment import assign
@@ -13,6 +14,7 @@ from scenicq.compiler.requirements import Requirer, deferred
 from scenicq.compiler.temporal import TimedStatements
 from scenicq.compiler.values import describe, fail
 from scenicq.errors import Diagnostic, Span
+from scenicq.forest.nodes import Node
 from scenicq.syntax import ast
 
 __all__ = ["leave_out", "timed_statement"]
@@ -113,11 +115,17 @@ def _watch(run: Timer, timed: TimedStatements, call: MonitorCall, span: Span) ->
             assign(run, node.target, item, inner[-1])
         return inner
 
-    timed.watch(graph_of(timed, body, scope, lambda wanted, names: deferred(run, wanted, names, span), rounds, span))
+    def conditions(wanted: ast.Expression, names: Environment) -> Callable[[], Node]:
+        return deferred(run, wanted, names, span)
+
+    def seconds(node: ast.DynamicStatement, names: Environment) -> float:
+        return _seconds(run, node, names)
+
+    timed.watch(graph_of(timed, body, scope, conditions, rounds, seconds, span))
 
 
 def _seconds(run: Timer, node: ast.DynamicStatement, scope: Environment) -> float:
-    """The time of `terminate after`, in seconds."""
+    """The time of `terminate after` or `wait for`, in seconds."""
     assert node.operand is not None
     value = run.evaluate(node.operand, scope)
     if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:

@@ -151,9 +151,15 @@ class Goto:
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Goes on with a step at the next sample."""
+    """Goes on with a step at a later sample.
+
+    Attributes:
+        then: The step.
+        for_s: The sample is the first one so many seconds later, and at least the next one.
+    """
 
     then: int
+    for_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -144,7 +144,7 @@ def feather_batches(data: bytes, bound: Bound) -> tuple[Any, list[Any]]:
 
     Raises:
         DataError: file-invalid: it unpacks to too much.
-        ArrowException: It is no Feather file; also ValueError and OSError.
+        ValueError: It is no Feather file; Arrow has errors of its own for that, too.
     """
     with pa.ipc.open_file(pa.BufferReader(data)) as file:
         count = file.num_record_batches

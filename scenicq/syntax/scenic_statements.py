@@ -105,11 +105,7 @@ class ProgramParser(StatementParser):
         self.temporal = True
         condition = self.expression()
         self.temporal = False
-        name: str | None = None
-        if self.accept("as"):
-            if self.token.kind not in ("name", "number", "string"):
-                raise self.fail("the name of the requirement is missing", label=self.found())
-            name = self.advance().text.strip("\"'")
+        name = self.name_after("requirement")
         return ast.Require(self.span(start), condition, probability, name)
 
     def _is_probability(self) -> bool:
@@ -124,6 +120,14 @@ class ProgramParser(StatementParser):
         after = self.peek(ahead)
         continues = after.text in ("[", "(", "-", "+") or after.text in INFIX_WORDS
         return not continues and self.starts_operand(self.index + ahead)
+
+    def name_after(self, what: str) -> str | None:
+        """Read `as NAME` after what may have a name."""
+        if not self.accept("as"):
+            return None
+        if self.token.kind not in ("name", "number", "string"):
+            raise self.fail(f"the name of the {what} is missing", label=self.found())
+        return self.advance().text.strip("\"'")
 
     def mutate(self) -> ast.Statement:
         """Read `mutate`."""
@@ -165,13 +169,23 @@ class ProgramParser(StatementParser):
         if kind == "terminate simulation" and not self.accept("when"):
             return ast.DynamicStatement(self.span(start), kind)
         operand = self.expression()
-        unit = ""
-        if kind == "terminate after":
-            unit = self.text
-            if unit not in ("seconds", "steps"):
-                raise self.fail("`seconds` or `steps` is missing", label=self.found())
-            self.advance()
+        unit = self.unit() if kind == "terminate after" else ""
+        if not unit:
+            self.name_after("condition")
         return ast.DynamicStatement(self.span(start), kind, operand, unit)
+
+    def wait(self, kind: str) -> ast.Statement:
+        """Read `wait for` or `wait until`."""
+        start = self.advance().start
+        self.advance()
+        operand = self.expression()
+        return ast.DynamicStatement(self.span(start), kind, operand, self.unit() if kind == "wait for" else "")
+
+    def unit(self) -> str:
+        """Read the unit of a time."""
+        if self.text not in ("seconds", "steps"):
+            raise self.fail("`seconds` or `steps` is missing", label=self.found())
+        return self.advance().text
 
     def dynamic(self, word: str) -> ast.Statement | None:
         """Read past a statement about what happens over time, or nothing where none starts."""
@@ -180,6 +194,8 @@ class ProgramParser(StatementParser):
             return None
         if kind.startswith("terminate "):
             return self.terminate(kind)
+        if kind in ("wait for", "wait until"):
+            return self.wait(kind)
         start = self.token.start
         while not self.at_line_end():
             self.advance()

@@ -10,13 +10,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import assert_never
 
+import numpy as np
+from numpy.typing import NDArray
+
 from scenicq.forest.temporal import Atom, End, Goto, Monitor, Reject, Terminate, Test, Wait
 from scenicq.temporal.truth import FALSE, TRUE, Truth
 
-__all__ = ["NEVER", "Outcome", "run_monitor"]
+__all__ = ["NEVER", "SLACK_S", "Outcome", "run_monitor"]
 
 NEVER = 1 << 60
 """A sample that does not come."""
+SLACK_S = 1e-6
+"""How much earlier than it should a sample may come: times are rounded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,25 +45,32 @@ class Outcome:
         return Outcome(unclear=min(self.ends, self.rejects, self.unclear, other.ends, other.rejects, other.unclear))
 
 
-def run_monitor(monitor: Monitor, atom: Callable[[Atom], Truth], n: int) -> list[Outcome]:
-    """What becomes of the runs that start at each of n samples.
+def run_monitor(monitor: Monitor, atom: Callable[[Atom], Truth], seconds: NDArray[np.float64]) -> list[Outcome]:
+    """What becomes of the runs that start at each sample.
 
     Args:
         monitor: The monitor.
         atom: The value of an atom at each sample, shape (n,).
-        n: Samples.
+        seconds: Time of each sample, ascending, shape (n,).
     """
-    entries = {0, *(step.then for step in monitor.steps if isinstance(step, Wait))}
+    n = len(seconds)
+    waits = {number: step for number, step in enumerate(monitor.steps) if isinstance(step, Wait)}
+    # at which sample a wait that begins at each sample is over; n where none is late enough
+    over: dict[int, list[int]] = {
+        number: np.maximum(np.searchsorted(seconds, seconds + step.for_s - SLACK_S), np.arange(1, n + 1)).tolist()
+        for number, step in waits.items()
+    }
+    entries = {0, *(step.then for step in waits.values())}
     tests = {
         number: atom(step.condition).tolist() for number, step in enumerate(monitor.steps) if isinstance(step, Test)
     }
-    following = dict.fromkeys(entries, Outcome())
-    found: list[Outcome] = []
+    # by sample, the last of which is one that does not come: outcomes from each step that a wait leads to
+    found: list[dict[int, Outcome]] = [{} for _ in range(n)]
+    found.append(dict.fromkeys(entries, Outcome()))
     for sample in range(n - 1, -1, -1):
-        at_step: dict[int, Outcome] = {}
-        following = {entry: _from(monitor, entry, sample, tests, following, at_step) for entry in entries}
-        found.append(following[0])
-    return found[::-1]
+        known = {number: found[over[number][sample]][step.then] for number, step in waits.items()}
+        found[sample] = {entry: _from(monitor, entry, sample, tests, known) for entry in entries}
+    return [outcomes[0] for outcomes in found[:n]]
 
 
 def _from(
@@ -66,10 +78,9 @@ def _from(
     first: int,
     sample: int,
     tests: dict[int, list[int]],
-    following: dict[int, Outcome],
     known: dict[int, Outcome],
 ) -> Outcome:
-    """The outcome from a step on at a sample; what lies between two `Wait`s has no circle."""
+    """The outcome from a step on at a sample, where those of waits are known; between them there is no circle."""
     stack = [first]
     while stack:
         number = stack[-1]
@@ -88,7 +99,6 @@ def _from(
                 after = [step.then]
             case Wait():
                 after = []
-                known[number] = following[step.then]
             case Terminate():
                 after = []
                 known[number] = Outcome(ends=sample)

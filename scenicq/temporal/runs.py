@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scenicq.errors import Span
 from scenicq.forest.temporal import Atom, Dynamics
 from scenicq.temporal.ltlf import evaluate
-from scenicq.temporal.monitor_run import NEVER, Outcome, run_monitor
+from scenicq.temporal.monitor_run import NEVER, SLACK_S, Outcome, run_monitor
 from scenicq.temporal.occurrences import next_at
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -25,8 +25,6 @@ __all__ = ["SLACK_S", "Run", "runs_from"]
 
 _MOST_CELLS = 4_000_000
 """Truth values of a formula in memory."""
-SLACK_S = 1e-6
-"""Seconds that floating point may be off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +60,7 @@ def runs_from(
         starts: Samples to start from, ascending.
     """
     n = len(seconds)
-    watched = [run_monitor(monitor, atom, n) for monitor in dynamics.monitors]
+    watched = [run_monitor(monitor, atom, seconds) for monitor in dynamics.monitors]
     if dynamics.terminates:
         return _terminating(dynamics, atom, seconds, starts, watched)
     found = {start: Run(start, start, int(FALSE)) for start in starts}
