@@ -179,7 +179,8 @@ class ProgramParser(StatementParser):
         start = self.advance().start
         self.advance()
         operand = self.expression()
-        return ast.DynamicStatement(self.span(start), kind, operand, self.unit() if kind == "wait for" else "")
+        unit = self.unit() if kind == "wait for" else ""
+        return ast.DynamicStatement(self.span(start), kind, operand, unit)
 
     def unit(self) -> str:
         """Read the unit of a time."""
