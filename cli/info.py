@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import click
 
 from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Counts, Manifest
+from scenicq.store.map_fit import MapFit, map_fits, misfits
 from scenicq.store.motion import LONGEST_GAP_US
 from scenicq.store.observed_motion import observed_motion
 from scenicq.store.schema import SCHEMAS
@@ -18,7 +20,7 @@ from scenicq.store.verification import verify_computed
 from .datasets import open_checked
 from .ingest import defects
 from .manual import Manual
-from .report import columns, count, is_date, moment, plain
+from .report import columns, count, is_date, moment, plain, show_few
 from .streams import say
 
 __all__ = ["info"]
@@ -81,7 +83,27 @@ def _motion(dataset: Dataset) -> list[str]:
     return [*found, ""]
 
 
-def _lines(dataset: Dataset) -> list[str]:
+def _fit(fits: Sequence[MapFit], maps: int) -> list[str]:
+    """What was measured of the maps."""
+    if not fits:
+        return []
+
+    def share(value: float | None) -> str:
+        return "" if value is None else f"{value:.0%}"
+
+    rows = [("MAP", "vehicles", "on lanes", "off their direction", "lane width", "fits")]
+    for fit in fits[:_TOP]:
+        deviation = "" if fit.deviation is None else f"{math.degrees(fit.deviation):.0f} deg"
+        width = "" if fit.width_m is None else f"{fit.width_m:.3g} m"
+        fits_so = "no" if fit.cause else "" if fit.on_lanes is None else "yes"
+        rows.append((fit.map, f"{fit.vehicles:,}", share(fit.on_lanes), deviation, width, fits_so))
+    more = [f"  and {len(fits) - _TOP:,} more"] if len(fits) > _TOP else []
+    if maps > len(fits):
+        more.append(f"looked at the {len(fits):,} maps of {maps:,} that have the most labels")
+    return [*columns(rows, right=frozenset({1, 2, 3, 4}), indent=""), *more, ""]
+
+
+def _lines(dataset: Dataset, fits: Sequence[MapFit]) -> list[str]:
     manifest = dataset.manifest
     span = manifest.span_us
     source, made = manifest.provenance.get("source", "unknown"), manifest.provenance.get("time", "unknown")
@@ -98,6 +120,7 @@ def _lines(dataset: Dataset) -> list[str]:
         *_classes(manifest),
         *_counted("MAP", manifest.by_map),
         *([f"no map for: {', '.join(without_map)}", ""] if without_map else []),
+        *_fit(fits, len(dataset.maps)),
         *_counted("RECORDING", manifest.by_recording),
         *_motion(dataset),
         *_tables(manifest),
@@ -128,11 +151,13 @@ def info(dataset: str, *, verify: bool, format_: str) -> None:
     if format_ == "json":
         say(opened.manifest.to_json(), nl=False)
     else:
+        fits = map_fits(opened)
+        show_few(misfits(fits))
         say(
             plain(
                 "\n".join(
                     [
-                        *_lines(opened),
+                        *_lines(opened, fits),
                         *(["every checksum is right, and every value is sound"] if verify else []),
                     ]
                 )

@@ -63,6 +63,7 @@ CODES: dict[str, str] = {
     "assumed": "what the source does not say, and is taken for granted",
     "not-read": "what the source holds, and no dataset of ours has a place for",
     "map-missing": "a map that the labels refer to is not there",
+    "map-does-not-fit": "vehicles do not lie on the lanes of a map, or do not head along them, or its sides are wrong",
     "map-invalid": "an element of a map is not sound",
     "store-missing": "the folder is not a dataset of ours",
     "store-version": "the dataset was written by another version",

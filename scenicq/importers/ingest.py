@@ -21,6 +21,7 @@ from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
 from scenicq.importers.segments import Job, World, fingerprint, maps_digest, write_segments
+from scenicq.store.dataset import open_dataset
 from scenicq.store.manifest import LeftOut, Manifest, is_dataset
 from scenicq.store.segment import SEGMENT_OBJECTS, Segment, read_segments, segments_of
 from scenicq.store.writer import DatasetWriter
@@ -132,7 +133,20 @@ def ingest(
         manifest = writer.finish(
             name=opened.name, importer=importer.name, left_out=report.counts, provenance=provenance
         )
-    return _summary(target_path, importer, manifest, report, reused)
+    return _summary(target_path, importer, manifest, (*_misfits(target_path), *report.diagnostics), reused)
+
+
+def _misfits(target: Path) -> tuple[Diagnostic, ...]:
+    """What does not fit between maps and labels."""
+    dataset = open_dataset(target, check=False)
+    if not dataset.maps:
+        return ()
+    from scenicq.store.map_fit import map_fits, misfits  # noqa: PLC0415 - slow to load, and for maps
+
+    try:
+        return misfits(map_fits(dataset))
+    finally:
+        dataset.release()
 
 
 class _Reached:
@@ -227,7 +241,9 @@ def _take_over(writer: DatasetWriter, moves: Sequence[tuple[int, Segment, tuple[
     return reused
 
 
-def _summary(target: Path, importer: Importer, manifest: Manifest, report: Report, reused: int) -> IngestSummary:
+def _summary(
+    target: Path, importer: Importer, manifest: Manifest, diagnostics: tuple[Diagnostic, ...], reused: int
+) -> IngestSummary:
     return IngestSummary(
         target=target,
         importer=importer.name,
@@ -238,7 +254,7 @@ def _summary(target: Path, importer: Importer, manifest: Manifest, report: Repor
         reused=reused,
         by_class=manifest.by_class,
         left_out=manifest.left_out,
-        diagnostics=report.diagnostics,
+        diagnostics=diagnostics,
     )
 
 
