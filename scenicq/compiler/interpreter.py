@@ -122,7 +122,7 @@ class Interpreter:
         if name == "ego":
             self._set_ego(value, span)
             return
-        if isinstance(value, Instance) and value.index is not None and not value.label and not scope.library:
+        if isinstance(value, Instance) and not (value.index is None or value.label or scope.library or self.course):
             value.label = name
         if name == "workspace":
             self.workspace = to_region(value, span)
