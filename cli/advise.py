@@ -34,12 +34,13 @@ def _number(outlook: Outlook) -> str:
     return f"{about}{outlook.least:,} to {outlook.most:,}" if outlook.least else f"{about}at most {outlook.most:,}"
 
 
-def advise(query: Query, *, asked: bool) -> None:
+def advise(query: Query, *, asked: bool, near: bool = False) -> None:
     """Print what excludes most frames, and how many there would be with one change.
 
     Args:
         query: After its results were taken.
         asked: Whether the user asked for it, so that it may take its time.
+        near: Whether what comes closest has been shown.
     """
     from scenicq.query.explain.advice import advice  # noqa: PLC0415 - takes long to load
 
@@ -64,8 +65,9 @@ def advise(query: Query, *, asked: bool) -> None:
         lines.append(none)
     lines += [f"  = hint: {hint}" for hint in found.hints]
     if not asked:
-        lines.append("  = hint: `--near 3` shows the frames that come closest"
-                     + ("" if found.complete else ", `--advise` tries all changes"))  # fmt: skip
+        more = [] if near else ["`--near 3` shows the frames that come closest"]
+        more += [] if found.complete else ["`--advise` tries all changes"]
+        lines += [f"  = hint: {', '.join(more)}"] if more else []
     click.echo("\n".join(lines), err=True)
 
 

@@ -68,6 +68,20 @@ class Manual(click.Command):
         with only_results():
             return super().invoke(ctx)
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Take the words of the command line; one that is no option may be a name, of which users are told.
+
+        Raises:
+            click.UsageError: They do not fit.
+        """
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            if not self.arguments:
+                raise
+            message = f"{error.message} (a name that begins with '-' stands after '--')"
+            raise click.NoSuchOption(error.option_name, message, error.possibilities, ctx) from None
+
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the arguments, the options by topic, and the exit codes."""
         if self.arguments:

@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Collection, Generator, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -202,9 +202,10 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
     if rank or sample is not None:
         results = _selected(query, results, sample, rank=rank, diverse=diverse)
+    came_close: list[str] = []
     with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
         try:
-            deliver(query, results, _near(query, near), wanted, bar)
+            deliver(query, results, _noted(_near(query, near), came_close), wanted, bar)
         except BaseException:
             if pieces is not None:
                 with contextlib.suppress(OSError):
@@ -215,12 +216,29 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     INTERRUPTS.advice = "  = hint: all results are written"
     if query.funnel.cut:
         _tell_cut(query, resume=resume)
+    elif near is not None and not came_close:
+        _tell_far(query)
     limit = query.options.limit
     reached = limit is not None and query.funnel.matches >= limit
     whole = not reached and not query.funnel.cut and not query.funnel.over_time
     if advised or (not quiet and whole and is_nearly_empty(query)):
-        advise(query, asked=advised)
+        advise(query, asked=advised, near=near is not None)
     _conclude(ctx, query, told, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
+
+
+def _noted(found: Iterable[Result], recordings: list[str]) -> Iterator[Result]:
+    """The same results; the list takes the recording of each."""
+    for result in found:
+        recordings.append(result.recording)
+        yield result
+
+
+def _tell_far(query: Query) -> None:
+    """Say that nothing came close."""
+    what = "recording" if query.is_over_time() else "frame"
+    message = f"--near shows nothing: no {what} that was looked at would match with a wider tolerance"
+    hints = ("no tolerance holds in requirements: `--advise` tells which change of the program would do",)
+    show([Diagnostic("option-invalid", message, hints=hints, severity="warning")])
 
 
 def _tell_cut(query: Query, *, resume: bool) -> None:

@@ -235,3 +235,20 @@ def test_a_program_that_is_no_text(run, crossroads, tmp_path):
     file.write_bytes(b"\x89PNG\xff\xfe")
     result = run("match", file, crossroads)
     assert (result.exit_code, result.stderr.startswith("error[file-invalid]")) == (2, True)
+
+
+def test_nothing_that_comes_close_is_told_and_not_advised_again(run, crossroads):
+    text = "model scenic.domains.driving.model\nego = new Car\nother = new Car\nrequire (distance to other) < 0.01"
+    found = run("match", "-e", text, crossroads, "--near", "3")
+    assert found.exit_code == 1
+    assert "--near shows nothing" in found.stderr
+    assert "`--near 3`" not in found.stderr
+    assert "`--near 3`" in run("match", "-e", text, crossroads).stderr
+
+
+def test_a_name_like_an_option_is_told_how_to_stand(run, crossroads):
+    wrong = run("explain", "-e", "ego = new Car", crossroads, "-7-frame")
+    assert wrong.exit_code == 2
+    assert "stands after '--'" in wrong.stderr
+    right = run("explain", "-e", "ego = new Car", crossroads, "--", "-7-frame")
+    assert "no frame" in right.stderr.lower() or "-7-frame" in right.stderr
