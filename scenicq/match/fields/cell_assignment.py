@@ -197,7 +197,9 @@ def _pinned(cases: BoxSet, number: int, items: list[Item], cells: list[Alternati
         form = affine_scalar(node)
         if form is not None and form.terms:
             low, high = cases.value(whole)[:, number].tolist()
-            turns = math.tau * round(((low + high) / 2 - seen) / math.tau)
+            # a heading that nothing bounds needs no whole turns
+            middle = (low + high) / 2 if math.isfinite(low + high) else seen
+            turns = math.tau * round((middle - seen) / math.tau)
             value = min(max(seen + turns, low), high)
             pinned[id(node)] = Constant(value, span=node.span)
             cells.append([[Row(form, value, value)]])
