@@ -59,6 +59,13 @@ INTERRUPTS = Interrupts()
 class Commands(click.Group):
     """A group whose subcommands are imported when they are needed."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the arguments; where there are none, show the help, and that nothing was done."""
+        if not args and not ctx.resilient_parsing:
+            click.echo(ctx.get_help(), err=True)
+            ctx.exit(ERROR)
+        return super().parse_args(ctx, args)
+
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The names, in the order in which one meets them."""
         return list(COMMANDS)

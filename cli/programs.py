@@ -60,7 +60,7 @@ def given_program(
         click.UsageError: An argument is missing or too many.
         DataError: As `read_scenario`.
     """
-    names = [each.make_metavar(ctx) for each in ctx.command.params if isinstance(each, click.Argument)]
+    names = [str(each.metavar) for each in ctx.command.params if isinstance(each, click.Argument)]
     if text is not None and words[-1] is not None:
         raise click.UsageError(f"-e gives the program: `{words[0]}` is one argument too many", ctx)
     there = words if text is None else [text, *words[:-1]]

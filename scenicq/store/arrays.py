@@ -10,6 +10,7 @@ pyarrow has all of this, but loads `pyarrow.compute` and `numpy.ma` for it: more
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from itertools import chain, repeat
 from operator import mul
 from typing import Any
@@ -29,6 +30,12 @@ FEW = 200_000
 """Texts that are taken one by one, which takes less time than to load `pyarrow.compute`."""
 
 
+@cache
+def _dtype(kind: Any) -> Any:
+    """NumPy's type of a `pyarrow` type of numbers, which `pyarrow` tells before version 26 only where pandas is."""
+    return pa.array([], kind).to_numpy().dtype
+
+
 def number_array(values: NDArray[Any], kind: Any) -> ArrowArray:
     """Numbers or truth values of shape (n,) as an array of a type that can hold them; nan becomes null.
 
@@ -38,7 +45,7 @@ def number_array(values: NDArray[Any], kind: Any) -> ArrowArray:
     """
     if values.dtype == np.bool_:
         return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.packbits(values, bitorder="little"))])
-    values = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
+    values = np.ascontiguousarray(values, dtype=_dtype(kind))
     there = ~np.isnan(values) if values.dtype.kind == "f" else None
     valid = None if there is None or there.all() else pa.py_buffer(np.packbits(there, bitorder="little"))
     return pa.Array.from_buffers(kind, len(values), [valid, pa.py_buffer(values)])
