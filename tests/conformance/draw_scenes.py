@@ -53,6 +53,8 @@ def thing(thing: Any) -> dict[str, Any]:
 
 OFF_ROAD: list[Any] = []
 """Places of the last sample off the road at which it asks for the direction of traffic."""
+KNOWN_OFF_ROAD: list[Any] = []
+"""The same of the program that was compiled last: known places are asked about once."""
 
 
 def _road_direction(self: Any, point: Any) -> Any:
@@ -72,11 +74,13 @@ def _sample_all(quantities: Any) -> Any:
 
 def plain(scene: Any) -> dict[str, Any]:
     """A scene as plain data."""
+    known = {(round(each.x, 3), round(each.y, 3)) for each in KNOWN_OFF_ROAD}
+    placed = [(round(each.position.x, 3), round(each.position.y, 3)) for each in scene.objects]
     values = {name: value for name, value in scene.params.items() if isinstance(value, str | int | float | bool)}
     return {
         "objects": [thing(each) for each in scene.objects],
         "params": {name: value for name, value in values.items() if name != "map"},
-        "directions_off_road": len(OFF_ROAD),
+        "directions_off_road": len(OFF_ROAD) + sum(place in known for place in placed),
     }
 
 
@@ -95,7 +99,9 @@ def draw(request: dict[str, Any], chart: Path) -> dict[str, Any]:
     scenes: list[dict[str, Any]] = []
     try:
         with patience(request["seconds"]):
+            OFF_ROAD.clear()
             scenario = compiled(request, chart)
+            KNOWN_OFF_ROAD[:] = OFF_ROAD
             while len(scenes) < request["count"]:
                 scenes.append(plain(scenario.generate(maxIterations=MOST_ATTEMPTS)[0]))
     except (OutOfPatienceError, RejectionException, InvalidScenarioError) as end:

@@ -126,12 +126,16 @@ class _Conditioned:
 
 def _fix(found: dict[tuple[int, int], list[Any]], witness: dict[str, Any]) -> str:
     """Let random variables have the values of a witness; what keeps it from that."""
+    points = [each for made in found.values() for each in made if isinstance(each, PointInRegionDistribution)]
+    keys = sorted((tuple(map(int, key.split(":"))) for key, value in witness.items() if isinstance(value, list)))
+    if len(points) != len(keys):
+        return f"{len(points)} random points, {len(keys)} of which are known"
+    in_order = dict(zip(keys, points, strict=True))  # Scenic does not say where in the program they are made
     for key, value in witness.items():
         line, column = map(int, key.split(":"))
         made, point = found.get((line, column), []), isinstance(value, list)
-        if point:  # a point: its region may be said anywhere in the line
-            made = [each for (at, _), all_ in found.items() if at == line for each in all_]
-            made = [each for each in made if isinstance(each, PointInRegionDistribution)]
+        if point:
+            made = [in_order[line, column]]
         if len(made) != 1:
             return f"{len(made)} random variables at {key}"
         variable = made[0].index if isinstance(made[0], Options) else made[0]
