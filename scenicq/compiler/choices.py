@@ -18,6 +18,7 @@ from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
 
 __all__ = [
     "LACKING",
+    "NothingLeftError",
     "distribute",
     "each_existing",
     "each_option",
@@ -32,6 +33,10 @@ _MOST_OPTIONS = 20_000
 """Options of a choice, those of nested choices included."""
 LACKING = frozenset({"map-lacks", "runtime-error"})
 """Errors that only say that something is not there: a part of the map, an item of a list."""
+
+
+class NothingLeftError(ScenarioError):
+    """No outcome of a random choice has what the program asks for."""
 
 
 def make_choice(index: Node, options: list[ModelValue], span: Span | None) -> ModelValue:
@@ -80,7 +85,7 @@ def each_existing(run: Runner, choice: Choice, function: Callable[[ModelValue], 
                 run.excluded.note_lacking(choice.index)
     if not found:
         assert missing is not None
-        raise missing
+        raise NothingLeftError(missing.diagnostics)
     count = len(choice.options)
     run.excluded.add(choice.index, [number for number in range(count) if number not in found], count, span)
     spare = next(iter(found.values()))

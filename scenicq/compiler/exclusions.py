@@ -19,6 +19,8 @@ from scenicq.forest.nodes import Identity, Index, LogicOp, Node, Select
 __all__ = ["Exclusions"]
 
 _Key: TypeAlias = "Identity | int"
+_Told: TypeAlias = "tuple[tuple[tuple[Node, int, int], ...], Node, list[int], int, Span]"
+"""What is excluded: under which options of others, the choice, its options, how many it has, and the place."""
 _OWNER = re.compile(r"(?<![\w.])[\w.]+\.$")
 """What stands before an attribute; looked for once in each word, however long."""
 
@@ -54,6 +56,8 @@ class Exclusions:
         self._found: dict[_Key, _Choice] = {}
         self._assumed: list[tuple[Node, int, int]] = []
         self._lacking: set[_Key] = set()
+        self._apart: list[_Told] | None = None
+        self._kept: dict[int, tuple[object, list[_Told]]] = {}
 
     @contextmanager
     def assuming(self, index: Node, option: int, count: int) -> Generator[None]:
@@ -66,6 +70,9 @@ class Exclusions:
 
     def add(self, index: Node, options: list[int], count: int, span: Span) -> None:
         """Exclude some of the `count` options of a choice."""
+        if self._apart is not None:
+            self._apart.append((tuple(self._assumed), index, options, count, span))
+            return
         path: dict[_Key, tuple[Node, int, int]] = {}
         for step in self._assumed:
             if path.setdefault(_key(step[0]), step)[1] != step[1]:
@@ -80,6 +87,34 @@ class Exclusions:
         for around, (outer, option, width) in path.items():
             level = level.setdefault(around, _Choice(outer, width, span)).under.setdefault(option, {})
         level.setdefault(key, _Choice(index, count, span)).excluded.update(options)
+
+    @contextmanager
+    def apart(self) -> Generator[list[_Told]]:
+        """What is excluded meanwhile is only listed."""
+        before, found = self._apart, list[_Told]()
+        self._apart = found
+        try:
+            yield found
+        finally:
+            self._apart = before
+
+    def keep(self, value: object, found: list[_Told]) -> None:
+        """Keep what was listed beside a value until that is read; values that are no objects of their own are read."""
+        if not found:
+            return
+        self._kept[id(value)] = value, found
+        if value is None or isinstance(value, bool | int | float | str):
+            self.say(value)
+
+    def say(self, value: object) -> None:
+        """Exclude what is kept beside a value."""
+        if id(value) not in self._kept:
+            return
+        assumed = self._assumed
+        for path, index, options, count, span in self._kept[id(value)][1]:
+            self._assumed = [*assumed, *path]
+            self.add(index, options, count, span)
+        self._assumed = assumed
 
     def note_lacking(self, index: Node) -> None:
         """Some option of a choice is there, but lacks a part that the program asks for."""

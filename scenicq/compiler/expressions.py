@@ -26,6 +26,7 @@ from scenicq.compiler.items import items_of, length_of, subscript
 from scenicq.compiler.known_properties import decided, settled
 from scenicq.compiler.logic import condition, connected, inverted
 from scenicq.compiler.texts import checked_text, formatted
+from scenicq.compiler.unread import read
 from scenicq.compiler.values import (
     Builtin,
     Choice,
@@ -216,7 +217,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
                 return run.ego(span)
             if node.id == "globalParameters" and scope.find(node.id) is None:
                 return Module("globalParameters", {name: given[0] for name, given in run.params.items()})
-            return scope.get(node.id, span)
+            return read(run, scope.get(node.id, span))
         case ast.LiteralValue():
             if isinstance(node.value, complex | bytes | type(...)):
                 raise fail("unsupported-construct", "a literal of this kind is not supported", span)

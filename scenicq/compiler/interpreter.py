@@ -34,6 +34,7 @@ from scenicq.compiler.scoping import own_names
 from scenicq.compiler.specifiers import construct
 from scenicq.compiler.temporal import TimedStatements
 from scenicq.compiler.timed_statements import leave_out, timed_statement
+from scenicq.compiler.unread import computed
 from scenicq.compiler.values import (
     Choice,
     Delayed,
@@ -55,7 +56,6 @@ from scenicq.geometry.regions import Everywhere
 from scenicq.syntax import ast
 
 __all__ = ["Interpreter"]
-
 
 _OBJECT_STEPS = 300
 """Steps that an object takes: its properties and requirements are work later on, too."""
@@ -256,7 +256,7 @@ class Interpreter:
             case ast.ExpressionStatement():
                 self._value(node.value, scope)
             case ast.Assign():
-                value = self._value(node.value, scope)
+                value = computed(self, node.value, scope, lambda: self._value(node.value, scope))
                 for target in node.targets:
                     assign(self, target, value, scope)
             case ast.AugmentedAssign():

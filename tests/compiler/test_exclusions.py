@@ -47,7 +47,7 @@ def has(lane: Lane, asked: str) -> bool:
     x, y = middle(lane)
     known = asked.replace("LANE", f'network.elements["{lane.id}"]').replace("SPOT", f"({x}, {y})")
     try:
-        compiled(f"{HEADER}ego = new Car at ({x}, {y})\nfound = {known}\n")
+        compiled(f"{HEADER}ego = new Car at ({x}, {y})\nfound = {known}\nrequire len([found]) == 1\n")
     except ScenarioError as error:
         if error.diagnostics[0].code not in LACKING:
             raise
@@ -60,7 +60,7 @@ def test_a_lane_that_has_it_matches_and_one_that_lacks_it_does_not(kind: str) ->
     asked = ASKED[kind].replace("LANE", "lane").replace("SPOT", "spot")
     text = (
         f"{HEADER}lane = Uniform(*network.lanes)\nspot = new OrientedPoint in lane.centerline\n"
-        f"ego = new Car at spot, with requireVisible False\nfound = {asked}\n"
+        f"ego = new Car at spot, with requireVisible False\nfound = {asked}\nrequire len([found]) == 1\n"
     )
     matcher = Matcher(compiled(text))
     seen: set[bool] = set()
