@@ -269,8 +269,10 @@ def test_of_what_a_label_lacks_nothing_is_known(tmp_path):
         other = LabelObject(
             "a", "Car", "car", 1.75, 60.0, 0.0, width, 4.5, velocity=None if speed is None else (0.0, speed)
         )
-        labels.append(Label(f"{at}", "r", at, "street", ego, (other,)))
-    write_dataset(tmp_path / "d", [Recording("r", "street", tuple(labels))], {"street": STREET.features}, name="d")
+        # in a recording of its own, so that no motion follows from the others
+        labels.append(Label(f"{at}", f"r{at:02}", at, "street", ego, (other,)))
+    recordings = [Recording(label.recording, "street", (label,)) for label in labels]
+    write_dataset(tmp_path / "d", recordings, {"street": STREET.features}, name="d")
     dataset, decided = open_dataset(tmp_path / "d"), Counter()
     for seed in range(30):
         rng = random.Random(seed)
