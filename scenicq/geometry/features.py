@@ -92,6 +92,10 @@ def read_geojson(source: str | Path | Mapping[str, Any], on_problem: ProblemSink
     collection = _object(document).get("features")
     if not isinstance(collection, list):
         raise DataError(Diagnostic("file-invalid", f"{where}: not a GeoJSON feature collection"))
+    if _is_in_degrees(_object(document).get("crs")):
+        message = f"{where}: its `crs` says that its coordinates are degrees; maps are in metres"
+        hint = "`ogr2ogr -t_srs EPSG:326ZZ projected.geojson FILE` projects it (ZZ: the UTM zone of the labels)"
+        raise DataError(Diagnostic("file-invalid", message, hints=(hint,)))
     found: dict[str, MapFeature] = {}
     entries = cast("list[Any]", collection)
     known = shapes.plain_polygons([_object(entry).get("geometry") for entry in entries])
@@ -109,6 +113,12 @@ def read_geojson(source: str | Path | Mapping[str, Any], on_problem: ProblemSink
     for identifier, message in dangling(features):
         on_problem(identifier, message)
     return features
+
+
+def _is_in_degrees(crs: Any) -> bool:
+    """Whether a `crs` names coordinates of the globe."""
+    name = str(_object(_object(crs).get("properties")).get("name", "")).upper()
+    return name.endswith(("CRS84", "CRS83", ":4326", ":4979", ":4258")) or name in ("WGS84", "WGS 84")
 
 
 class _UnsoundError(Exception):
