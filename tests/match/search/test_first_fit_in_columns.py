@@ -75,7 +75,10 @@ def solver():
 def labels(scenario, seeds):
     for seed in seeds:
         rng = random.Random(seed)
-        label = label_of(scenario, drawn(scenario, seed), rng, distractors=seed % 4, sizes=bool(seed % 2))
+        scene = drawn(scenario, seed)
+        label = label_of(scenario, scene, rng, distractors=seed % 4, sizes=bool(seed % 2))
+        speed, heading = (scene.values.get((scenario.ego, name), 0.0) for name in ("speed", "heading"))
+        label = replace(label, ego=replace(label.ego, velocity=(-speed * math.sin(heading), speed * math.cos(heading))))
         yield label
         moved = [
             replace(each, x=each.x + rng.choice([0.0, 0.2, 6.0]), heading=each.heading + rng.choice([0.0, 0.05, 2.0]))
