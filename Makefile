@@ -10,7 +10,7 @@ LINTED := scenicq cli tests sample_data
 FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/search/test_backtracking.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check test test-all golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames mutate browser dreal clean
+.PHONY: help setup demo check test test-all test-oldest test-newest golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames mutate browser dreal clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
@@ -42,6 +42,14 @@ test: $(READY) ## All tests but the slow ones
 test-all: $(READY) ## All tests
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev,notebook]'
 	$(PYTEST) -n $(WORKERS) --hypothesis-profile=anew
+	$(BIN)/python tests/dependencies/versions.py oldest
+	$(BIN)/python tests/dependencies/versions.py newest --pre
+
+test-oldest: $(READY) ## The lowest versions of dependencies that pyproject.toml allows, without pandas: the same output
+	$(BIN)/python tests/dependencies/versions.py oldest
+
+test-newest: $(READY) ## The newest versions of dependencies, without pandas: the same output
+	$(BIN)/python tests/dependencies/versions.py newest
 
 golden: $(READY) ## Rewrite the golden files that tests compare with
 	$(PYTEST) --update-golden -m 'not slow'

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).parent
-FOLDERS = ("bench", "conformance", "fuzz", "mutation", "importers/fuzzing")
+FOLDERS = ("bench", "conformance", "dependencies", "fuzz", "mutation", "importers/fuzzing")
 SCRIPTS = [
     file
     for folder in FOLDERS
