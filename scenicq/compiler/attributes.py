@@ -29,7 +29,7 @@ from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import ArithmeticOp, Constant, Node, PointIn
 from scenicq.geometry.angles import heading_of
-from scenicq.geometry.elements import Lane, Maneuver, NetworkElement
+from scenicq.geometry.elements import Lane, Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, orientation_of
 from scenicq.geometry.road_direction import along_lines
@@ -161,7 +161,7 @@ def _names(value: ModelValue) -> set[str]:
             return set(value.properties) | set(_PART_NAMES)
         case Module():
             return set(value.names)
-        case Network() | NetworkElement() | Maneuver():
+        case Network() | NetworkElement() | Maneuver() | Signal():
             return names_of(value)
         case _:
             return set(_PLAIN.get(type(value), ()))
@@ -180,7 +180,7 @@ def _lookup(run: Runner, value: ModelValue, name: str, span: Span) -> ModelValue
         case NetworkElement():
             region = _of_region(build.constant(value.region, span), name, span)
             return of_element(run, value, name, span) if region is MISSING else region
-        case Maneuver():
+        case Maneuver() | Signal():
             return of_element(run, value, name, span)
         case _ if is_node(value):
             return _of_field(run, value, name) if kind_of(value) == "field" else _of_node(value, name, span)

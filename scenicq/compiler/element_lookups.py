@@ -54,11 +54,13 @@ def _lane_sections(network: Network) -> list[list[LookupEntry]]:
 
 
 def _elements(network: Network) -> list[list[LookupEntry]]:
-    kinds: tuple[Sequence[NetworkElement], ...] = (
-        network.intersections, network.allRoads, network.lanes, network.shoulders, network.sidewalks,
-        network.crossings,
-    )  # fmt: skip
-    return [own(kind) for kind in kinds]
+    return [own(kind) for kind in network.top_level]
+
+
+def _directed(network: Network) -> list[list[LookupEntry]]:
+    """What has directions of traffic; lanes too, where the map has no roads."""
+    kinds: tuple[Sequence[NetworkElement], ...] = (network.intersections, network.roads, network.shoulders)
+    return [own(kind) for kind in kinds] + ([] if network.roads else [own(network.lanes)])
 
 
 LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[LookupEntry]]]]] = {
@@ -71,6 +73,7 @@ LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[LookupEntry]]]]] = {
     "sidewalkAt": ("sidewalk", lambda network: [own(network.sidewalks)]),
     "shoulderAt": ("shoulder", lambda network: [own(network.shoulders)]),
     "elementAt": ("element", _elements),
+    "nominalDirectionsAt": ("element", _directed),
 }
 """The look-ups of the network: which ranks they share, and the elements in the order in which they count."""
 

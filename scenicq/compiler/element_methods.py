@@ -9,25 +9,41 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
+from scenicq.compiler.choices import map_choice
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.following import follow
 from scenicq.compiler.known_properties import settled
 from scenicq.compiler.lanes_ahead import lanes_ahead
-from scenicq.compiler.lookups import among
+from scenicq.compiler.lookups import among, look_up
 from scenicq.compiler.road_attributes import worked_out
 from scenicq.compiler.values import Builtin, ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import Constant, Vector
-from scenicq.geometry.elements import Intersection, Lane, LaneGroup, LaneSection, Maneuver, NetworkElement, Road
-from scenicq.geometry.network import Network
+from scenicq.forest.nodes import Constant, DirectionAt, Node, Vector
+from scenicq.geometry import shapes
+from scenicq.geometry.elements import (
+    Intersection,
+    Lane,
+    LaneGroup,
+    LaneSection,
+    Maneuver,
+    NetworkElement,
+    Road,
+    RoadSection,
+)
+from scenicq.geometry.network import TOLERANCE, Network
+from scenicq.geometry.regions import SLACK
 
 __all__ = ["METHODS", "find_among", "method_of", "nominal_directions"]
 
 _PARTS: dict[str, tuple[tuple[type, Callable[[Any], Sequence[NetworkElement]]], ...]] = {
-    "sectionAt": ((Lane, lambda lane: lane.sections),),
-    "laneAt": ((LaneGroup, lambda group: group.lanes), (Road, lambda road: road.lanes)),
+    "sectionAt": ((Lane, lambda lane: lane.sections), (Road, lambda road: road.sections)),
+    "laneAt": (
+        (LaneGroup, lambda group: group.lanes),
+        (Road, lambda road: road.lanes),
+        (RoadSection, lambda section: section.lanes),
+    ),
     "laneGroupAt": ((Road, lambda road: road.laneGroups),),
     "laneSectionAt": ((Road, lambda road: [section for lane in road.lanes for section in lane.sections]),),
 }
@@ -63,8 +79,8 @@ def method_of(run: Runner, value: NetworkElement, name: str) -> Builtin | None:
             return among(run, found[0], f"crossingAt of {value.id}", point, reject, span)
 
         return Builtin(name, crossing)
-    if name == "nominalDirectionsAt":
-        return nominal_directions(run, run.network)
+    if name == "nominalDirectionsAt" and value.orientation is not None:
+        return nominal_directions(run, value)
     if name == "maneuversAt" and isinstance(value, Intersection):
         return Builtin(name, lambda span, point: _maneuvers_at(run, value, point, span))
     if name == "lanesAhead" and isinstance(value, Lane):
@@ -74,7 +90,16 @@ def method_of(run: Runner, value: NetworkElement, name: str) -> Builtin | None:
     if name == "flowFrom" and value.orientation is not None:
         field = build.constant(value.orientation)
 
-        def flow(span: Span, point: ModelValue, distance: ModelValue, **_: ModelValue) -> ModelValue:
+        def flow(
+            span: Span,
+            point: ModelValue,
+            distance: ModelValue,
+            steps: ModelValue = None,
+            stepSize: ModelValue = None,  # noqa: N803 - Scenic's name
+        ) -> ModelValue:
+            if steps is not None or stepSize is not None:
+                raise fail("unsupported-construct", "steps of one's own are not supported here", span, "given here",
+                           ("leave them out: steps are at most 5 m long",))  # fmt: skip
             return follow(run, field, point, distance, span).properties["position"]
 
         return Builtin(name, flow)
@@ -96,26 +121,51 @@ def _known_place(run: Runner, point: ModelValue, what: str, hint: str, span: Spa
     return cast(Vector, where.value)
 
 
-def nominal_directions(run: Runner, network: Network) -> Builtin:
-    """`nominalDirectionsAt` of a known point."""
+def nominal_directions(run: Runner, owner: Network | NetworkElement) -> Builtin:
+    """`nominalDirectionsAt`: the directions of traffic at a point, in an element or in whatever lies there."""
 
     def directions(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
-        hint = "`roadDirection at` it may be any of them"
-        return network.nominalDirectionsAt(*_known_place(run, point, "nominalDirectionsAt", hint, span))
+        found = look_up(run, owner, "nominalDirectionsAt", point, reject, span) if isinstance(owner, Network) else owner
+        place = settled(run, to_vector(point, span))
+        return map_choice(found, lambda element: _directions(element, place, span), span)
 
     return Builtin("nominalDirectionsAt", directions)
+
+
+def _directions(element: ModelValue, place: Node, span: Span) -> ModelValue:
+    """Those of one element; at a random place of an intersection one, which may be that of any way there."""
+    field = element.orientation if isinstance(element, NetworkElement) else None
+    if field is None:
+        return ()
+    if not isinstance(place, Constant):
+        return (DirectionAt(build.constant(field, span), place, span=span),)
+    x, y = cast(Vector, place.value)
+    fields = [field]
+    if isinstance(element, Intersection):
+        lanes = (maneuver.connectingLane for maneuver in _ways_at(element, x, y))
+        fields = [lane.orientation for lane in lanes if lane is not None and lane.orientation is not None]
+    return tuple(heading for each in fields if (heading := each.first(x, y)) is not None)
 
 
 def _maneuvers_at(run: Runner, intersection: Intersection, point: ModelValue, span: Span) -> ModelValue:
     """The ways through an intersection that pass a known point."""
     hint = "choose a maneuver first, as in `Uniform(*intersection.maneuvers)`"
-    x, y = _known_place(run, point, "maneuversAt", hint, span)
+    return _ways_at(intersection, *_known_place(run, point, "maneuversAt", hint, span))
 
-    def passes(maneuver: Maneuver) -> bool:
-        way = maneuver.connectingLane
-        return way is not None and among(run, [way], "maneuversAt", (x, y), None, span) is not None
 
-    return [maneuver for maneuver in intersection.maneuvers if passes(maneuver)]
+def _ways_at(intersection: Intersection, x: float, y: float) -> list[Maneuver]:
+    """The ways through an intersection that hold a point, else those within the map's tolerance, else the nearest."""
+    here = shapes.point(x, y)
+    away = {
+        maneuver: shapes.distance(maneuver.connectingLane.polygon, here)
+        for maneuver in intersection.maneuvers
+        if maneuver.connectingLane is not None
+    }
+    for limit in (SLACK, TOLERANCE):
+        found = [maneuver for maneuver, distance in away.items() if distance <= limit]
+        if found:
+            return found
+    return [min(away, key=away.__getitem__)] if away else []
 
 
 def _shifted(run: Runner, section: LaneSection, offset: ModelValue, span: Span) -> ModelValue:

@@ -28,6 +28,7 @@ from scenicq.geometry.elements import (
     MissingElementError,
     NetworkElement,
     Road,
+    Signal,
 )
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.network import Network
@@ -43,7 +44,7 @@ MANEUVER_TYPES = Module("ManeuverType", {name: name for name in ("STRAIGHT", "LE
 
 _TURN = math.radians(20)
 """Change of direction from which on a way through an intersection is a turn."""
-_HIDDEN = frozenset({"polygon", "properties", "region"})
+_HIDDEN = frozenset({"polygon", "properties", "region", "left_edge", "right_edge"})
 _NETWORK = frozenset(
     "lanes laneSections laneGroups roads connectingRoads allRoads intersections crossings sidewalks shoulders "
     "laneRegion roadRegion intersectionRegion crossingRegion sidewalkRegion shoulderRegion drivableRegion "
@@ -52,11 +53,13 @@ _NETWORK = frozenset(
 _MANEUVER = frozenset({"type", "conflictingManeuvers", "reverseManeuvers"})
 
 
-def names_of(value: Network | NetworkElement | Maneuver) -> set[str]:
+def names_of(value: Network | NetworkElement | Maneuver | Signal) -> set[str]:
     """The attributes that a value may have."""
     if isinstance(value, Network):
         return set(_NETWORK | LOOKUPS.keys() | METHODS | {"findPointIn"}) | names_worked_out(value)
     own = {name for name in dir(value) if not name.startswith("__")} - _HIDDEN
+    if isinstance(value, Signal):
+        return own
     return own | (_MANEUVER if isinstance(value, Maneuver) else METHODS | names_worked_out(value))
 
 
@@ -69,14 +72,14 @@ def is_of_elements(name: str) -> bool:
 
 def of_network(run: Runner, network: Network, name: str, span: Span) -> ModelValue:
     """An attribute of the network, or `MISSING`."""
+    if name == "nominalDirectionsAt":
+        return nominal_directions(run, network)
     if name in LOOKUPS:
 
         def find(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
             return look_up(run, network, name, point, reject, span)
 
         return Builtin(name, find)
-    if name == "nominalDirectionsAt":
-        return nominal_directions(run, network)
     if name == "findPointIn":
 
         def find_in(span: Span, point: ModelValue, elems: ModelValue, reject: ModelValue = None) -> ModelValue:
@@ -92,8 +95,8 @@ def of_network(run: Runner, network: Network, name: str, span: Span) -> ModelVal
     return build.constant(found, span) if name.endswith("Region") or name == "roadDirection" else found
 
 
-def of_element(run: Runner, value: NetworkElement | Maneuver, name: str, span: Span) -> ModelValue:
-    """An attribute of an element or maneuver, or `MISSING`.
+def of_element(run: Runner, value: NetworkElement | Maneuver | Signal, name: str, span: Span) -> ModelValue:
+    """An attribute of an element, maneuver or signal, or `MISSING`.
 
     Raises:
         ScenarioError: map-lacks, where Scenic would reject the scene.

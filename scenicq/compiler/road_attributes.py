@@ -26,6 +26,7 @@ from scenicq.geometry.elements import (
     Lane,
     LaneGroup,
     LaneSection,
+    LongElement,
     NetworkElement,
     PedestrianCrossing,
     Road,
@@ -102,8 +103,25 @@ def _bike_lane(_: Network, group: LaneGroup) -> Lane | None:
     return next((lane for lane, kind in kinds if kind.startswith(("bike", "biking", "bicycle"))), None)
 
 
+def _belonging(group: LaneGroup, key: str, candidates: Sequence[_Element], reach: float) -> _Element | None:
+    """What the map says belongs to a group; where it says nothing, what lies along its right edge."""
+    if key not in group.properties:
+        return _beside(group, candidates, reach)
+    told = group.properties[key]
+    own = {told} if isinstance(told, str) else set(cast("list[str]", told or []))
+    return next((each for each in candidates if each.id in own), None)
+
+
+def _sidewalk(network: Network, group: LaneGroup) -> Sidewalk | None:
+    return _belonging(group, "sidewalk", network.sidewalks, _SIDEWALK)
+
+
+def _shoulder(network: Network, group: LaneGroup) -> Shoulder | None:
+    return _belonging(group, "shoulder", network.shoulders, _SHOULDER)
+
+
 def _sidewalks(network: Network, road: Road) -> tuple[Sidewalk, ...]:
-    found = (_beside(group, network.sidewalks, _SIDEWALK) for group in road.laneGroups)
+    found = (_sidewalk(network, group) for group in road.laneGroups)
     return tuple(dict.fromkeys(each for each in found if each is not None))
 
 
@@ -112,21 +130,47 @@ def _sidewalk_region(network: Network, road: Road) -> ModelValue:
     return build.constant(PolygonSet(tuple(each.polygon for each in own), f"sidewalk of {road.id}"))
 
 
-def _side(element: Lane | LaneSection, *, left: bool) -> ModelValue:
-    if element.centerline is None:
-        return None
-    lines = side_edges(element.polygon, element.centerline.lines, left=left)
-    return _lines(lines, f"{'left' if left else 'right'} edge of {element.id}")
+def _side(element: LongElement, *, left: bool) -> ModelValue:
+    """A side of an element: as the map gives it, else the border of its area or those of its outermost lanes."""
+    given = element.left_edge if left else element.right_edge
+    if given is not None:
+        return build.constant(given)
+    name = f"{'left' if left else 'right'} edge of {element.id}"
+    match element:
+        case Lane() | LaneSection() if element.centerline is not None:
+            return _lines(side_edges(element.polygon, element.centerline.lines, left=left), name)
+        case LaneGroup():
+            return _lines([edge for lane in element.lanes for edge in _outer_edges(lane, left)], name)
+        case Road():
+            own, other = element.forwardLanes, element.backwardLanes
+            if left:
+                own, other = other, own
+            return _side(own, left=False) if own else _side(other, left=True) if other else None
+        case _:
+            return None
 
 
-def _road_of(network: Network, element: NetworkElement) -> Road | None:
-    name = element.properties.get("road")
-    return next((road for road in network.allRoads if road.id == name), None)
+def _outer_edges(lane: Lane, left: bool) -> Iterable[LineString]:
+    """The sides of a lane's sections that are no border to another one of its group."""
+    for section in lane.sections:
+        beside = section._laneToLeft if left else section._laneToRight  # pyright: ignore[reportPrivateUsage]
+        inside = beside is not None and lane.group is not None and beside.group is lane.group
+        if not inside and section.centerline is not None:
+            yield from side_edges(section.polygon, section.centerline.lines, left=left)
 
 
 def _speed_limit(_: Network, element: NetworkElement) -> ModelValue:
     limit = element.properties.get("speed_limit")
     return float(limit) if isinstance(limit, int | float) and not isinstance(limit, bool) else None
+
+
+def _source_id(_: Network, element: NetworkElement) -> ModelValue:
+    told = element.properties.get("source_id")
+    return told if isinstance(told, int | str) else element.id
+
+
+def _signals(_: Network, element: Road | Intersection) -> ModelValue:
+    return element.signals if "signals" in element.properties else None
 
 
 def _signalized(_: Network, element: NetworkElement) -> ModelValue:
@@ -138,16 +182,25 @@ _WORKED_OUT: dict[str, tuple[_Work, ...]] = {
     "network": ((NetworkElement, lambda network, _: network),),
     "speedLimit": ((NetworkElement, _speed_limit),),
     "tags": ((NetworkElement, lambda _, element: frozenset(element.properties.get("tags") or ())),),
-    "leftEdge": tuple((kind, lambda _, lane: _side(lane, left=True)) for kind in (Lane, LaneSection)),
-    "rightEdge": tuple((kind, lambda _, lane: _side(lane, left=False)) for kind in (Lane, LaneSection)),
+    "leftEdge": ((LongElement, lambda _, element: _side(element, left=True)),),
+    "rightEdge": ((LongElement, lambda _, element: _side(element, left=False)),),
+    "name": ((NetworkElement, lambda _, element: str(element.properties.get("name", ""))),),
+    "id": ((NetworkElement, _source_id),),
     "curb": ((LaneGroup, _curb),),
-    "sidewalk": ((LaneGroup, lambda network, group: _beside(group, network.sidewalks, _SIDEWALK)),),
-    "shoulder": ((LaneGroup, lambda network, group: _beside(group, network.shoulders, _SHOULDER)),),
+    "sidewalk": ((LaneGroup, _sidewalk),),
+    "shoulder": ((LaneGroup, _shoulder),),
     "bikeLane": ((LaneGroup, _bike_lane),),
-    "crossings": ((Road, _crossings), (Intersection, _crossings)),
+    "crossings": (
+        (Road, _crossings),
+        (Intersection, _crossings),
+        (Sidewalk, lambda network, _: None if network.crossings else ()),
+    ),
+    "sections": ((Road, lambda _, road: road.sections or None),),
+    "roadSections": ((Network, lambda network, _: network.roadSections or None),),
+    "signals": ((Road, _signals), (Intersection, _signals)),
+    "openDriveID": ((LaneSection, lambda _, section: section.openDriveID),),
     "sidewalks": ((Road, _sidewalks),),
     "sidewalkRegion": ((Road, _sidewalk_region),),
-    "road": ((Shoulder, _road_of), (Sidewalk, _road_of)),
     "isSignalized": ((Intersection, _signalized),),
     "elements": ((Network, lambda network, _: dict(network.elements)),),
     "driveOnLeft": ((Network, lambda *_: False),),
@@ -161,6 +214,9 @@ _UNKNOWN: dict[str, tuple[type | tuple[type, ...], str]] = {
     "signals": ((Road, Intersection), "where traffic signals are"),
     "isSignalized": (Intersection, "which intersections have traffic signals"),
     "openDriveID": (LaneSection, "the numbers of lanes in OpenDRIVE"),
+    "crossings": (Sidewalk, "which crossings lead to a sidewalk"),
+    "sections": (Road, "where roads are cut into sections; those of their lanes are `sections` of these"),
+    "roadSections": (Network, "where roads are cut into sections; those of lanes are `laneSections`"),
     "startSidewalk": (PedestrianCrossing, "which sidewalks a crossing joins"),
     "endSidewalk": (PedestrianCrossing, "which sidewalks a crossing joins"),
     "parent": (PedestrianCrossing, "what a crossing belongs to"),
@@ -168,11 +224,6 @@ _UNKNOWN: dict[str, tuple[type | tuple[type, ...], str]] = {
     "vehicleTypes": (NetworkElement, "which vehicles may use a lane"),
 }
 _REFUSED: dict[str, tuple[type | tuple[type, ...], str]] = {
-    "leftEdge": ((LaneGroup, Road), "use that of its lanes"),
-    "rightEdge": ((LaneGroup, Road), "use that of its lanes, or `curb`"),
-    "sections": (Road, "use the `sections` of its lanes"),
-    "roadSections": (Network, "use `laneSections`"),
-    "sectionAt": (Road, "use `laneSectionAt`"),
     "shiftLanes": (Road, "use `shiftedBy` of a lane section"),
 }
 

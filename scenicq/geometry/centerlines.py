@@ -11,7 +11,7 @@ from scenicq.geometry.features import MapFeature
 from scenicq.geometry.road_direction import DirectedLane, RoadDirection
 from scenicq.geometry.shapes import Coordinates
 
-__all__ = ["centerlines", "direction_along", "road_direction"]
+__all__ = ["centerlines", "direction_along", "lane_direction", "road_direction"]
 
 
 def centerlines(feature: MapFeature) -> tuple[Coordinates, ...]:
@@ -20,18 +20,32 @@ def centerlines(feature: MapFeature) -> tuple[Coordinates, ...]:
     return tuple(np.array(line, dtype=float)[:, :2] for line in lines if len(line) > 1)
 
 
-def road_direction(features: Iterable[MapFeature]) -> RoadDirection:
-    """The direction of traffic on the lanes of a map; who wants nothing else of its network need not build that.
+def lane_direction(features: Iterable[MapFeature]) -> RoadDirection:
+    """The direction of traffic on the lanes of a map alone.
 
     Args:
         features: Of those with the same id the first counts.
     """
+    return RoadDirection(_directed(features, "lane"))
+
+
+def road_direction(features: Iterable[MapFeature]) -> RoadDirection:
+    """The direction of traffic: that of the lanes, and of shoulders off roads and intersections, if these have one.
+
+    Args:
+        features: Of those with the same id the first counts.
+    """
+    features = tuple(features)
+    beside = _directed(features, "shoulder")
+    taken = tuple(each.shape for each in features if each.kind in ("intersection", "road"))
+    return RoadDirection(_directed(features, "lane"), beside=beside, taken=taken if beside else ())
+
+
+def _directed(features: Iterable[MapFeature], kind: str) -> tuple[DirectedLane, ...]:
     kept: dict[str, MapFeature] = {}
     for feature in features:
         kept.setdefault(feature.id, feature)
-    return RoadDirection(
-        tuple(DirectedLane(lane.shape, centerlines(lane)) for lane in kept.values() if lane.kind == "lane")
-    )
+    return tuple(DirectedLane(each.shape, centerlines(each)) for each in kept.values() if each.kind == kind)
 
 
 def direction_along(features: Iterable[MapFeature], kind: str) -> RoadDirection | None:

@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
-from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import PolygonSet, PolylineSet
+from scenicq.geometry.road_direction import RoadDirection
 
 __all__ = [
     "Curb",
@@ -25,13 +25,16 @@ __all__ = [
     "Lane",
     "LaneGroup",
     "LaneSection",
+    "LongElement",
     "Maneuver",
     "MissingElementError",
     "NetworkElement",
     "PedestrianCrossing",
     "Road",
+    "RoadSection",
     "Shoulder",
     "Sidewalk",
+    "Signal",
     "keeps_left",
 ]
 
@@ -57,7 +60,7 @@ class NetworkElement:
     id: str
     polygon: Polygon | MultiPolygon = field(repr=False)
     properties: Mapping[str, Any] = field(default_factory=dict[str, Any], repr=False)
-    orientation: VectorField | None = field(default=None, repr=False)
+    orientation: RoadDirection | None = field(default=None, repr=False)
 
     @property
     def uid(self) -> str:
@@ -77,19 +80,16 @@ class NetworkElement:
 
 @dataclass(eq=False)
 class LongElement(NetworkElement):
-    """An element that runs along a line.
+    """An element that runs along a line, and has others before and after it.
 
     Attributes:
         centerline: Polylines in the direction of travel, of a sidewalk in the road's, or None where the map gives none.
+        left_edge, right_edge: Its sides, in the direction of travel beside them, or None where the map gives none.
     """
 
     centerline: PolylineSet | None = field(default=None, repr=False, kw_only=True)
-
-
-@dataclass(eq=False)
-class LinearElement(LongElement):
-    """An element with a direction of travel and others before and after it."""
-
+    left_edge: PolylineSet | None = field(default=None, repr=False, kw_only=True)
+    right_edge: PolylineSet | None = field(default=None, repr=False, kw_only=True)
     _predecessor: NetworkElement | None = field(default=None, repr=False, kw_only=True)
     _successor: NetworkElement | None = field(default=None, repr=False, kw_only=True)
 
@@ -105,7 +105,7 @@ class LinearElement(LongElement):
 
 
 @dataclass(eq=False)
-class LaneSection(LinearElement):
+class LaneSection(LongElement):
     """A piece of a lane along which its neighbours stay the same.
 
     Attributes:
@@ -115,6 +115,7 @@ class LaneSection(LinearElement):
         isForward: Whether it runs in its road's forward direction; True where the map doesn't say.
         _laneToLeft, _laneToRight: Neighbouring sections or None; the names without underscore raise instead.
         _fasterLane, _slowerLane: Neighbours in the same direction towards and away from the road's middle.
+        openDriveID: Its number in the map's cross-section of the road, or None where the map doesn't say.
     """
 
     lane: Lane = field(repr=False, kw_only=True)
@@ -125,6 +126,7 @@ class LaneSection(LinearElement):
     _laneToRight: LaneSection | None = field(default=None, repr=False, kw_only=True)
     _fasterLane: LaneSection | None = field(default=None, repr=False, kw_only=True)
     _slowerLane: LaneSection | None = field(default=None, repr=False, kw_only=True)
+    openDriveID: int | None = field(default=None, repr=False, kw_only=True)
 
     @property
     def laneToLeft(self) -> LaneSection:
@@ -153,14 +155,14 @@ class LaneSection(LinearElement):
 
 
 @dataclass(eq=False)
-class Lane(LinearElement):
+class Lane(LongElement):
     """A lane.
 
     Attributes:
         group: Its group, if the map has one.
         road: Its road, if the map has one.
         sections: Its sections in the direction of travel; a lane that the map doesn't cut is its own single section.
-        adjacentLanes: Neighbouring lanes, left first.
+        adjacentLanes: Neighbouring lanes, section by section, left first.
         maneuvers: Ways on from its end.
         predecessors: Lanes that lead here.
         successors: Lanes that it leads to.
@@ -181,7 +183,7 @@ class Lane(LinearElement):
 
 
 @dataclass(eq=False)
-class LaneGroup(LinearElement):
+class LaneGroup(LongElement):
     """The lanes of a road that run in one direction.
 
     Attributes:
@@ -201,7 +203,7 @@ class LaneGroup(LinearElement):
 
 
 @dataclass(eq=False)
-class Road(LinearElement):
+class Road(LongElement):
     """A road between intersections, or the part of one that crosses an intersection.
 
     Attributes:
@@ -210,6 +212,8 @@ class Road(LinearElement):
         backwardLanes: The group of the other direction, or None.
         laneGroups: Those of the two that exist.
         intersection: The intersection that it lies in, or None.
+        sections: Its cuts across all lanes, from start to end; none where the map gives none.
+        signals: Its signals; none where the map gives none.
     """
 
     lanes: tuple[Lane, ...] = field(default=(), repr=False, kw_only=True)
@@ -217,11 +221,60 @@ class Road(LinearElement):
     backwardLanes: LaneGroup | None = field(default=None, repr=False, kw_only=True)
     laneGroups: tuple[LaneGroup, ...] = field(default=(), repr=False, kw_only=True)
     intersection: Intersection | None = field(default=None, repr=False, kw_only=True)
+    sections: tuple[RoadSection, ...] = field(default=(), repr=False, kw_only=True)
+    signals: tuple[Signal, ...] = field(default=(), repr=False, kw_only=True)
 
     @property
     def is1Way(self) -> bool:
         """Whether it has lanes in one direction only."""
         return self.forwardLanes is None or self.backwardLanes is None
+
+
+@dataclass(eq=False)
+class RoadSection(LongElement):
+    """A piece of a road along which its lanes stay the same.
+
+    Attributes:
+        road: The road.
+        forwardLanes: Its lane sections in the road's direction, the rightmost first.
+        backwardLanes: Those in the other direction, the one nearest to the middle first.
+    """
+
+    road: Road = field(repr=False, kw_only=True)
+    forwardLanes: tuple[LaneSection, ...] = field(default=(), repr=False, kw_only=True)
+    backwardLanes: tuple[LaneSection, ...] = field(default=(), repr=False, kw_only=True)
+
+    @property
+    def lanes(self) -> tuple[LaneSection, ...]:
+        """All lane sections, from right to left."""
+        return self.forwardLanes + self.backwardLanes
+
+    @property
+    def lanesByOpenDriveID(self) -> dict[int, LaneSection]:
+        """The lane sections by their numbers, as far as the map gives any."""
+        return {lane.openDriveID: lane for lane in self.lanes if lane.openDriveID is not None}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """A traffic light or sign.
+
+    Attributes:
+        uid: Unique in its map.
+        openDriveID: The map's own identifier.
+        country: Whose types these are.
+        type: What it is, in the country's numbers.
+    """
+
+    uid: str
+    openDriveID: int | str
+    country: str
+    type: str
+
+    @property
+    def isTrafficLight(self) -> bool:
+        """Whether it is a traffic light."""
+        return self.type == "1000001"
 
 
 @dataclass(eq=False)
@@ -231,9 +284,10 @@ class Intersection(NetworkElement):
     Attributes:
         roads: The roads that the map lists for it.
         lanes: The lanes of those roads that lie inside.
-        incomingLanes: Lanes that end at it.
-        outgoingLanes: Lanes that start at it.
-        maneuvers: Ways through it.
+        incomingLanes: Lanes that end at it, by the heading from the middle of their ends, from -pi on.
+        outgoingLanes: Lanes that start at it, in the same order.
+        maneuvers: Ways through it, start lane by start lane.
+        signals: The signals of the roads inside; none where the map gives none.
     """
 
     roads: tuple[Road, ...] = field(default=(), repr=False, kw_only=True)
@@ -241,6 +295,7 @@ class Intersection(NetworkElement):
     incomingLanes: tuple[Lane, ...] = field(default=(), repr=False, kw_only=True)
     outgoingLanes: tuple[Lane, ...] = field(default=(), repr=False, kw_only=True)
     maneuvers: tuple[Maneuver, ...] = field(default=(), repr=False, kw_only=True)
+    signals: tuple[Signal, ...] = field(default=(), repr=False, kw_only=True)
 
     @property
     def is3Way(self) -> bool:
@@ -280,12 +335,24 @@ class PedestrianCrossing(NetworkElement):
 
 @dataclass(eq=False)
 class Sidewalk(LongElement):
-    """A sidewalk."""
+    """A sidewalk.
+
+    Attributes:
+        road: Its road, if the map has one.
+    """
+
+    road: Road | None = field(default=None, repr=False, kw_only=True)
 
 
 @dataclass(eq=False)
 class Shoulder(LongElement):
-    """A shoulder of a road."""
+    """A shoulder of a road.
+
+    Attributes:
+        road: Its road, if the map has one.
+    """
+
+    road: Road | None = field(default=None, repr=False, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

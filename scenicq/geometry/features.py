@@ -13,10 +13,14 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry import shapes
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["REFERENCES", "MapFeature", "ProblemSink", "dangling", "names", "read_geojson"]
+__all__ = ["LINES", "REFERENCES", "MapFeature", "ProblemSink", "dangling", "names", "read_geojson"]
 
 ProblemSink = Callable[[str, str], None]
 """Takes the id of a feature ("" if it has none) and what is wrong with it."""
+
+ANY = "element"
+"""What stands for a reference to an element of any kind."""
+_ENDS = {"predecessor": ANY, "successor": ANY}
 
 REFERENCES: dict[str, dict[str, str]] = {
     "lane": {
@@ -26,14 +30,21 @@ REFERENCES: dict[str, dict[str, str]] = {
         "right": "lane",
         "predecessors": "lane",
         "successors": "lane",
+        **_ENDS,
     },
-    "lane_section": {"lane": "lane", "left": "lane_section", "right": "lane_section"},
-    "lane_group": {"road": "road", "opposite": "lane_group"},
-    "road": {"forward": "lane_group", "backward": "lane_group", "intersection": "intersection"},
-    "intersection": {"roads": "road"},
+    "lane_section": {"lane": "lane", "left": "lane_section", "right": "lane_section", **_ENDS},
+    "lane_group": {"road": "road", "opposite": "lane_group", "sidewalk": "sidewalk", "shoulder": "shoulder", **_ENDS},
+    "road": {"forward": "lane_group", "backward": "lane_group", "intersection": "intersection", **_ENDS},
+    "road_section": {"road": "road", "forward": "lane_section", "backward": "lane_section", **_ENDS},
+    "intersection": {"roads": "road", "incoming": "lane"},
+    "sidewalk": {"road": "road", **_ENDS},
+    "shoulder": {"road": "road", **_ENDS},
     "curb": {"group": "lane_group"},
 }
 """Properties that refer to other features: kind -> property -> kind that it refers to."""
+
+LINES = ("centerline", "left_edge", "right_edge")
+"""Properties that are lists of polylines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +53,8 @@ class MapFeature:
 
     Attributes:
         id: Unique in its map.
-        kind: `lane`, `lane_section`, `lane_group`, `road`, `intersection`, `crossing`, `sidewalk`, `shoulder`, `curb`,
-            `drivable`, or any other, which becomes a region of that name.
+        kind: `lane`, `lane_section`, `lane_group`, `road`, `road_section`, `intersection`, `crossing`, `sidewalk`,
+            `shoulder`, `curb`, `drivable`, or any other, which becomes a region of that name.
         shape: Polygon or MultiPolygon (LineString or MultiLineString for `curb`), in metres of the map frame.
         properties: What else the map says, as the interchange format spells it.
     """
@@ -72,7 +83,8 @@ def dangling(features: Iterable[MapFeature]) -> list[tuple[str, str]]:
     for feature in features:
         for key, kind in REFERENCES.get(feature.kind, {}).items():
             for name in names(feature, key) if key in feature.properties else ():
-                if kinds.get(name) != kind and not (kind == "lane_section" and kinds.get(name) == "lane"):
+                also = (ANY, "lane_section") if kinds.get(name) == "lane" else (ANY,)
+                if kinds.get(name) != kind and not (name in kinds and kind in also):
                     what = f"is a {kinds[name]}, not a {kind}" if name in kinds else "is not in the map"
                     found.append((feature.id, f"`{key}` of {feature.kind} `{feature.id}`: `{name}` {what}"))
     return found
@@ -150,8 +162,9 @@ def _feature(entry: Any, known: Shape | None) -> MapFeature:
     if shape is None or kind == "curb":
         shape = _shape(identifier, kind, _object(entry).get("geometry"))
     rest = {key: value for key, value in properties.items() if key not in ("id", "kind")}
-    if "centerline" in rest:
-        rest["centerline"] = _centerline(identifier, rest["centerline"])
+    for key in LINES:
+        if key in rest:
+            rest[key] = _polylines(identifier, key, rest[key])
     for key in REFERENCES.get(kind, {}):
         if not _is_reference(rest.get(key)):
             raise _UnsoundError(identifier, f"`{key}` is neither an id nor a list of ids")
@@ -188,16 +201,16 @@ def _shape(identifier: str, kind: str, geometry: Any) -> Shape:
     return shape
 
 
-def _centerline(identifier: str, value: Any) -> list[list[list[float]]]:
+def _polylines(identifier: str, key: str, value: Any) -> list[list[list[float]]]:
     """Polylines of at least two finite points; a single polyline is taken for a list of one."""
     try:
         single = bool(value) and isinstance(value[0][0], int | float)
         lines = cast("list[list[list[Any]]]", [value] if single else value or [])
         result = [[[float(x) for x in place[:2]] for place in line] for line in lines]
     except (TypeError, ValueError, OverflowError, LookupError) as error:
-        raise _UnsoundError(identifier, "its centreline is not a list of polylines") from error
+        raise _UnsoundError(identifier, f"`{key}` is not a list of polylines") from error
     if any(len(line) < 2 or any(len(place) != 2 for place in line) for line in result):
-        raise _UnsoundError(identifier, "its centreline has a polyline of less than two points")
+        raise _UnsoundError(identifier, f"`{key}` has a polyline of less than two points")
     if not all(math.isfinite(value) for line in result for place in line for value in place):
-        raise _UnsoundError(identifier, "its centreline has a coordinate that is not finite")
+        raise _UnsoundError(identifier, f"`{key}` has a coordinate that is not finite")
     return result

@@ -28,6 +28,7 @@ from scenicq.geometry.elements import (
     NetworkElement,
     PedestrianCrossing,
     Road,
+    RoadSection,
     Shoulder,
     Sidewalk,
 )
@@ -81,7 +82,7 @@ class Network:
 
     @cached_property
     def _linked(self) -> Elements:
-        return link(self.features, self.roadDirection)
+        return link(self.features)
 
     @cached_property
     def lanes(self) -> tuple[Lane, ...]:
@@ -92,6 +93,11 @@ class Network:
     def laneSections(self) -> tuple[LaneSection, ...]:
         """All sections of lanes."""
         return tuple(self._linked.sections.values())
+
+    @cached_property
+    def roadSections(self) -> tuple[RoadSection, ...]:
+        """All sections of roads outside of intersections."""
+        return tuple(section for road in self.roads for section in road.sections)
 
     @cached_property
     def laneGroups(self) -> tuple[LaneGroup, ...]:
@@ -146,6 +152,7 @@ class Network:
             self.lanes,
             self.laneGroups,
             self.allRoads,
+            tuple(self._linked.road_sections.values()),
             self.intersections,
             self.crossings,
             self.sidewalks,
@@ -205,8 +212,10 @@ class Network:
 
     @cached_property
     def roadRegion(self) -> PolygonSet:
-        """All roads."""
-        return self._region("road", ("road",), self.roadDirection)
+        """The roads outside of intersections."""
+        inside = {road.id for road in self.connectingRoads}
+        found = [feature for feature in self.features if feature.kind == "road" and feature.id not in inside]
+        return _region_of(found, "road", self.roadDirection)
 
     @cached_property
     def intersectionRegion(self) -> PolygonSet:
@@ -305,20 +314,15 @@ class Network:
         return self._first(((self.shoulders, "shoulder"),), x, y)
 
     def elementAt(self, x: float, y: float) -> NetworkElement | None:
-        """The element at a point, in Scenic's order: intersection, road, then the others."""
-        kinds: tuple[tuple[Sequence[NetworkElement], str], ...] = (
-            (self.intersections, "intersection"),
-            (self.allRoads, "road"),
-            (self.lanes, "lane"),
-            (self.shoulders, "shoulder"),
-            (self.sidewalks, "sidewalk"),
-            (self.crossings, "crossing"),
-        )
-        return self._first(kinds, x, y)
+        """The element at a point, in the order of `top_level`."""
+        names = ("intersection", "main_road", "shoulder", "sidewalk", "crossing", "lane")
+        return self._first(tuple(zip(self.top_level, names, strict=True)), x, y)
 
-    def nominalDirectionsAt(self, x: float, y: float) -> tuple[float, ...]:
-        """The directions of traffic at a point."""
-        return self.roadDirection.values(x, y)
+    @property
+    def top_level(self) -> tuple[tuple[NetworkElement, ...], ...]:
+        """The elements that `elementAt` knows, in Scenic's order; crossings, and lanes without roads, come last."""
+        lanes = () if self.roads else self.lanes
+        return (self.intersections, self.roads, self.shoulders, self.sidewalks, self.crossings, lanes)
 
     # --- how these are made
 
@@ -348,9 +352,12 @@ class Network:
         return self._indices[kind]
 
     def _region(self, name: str, kinds: tuple[str, ...], orientation: VectorField | None) -> PolygonSet:
-        found = [feature for feature in self.features if feature.kind in kinds]
-        polygons = tuple(cast("Polygon | MultiPolygon", feature.shape) for feature in found)
-        return PolygonSet(polygons, name, orientation, tuple(feature.id for feature in found))
+        return _region_of([feature for feature in self.features if feature.kind in kinds], name, orientation)
+
+
+def _region_of(features: Sequence[MapFeature], name: str, orientation: VectorField | None) -> PolygonSet:
+    polygons = tuple(cast("Polygon | MultiPolygon", feature.shape) for feature in features)
+    return PolygonSet(polygons, name, orientation, tuple(feature.id for feature in features))
 
 
 def _first_within(elements: Sequence[_Element], x: float, y: float) -> _Element | None:

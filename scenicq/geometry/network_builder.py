@@ -1,36 +1,51 @@
-"""Network elements from map features: makes them all, then fills in what refers to what."""
+"""Network elements from map features: makes them all, then fills in what refers to what.
+
+What a map says itself counts; what it doesn't say follows from the rest, as far as it does.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
-from scenicq.geometry.centerlines import centerlines, direction_along
+from scenicq.geometry.centerlines import centerlines
+from scenicq.geometry.element_ends import derive_ends
+from scenicq.geometry.element_lines import (
+    given_line,
+    set_group_lines,
+    set_lane_lines,
+    set_road_lines,
+    set_section_lines,
+)
 from scenicq.geometry.elements import (
     Curb,
     Intersection,
     Lane,
     LaneGroup,
     LaneSection,
-    Maneuver,
+    LongElement,
     NetworkElement,
     PedestrianCrossing,
     Road,
+    RoadSection,
     Shoulder,
     Sidewalk,
+    Signal,
     keeps_left,
 )
 from scenicq.geometry.features import MapFeature, names
-from scenicq.geometry.fields import VectorField
+from scenicq.geometry.maneuvers import by_heading, maneuvers_of
+from scenicq.geometry.own_directions import along_centerline, direction_of_intersection, direction_of_lanes
 from scenicq.geometry.regions import PolylineSet
 
 __all__ = ["Elements", "link"]
 
 _Element = TypeVar("_Element", bound=NetworkElement)
+_Long = TypeVar("_Long", bound=LongElement)
 
 
 @dataclass(slots=True, eq=False)
@@ -41,72 +56,105 @@ class Elements:
     sections: dict[str, LaneSection] = field(default_factory=dict[str, LaneSection])
     groups: dict[str, LaneGroup] = field(default_factory=dict[str, LaneGroup])
     roads: dict[str, Road] = field(default_factory=dict[str, Road])
+    road_sections: dict[str, RoadSection] = field(default_factory=dict[str, RoadSection])
     intersections: dict[str, Intersection] = field(default_factory=dict[str, Intersection])
     crossings: dict[str, PedestrianCrossing] = field(default_factory=dict[str, PedestrianCrossing])
     sidewalks: dict[str, Sidewalk] = field(default_factory=dict[str, Sidewalk])
     shoulders: dict[str, Shoulder] = field(default_factory=dict[str, Shoulder])
     curbs: dict[str, Curb] = field(default_factory=dict[str, Curb])
 
+    def by_id(self) -> dict[str, NetworkElement]:
+        """All that have an area."""
+        tables: tuple[Mapping[str, NetworkElement], ...] = (
+            self.sections, self.road_sections, self.lanes, self.groups, self.roads, self.intersections,
+            self.crossings, self.sidewalks, self.shoulders,
+        )  # fmt: skip
+        return {name: element for table in tables for name, element in table.items()}
 
-def link(features: Sequence[MapFeature], direction: VectorField) -> Elements:
+
+def link(features: Sequence[MapFeature]) -> Elements:
     """The elements of a network with their references; references that dangle are passed over.
 
     Args:
         features: With unique ids.
-        direction: The direction of traffic, the orientation of whatever carries any.
     """
     elements = Elements()
     for feature in features:
-        _make(feature, direction, elements)
-    by_kind = {kind: [f for f in features if f.kind == kind] for kind in ("lane", "lane_section", "lane_group", "road")}
-    _link_groups(by_kind["lane_group"], by_kind["lane"], elements)
-    _link_roads(by_kind["road"], elements)
-    _make_curbs([f for f in features if f.kind == "curb"], elements)
-    _link_sections(by_kind["lane_section"], by_kind["lane"], elements)
-    _link_lanes(by_kind["lane"], elements)
-    _link_intersections([f for f in features if f.kind == "intersection"], elements)
+        _make(feature, elements)
+    by_kind: dict[str, list[MapFeature]] = {}
+    for feature in features:
+        by_kind.setdefault(feature.kind, []).append(feature)
+    lanes = by_kind.get("lane", [])
+    _link_groups(by_kind.get("lane_group", []), lanes, elements)
+    _link_roads(by_kind.get("road", []), elements)
+    _make_curbs(by_kind.get("curb", []), elements)
+    _link_sections(by_kind.get("lane_section", []), lanes, elements)
+    _link_road_sections(by_kind.get("road_section", []), elements)
+    _link_lanes(lanes, elements)
+    _link_intersections(by_kind.get("intersection", []), elements)
+    everything = elements.by_id()
+    derive_ends(elements.lanes.values(), elements.groups.values(), elements.roads.values())
+    for feature in features:
+        _link_ends(feature, everything.get(feature.id), everything)
+    _link_lines(elements)
     for lane in elements.lanes.values():
-        lane.maneuvers = tuple(_maneuvers(lane))
-    for crossing in elements.intersections.values():
-        crossing.maneuvers = tuple(
-            maneuver
-            for lane in crossing.incomingLanes
-            for maneuver in lane.maneuvers
-            if maneuver.intersection is crossing
-        )
+        lane.maneuvers = maneuvers_of(lane)
+    _link_maneuvers(by_kind.get("intersection", []), elements)
     return elements
 
 
-def _make(feature: MapFeature, direction: VectorField, elements: Elements) -> None:
+def _make(feature: MapFeature, elements: Elements) -> None:
     if feature.kind == "curb":
         return
     area = cast("Polygon | MultiPolygon", feature.shape)
     plain = (feature.id, area, feature.properties)
-    directed = (*plain, direction)
     match feature.kind:
         case "lane":
-            elements.lanes[feature.id] = Lane(*directed, centerline=_centerline(feature, direction))
+            elements.lanes[feature.id] = _along(Lane(*plain), feature)
         case "lane_group":
-            elements.groups[feature.id] = LaneGroup(*directed)
+            elements.groups[feature.id] = _along(LaneGroup(*plain), feature)
         case "road":
-            elements.roads[feature.id] = Road(*directed)
+            elements.roads[feature.id] = _along(Road(*plain, signals=_signals(feature)), feature)
         case "intersection":
-            elements.intersections[feature.id] = Intersection(*directed)
+            elements.intersections[feature.id] = Intersection(*plain, signals=_signals(feature))
         case "crossing":
             elements.crossings[feature.id] = PedestrianCrossing(*plain)
         case "sidewalk":
-            own = direction_along([feature], "sidewalk")
-            elements.sidewalks[feature.id] = Sidewalk(*plain, own, centerline=_centerline(feature, own))
+            elements.sidewalks[feature.id] = _along(Sidewalk(*plain), feature)
         case "shoulder":
-            own = direction_along([feature], "shoulder") or direction
-            elements.shoulders[feature.id] = Shoulder(*plain, own, centerline=_centerline(feature, own))
+            elements.shoulders[feature.id] = _along(Shoulder(*plain), feature)
         case _:
             pass
 
 
-def _centerline(feature: MapFeature, direction: VectorField | None) -> PolylineSet | None:
-    lines = tuple(LineString(line) for line in centerlines(feature))
-    return PolylineSet(lines, f"centerline of {feature.id}", direction) if lines else None
+def _along(element: _Long, feature: MapFeature) -> _Long:
+    """An element with the lines that the map gives, and the direction that its centreline has."""
+    element.left_edge, element.right_edge = given_line(feature, "left_edge"), given_line(feature, "right_edge")
+    lines = centerlines(feature)
+    if lines:
+        element.orientation = along_centerline(feature.id, feature.shape, lines)
+        name = f"centerline of {feature.id}"
+        element.centerline = PolylineSet(tuple(LineString(line) for line in lines), name, element.orientation)
+    return element
+
+
+def _signals(feature: MapFeature) -> tuple[Signal, ...]:
+    """The signals that a feature lists; what is no signal is passed over."""
+    entries = feature.properties.get("signals")
+    found: list[Signal] = []
+    for entry in cast("list[Any]", entries) if isinstance(entries, list) else []:
+        if isinstance(entry, dict):
+            told = cast("dict[str, Any]", entry)
+            number = told.get("number")
+            found.append(
+                Signal(
+                    str(told.get("id", "")),
+                    number if isinstance(number, int | str) else 0,
+                    str(told.get("country", "")),
+                    str(told.get("type", "")),
+                )
+            )
+    return tuple(found)
 
 
 def _make_curbs(features: list[MapFeature], elements: Elements) -> None:
@@ -168,7 +216,7 @@ def _one_group(groups: tuple[LaneGroup, ...], road: Road, side: str) -> LaneGrou
     polygons = [polygon for group in groups for polygon in shapes.simple_parts([group.polygon])]
     area = cast("Polygon | MultiPolygon", shapes.union_all(polygons))
     lanes = tuple(lane for group in groups for lane in group.lanes)
-    merged = LaneGroup(f"{road.id}:{side}", area, {}, groups[0].orientation, road=road, lanes=lanes)
+    merged = LaneGroup(f"{road.id}:{side}", area, road=road, lanes=lanes)
     opposites = (group.__dict__["_opposite"] for group in groups)
     _set(merged, "_opposite", next((opposite for opposite in opposites if opposite is not None), None))
     return merged
@@ -180,10 +228,16 @@ def _link_sections(section_features: list[MapFeature], lane_features: list[MapFe
         lane = _first(elements.lanes, feature, "lane")
         if lane is None:
             continue
-        area = cast("Polygon | MultiPolygon", feature.shape)
-        line = _centerline(feature, lane.orientation) or lane.centerline
-        section = LaneSection(feature.id, area, feature.properties, lane.orientation, centerline=line, lane=lane)
-        elements.sections[feature.id] = section
+        section = LaneSection(
+            feature.id,
+            cast("Polygon | MultiPolygon", feature.shape),
+            feature.properties,
+            lane.orientation,
+            lane=lane,
+            centerline=lane.centerline,
+            openDriveID=_number(feature),
+        )
+        elements.sections[feature.id] = _along(section, feature)
         listed.setdefault(lane.id, []).append(section)
     for lane in elements.lanes.values():
         sections = listed.get(lane.id)
@@ -205,6 +259,31 @@ def _link_sections(section_features: list[MapFeature], lane_features: list[MapFe
         lane = elements.lanes[feature.id]
         if lane.id not in listed:
             _link_neighbours(lane.sections[0], lambda key, f=feature: _section(elements, f, key))
+
+
+def _number(feature: MapFeature) -> int | None:
+    number = feature.properties.get("number")
+    return number if isinstance(number, int) and not isinstance(number, bool) else None
+
+
+def _link_road_sections(features: list[MapFeature], elements: Elements) -> None:
+    listed: dict[str, list[RoadSection]] = {}
+    for feature in features:
+        road = _first(elements.roads, feature, "road")
+        if road is None:
+            continue
+        section = RoadSection(
+            feature.id,
+            cast("Polygon | MultiPolygon", feature.shape),
+            feature.properties,
+            road=road,
+            forwardLanes=_found(elements.sections, feature, "forward"),
+            backwardLanes=_found(elements.sections, feature, "backward"),
+        )
+        elements.road_sections[feature.id] = _along(section, feature)
+        listed.setdefault(road.id, []).append(section)
+    for road in elements.roads.values():
+        road.sections = tuple(listed.get(road.id, ()))
 
 
 def _is_forward(lane: Lane, road: Road) -> bool:
@@ -254,8 +333,7 @@ def _link_lanes(features: list[MapFeature], elements: Elements) -> None:
         lane.predecessors = tuple(dict.fromkeys(before.get(lane.id, ())))
         _set(lane, "_successor", next(iter(lane.successors), None))
         _set(lane, "_predecessor", next(iter(lane.predecessors), None))
-        near = (section.lane for own in lane.sections for section in own.adjacentLanes)
-        lane.adjacentLanes = tuple(dict.fromkeys(near))
+        lane.adjacentLanes = tuple(section.lane for own in lane.sections for section in own.adjacentLanes)
 
 
 def _link_intersections(features: list[MapFeature], elements: Elements) -> None:
@@ -272,19 +350,46 @@ def _link_intersections(features: list[MapFeature], elements: Elements) -> None:
         own = set(crossing.lanes)
         ahead = [other for lane in crossing.lanes for other in lane.successors if other not in own]
         behind = [other for lane in crossing.lanes for other in lane.predecessors if other not in own]
-        crossing.incomingLanes = tuple(dict.fromkeys(behind))
-        crossing.outgoingLanes = tuple(dict.fromkeys(ahead))
+        crossing.incomingLanes = by_heading((*_found(elements.lanes, feature, "incoming"), *behind), -1)
+        crossing.outgoingLanes = by_heading(ahead, 0)
 
 
-def _maneuvers(lane: Lane) -> list[Maneuver]:
-    found: list[Maneuver] = []
-    for following in lane.successors:
-        crossing = following.road.intersection if following.road is not None else None
-        if crossing is None:
-            found.append(Maneuver(lane, following))
-        elif lane not in crossing.lanes:
-            found += [Maneuver(lane, end, following, crossing) for end in following.successors]
-    return found
+def _link_maneuvers(features: list[MapFeature], elements: Elements) -> None:
+    """The ways through each intersection, start lane by start lane, in the map's order if it gives one."""
+    for feature in features:
+        crossing = elements.intersections[feature.id]
+        starts = dict.fromkeys((*_found(elements.lanes, feature, "incoming"), *crossing.incomingLanes))
+        crossing.maneuvers = tuple(
+            maneuver for lane in starts for maneuver in lane.maneuvers if maneuver.intersection is crossing
+        )
+        crossing.orientation = direction_of_intersection(crossing)
+
+
+def _link_ends(feature: MapFeature, element: NetworkElement | None, everything: dict[str, NetworkElement]) -> None:
+    """What the map says lies before and behind an element, and whose it is."""
+    for key in ("successor", "predecessor"):
+        if key in feature.properties and isinstance(element, LongElement):
+            _set(element, f"_{key}", _first(everything, feature, key))
+    if isinstance(element, Sidewalk | Shoulder):
+        road = _first(everything, feature, "road")
+        element.road = road if isinstance(road, Road) else None
+
+
+def _link_lines(elements: Elements) -> None:
+    """The lines of elements that are made of others, and the directions of these."""
+    for lane in elements.lanes.values():
+        set_lane_lines(lane)
+    for section in elements.road_sections.values():
+        set_section_lines(section)
+        section.orientation = direction_of_lanes(section)
+    for road in elements.roads.values():
+        for group in road.laneGroups:
+            set_group_lines(group, road)
+            group.orientation = direction_of_lanes(group)
+        set_road_lines(road)
+        road.orientation = direction_of_lanes(road)
+    for group in elements.groups.values():
+        group.orientation = group.orientation if group.road is not None else direction_of_lanes(group)
 
 
 def _set(element: NetworkElement, name: str, value: Any) -> None:

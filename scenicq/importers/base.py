@@ -311,8 +311,10 @@ def _element_problem(feature: MapFeature) -> str | None:
 
 
 def _farthest(feature: MapFeature) -> float:
-    """The largest coordinate of an element's shape and centreline, without its sign."""
-    lines = cast("list[list[list[float]]]", feature.properties.get("centerline") or [])
+    """The largest coordinate of an element's shape and lines, without its sign."""
+    from scenicq.geometry.features import LINES  # noqa: PLC0415 - slow to load, and for maps
+
+    lines = [line for key in LINES for line in cast("list[list[list[float]]]", feature.properties.get(key) or [])]
     return max(
         (abs(each) for each in (*feature.shape.bounds, *(x for line in lines for xy in line for x in xy))), default=0.0
     )
@@ -371,8 +373,10 @@ def _storable_of(features: Sequence[MapFeature], file: str, report: Report) -> I
 
 
 def _texts(feature: MapFeature) -> list[object]:
-    # the centreline is numbers by now, and most of what there is
-    properties = {key: value for key, value in feature.properties.items() if key != "centerline"}
+    from scenicq.geometry.features import LINES  # noqa: PLC0415 - slow to load, and for maps
+
+    # lines are numbers by now, and most of what there is
+    properties = {key: value for key, value in feature.properties.items() if key not in LINES}
     return [feature.id, feature.kind, properties]
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
 from xml.etree import ElementTree
@@ -34,10 +34,13 @@ try:
 except ImportError:
     Network = None
 
-__all__ = ["Directions", "explain"]
+__all__ = ["Directions", "explain", "features_of"]
 
 _MEMORY_BYTES = 8 << 30
 """A map that claims a road of a million kilometres must not take the machine down."""
+
+_ROUNDING = 1e-8
+"""Metres that a line may move by when points are left out."""
 
 
 def _main(source: str, target: str) -> int:
@@ -54,7 +57,7 @@ def _main(source: str, target: str) -> int:
     except Exception as error:  # noqa: BLE001 - whatever Scenic's parser stumbles over is the map's fault here
         sys.stderr.write("\n" + explain(error, source).replace("\n", " ") + "\n")
         return 4
-    features = _features(network, Directions(ElementTree.parse(source).getroot()))  # noqa: S314 - Scenic read it, too
+    features = features_of(network, Directions(ElementTree.parse(source).getroot()))  # noqa: S314 - Scenic read it, too
     with open(target, "w", encoding="utf-8") as file:
         json.dump({"type": "FeatureCollection", "features": features}, file)
     return 0
@@ -150,7 +153,9 @@ def _dangling(root: ElementTree.Element) -> Iterator[str]:
                     yield f"road `{road.get('id')}`: its {way} is {kind} `{name}`, which is not there"
 
 
-def _features(network: Any, directions: Directions) -> list[dict[str, Any]]:
+def features_of(network: Any, directions: Directions) -> list[dict[str, Any]]:
+    """All elements of Scenic's network, those turned round that run otherwise."""
+
     def turned(lane: Any) -> bool:
         return directions.turned(str(lane.road.id), lane.sections[0].openDriveID)
 
@@ -169,26 +174,21 @@ def _features(network: Any, directions: Directions) -> list[dict[str, Any]]:
             if maneuver.connectingLane is not None:
                 crossing_of[maneuver.connectingLane.road.uid] = crossing.uid
     found = [_lane(lane, after, turned(lane), keeps_left(lane)) for lane in network.lanes]
-    found += [_section(section, turned(section.lane), keeps_left(section.lane)) for section in network.laneSections]
+    found += [
+        _lane_section(section, turned(section.lane), keeps_left(section.lane)) for section in network.laneSections
+    ]
     for group in network.laneGroups:
-        links = {"road": group.road.uid, "opposite": _uid(group._opposite)}
-        found.append(_feature(group.uid, "lane_group", group.polygon, links))
-        if group.curb is not None:
-            found.append(_feature(f"{group.uid}_curb", "curb", _line(group.curb), {"group": group.uid}))
+        found += _lane_group(group, turned(group.lanes[0]))
     for road in (*network.roads, *network.connectingRoads):
-        groups = (_uid(road.forwardLanes), _uid(road.backwardLanes))
-        forward, backward = reversed(groups) if keeps_left(road.lanes[0]) else groups
-        links = {"forward": forward, "backward": backward}
-        links["intersection"] = crossing_of.get(road.uid)
-        found.append(_feature(road.uid, "road", road.polygon, links))
-    for crossing in network.intersections:
-        links = {"roads": [road.uid for road in crossing.roads], "signalized": bool(crossing.isSignalized)}
-        found.append(_feature(crossing.uid, "intersection", crossing.polygon, links))
-    found += [_feature(element.uid, "crossing", element.polygon, {}) for element in network.crossings]
+        found.append(_road(road, crossing_of.get(road.uid), keeps_left(road.lanes[0])))
+        found += [_road_section(section, keeps_left(section)) for section in road.sections]
+    found += [_intersection(crossing, turned) for crossing in network.intersections]
+    found += [_feature(element, "crossing", {}) for element in network.crossings]
     for kind, elements in (("sidewalk", network.sidewalks), ("shoulder", network.shoulders)):
         for element in elements:
-            links = {"centerline": _points(element.centerline, keeps_left(element))}
-            found.append(_feature(element.uid, kind, element.polygon, links))
+            left = keeps_left(element)
+            links = {"road": element.road.uid, "centerline": _points(element.centerline, left)}
+            found.append(_feature(element, kind, {**links, **_edges(element, left), **_ends(element, left)}))
     return found
 
 
@@ -200,38 +200,119 @@ def _lane(lane: Any, after: dict[str, list[str]], turned: bool, left_hand: bool)
         "traffic": "left" if left_hand else None,
         "centerline": _points(lane.centerline, turned),
     }
-    return _feature(lane.uid, "lane", lane.polygon, links)
+    # a lane that is not cut has the edges of its section, and this its centreline
+    edges = _edges(lane, turned) if len(lane.sections) > 1 else {}
+    return _feature(lane, "lane", {**links, **edges, **_ends(lane, turned)})
 
 
-def _section(section: Any, turned: bool, left_hand: bool) -> dict[str, Any]:
+def _lane_section(section: Any, turned: bool, left_hand: bool) -> dict[str, Any]:
     sides = (section._laneToLeft, section._laneToRight)
     left, right = reversed(sides) if turned else sides
     links = {
         "lane": section.lane.uid,
         "left": _uid(left),
         "right": _uid(right),
+        "number": section.openDriveID,
         "traffic": "left" if left_hand else None,
-        "centerline": _points(section.centerline, turned),
+        "centerline": _points(section.centerline, turned) if len(section.lane.sections) > 1 else None,
     }
-    return _feature(section.uid, "lane_section", section.polygon, links)
+    return _feature(section, "lane_section", {**links, **_edges(section, turned), **_ends(section, turned)})
+
+
+def _lane_group(group: Any, turned: bool) -> list[dict[str, Any]]:
+    """A lane group and its curb."""
+    links = {
+        "road": group.road.uid,
+        "opposite": _uid(group._opposite),
+        "sidewalk": _listed(group._sidewalk),
+        "shoulder": _listed(group._shoulder),
+    }
+    found = [_feature(group, "lane_group", {**links, **_ends(group, turned)})]
+    if group.curb is not None:
+        found.append(_shaped(f"{group.uid}_curb", "curb", group.curb.lineString, {"group": group.uid}))
+    return found
+
+
+def _road(road: Any, intersection: str | None, left_hand: bool) -> dict[str, Any]:
+    directions = (_uid(road.forwardLanes), _uid(road.backwardLanes))
+    forward, backward = reversed(directions) if left_hand else directions
+    links = {
+        "forward": forward,
+        "backward": backward,
+        "intersection": intersection,
+        "signals": [_signal(signal) for signal in road.signals],
+        "centerline": _points(road.centerline, left_hand),
+    }
+    return _feature(road, "road", {**links, **_ends(road, left_hand)})
+
+
+def _road_section(section: Any, left_hand: bool) -> dict[str, Any]:
+    directions = ([part.uid for part in section.forwardLanes], [part.uid for part in section.backwardLanes])
+    forward, backward = reversed(directions) if left_hand else directions
+    links = {
+        "road": section.road.uid,
+        "forward": forward,
+        "backward": backward,
+        "centerline": _points(section.centerline, left_hand),
+    }
+    return _feature(section, "road_section", {**links, **_ends(section, left_hand)})
+
+
+def _intersection(crossing: Any, turned: Callable[[Any], bool]) -> dict[str, Any]:
+    ways = [(each, turned(each.connectingLane)) for each in crossing.maneuvers]
+    incoming = [each.endLane if back else each.startLane for each, back in ways]
+    # lanes that end here and lead nowhere
+    incoming += [] if any(back for _, back in ways) else crossing.incomingLanes
+    links = {
+        "roads": [road.uid for road in crossing.roads],
+        "incoming": list(dict.fromkeys(lane.uid for lane in incoming)),
+        "signalized": bool(crossing.isSignalized),
+        "signals": [_signal(signal) for signal in crossing.signals],
+    }
+    return _feature(crossing, "intersection", links)
+
+
+def _signal(signal: Any) -> dict[str, Any]:
+    return {"id": signal.uid, "number": signal.openDriveID, "country": signal.country, "type": signal.type}
 
 
 def _uid(element: Any) -> str | None:
     return None if element is None else element.uid
 
 
-def _line(region: Any) -> Any:
-    return region.lineString
+def _listed(element: Any) -> list[str]:
+    """A reference that says also that there is none."""
+    return [] if element is None else [element.uid]
+
+
+def _ends(element: Any, turned: bool) -> dict[str, list[str]]:
+    """What lies before and behind an element; of one that is turned round, it follows from the ways of its lanes."""
+    if turned:
+        return {}
+    return {"predecessor": _listed(element._predecessor), "successor": _listed(element._successor)}
+
+
+def _edges(element: Any, backwards: bool) -> dict[str, Any]:
+    """The sides of an element, along its direction."""
+    sides = (element.leftEdge, element.rightEdge)
+    left, right = reversed(sides) if backwards else sides
+    return {"left_edge": _points(left, backwards), "right_edge": _points(right, backwards)}
 
 
 def _points(region: Any, backwards: bool) -> list[list[list[float]]]:
-    lines = shapely.get_parts(region.lineString)
+    # points on straight pieces, of which some of Scenic's lines have many, say nothing
+    lines = shapely.simplify(shapely.get_parts(region.lineString), _ROUNDING)
     if backwards:
         lines = [shapely.reverse(line) for line in reversed(lines)]
     return [shapely.get_coordinates(line).tolist() for line in lines]
 
 
-def _feature(uid: str, kind: str, shape: Any, properties: dict[str, Any]) -> dict[str, Any]:
+def _feature(element: Any, kind: str, properties: dict[str, Any]) -> dict[str, Any]:
+    own = {"name": element.name or None, "source_id": element.id if element.id != element.uid else None}
+    return _shaped(element.uid, kind, element.polygon, {**own, **properties})
+
+
+def _shaped(uid: str, kind: str, shape: Any, properties: dict[str, Any]) -> dict[str, Any]:
     flat = shapely.force_2d(shape)
     if not flat.is_valid:
         parts = [part for part in shapely.get_parts(shapely.make_valid(flat)) if part.area > 0 or kind == "curb"]

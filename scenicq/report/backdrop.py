@@ -21,7 +21,7 @@ __all__ = ["Backdrop"]
 
 _KINDS = ("drivable", "road", "lane", "shoulder", "sidewalk", "intersection", "crossing")
 """Kinds with an area, from the bottom to the top; all others that are no lines lie below."""
-_GROUPING = frozenset({"lane_group", "lane_section"})
+_GROUPING = frozenset({"lane_group", "lane_section", "road_section"})
 """Kinds that only repeat the areas of others."""
 _DETAIL = 0.05
 """Metres by which a simplified outline may be off."""

@@ -354,6 +354,15 @@ class Expressions:
 
     def _direction(self, node: DirectionAt, point: TermVector) -> Term:
         """The direction of a field at a random point: one case per cell near it."""
+        if isinstance(node.field, Select):
+            # the direction of a field chosen at random is a choice of directions
+            options = tuple(
+                each
+                if isinstance(each, Constant) and isinstance(each.value, Undefined)
+                else DirectionAt(each, node.point, span=node.span)
+                for each in node.field.options
+            )
+            return cast(Term, self.code(Select(node.field.index, options, span=node.span)))
         if not isinstance(node.field, Constant):
             raise UnsupportedError("a random vector field at a random point")
         (x0, x1), (y0, y1) = self._around(node.point)

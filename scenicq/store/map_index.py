@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from scenicq.geometry.centerlines import centerlines, road_direction
+from scenicq.geometry.centerlines import centerlines, lane_direction
 from scenicq.geometry.features import MapFeature
 from scenicq.store.arrays import Texts
 from scenicq.store.columns import Memberships
@@ -28,7 +28,7 @@ class MapIndex:
         """Index a map; without elements every answer is empty."""
         self.ids = Texts([feature.id for feature in features])
         self.kinds = Texts([feature.kind for feature in features])
-        self._direction = road_direction(features)
+        self._direction = lane_direction(features)
         self._shapes = np.array([feature.shape for feature in features], dtype=object)
         self._tree = shapely.STRtree(self._shapes)
         shapely.prepare(self._shapes)
@@ -73,7 +73,7 @@ class MapIndex:
         return lane
 
     def road_directions(self, xy: NDArray[np.float64]) -> list[tuple[float, ...]]:
-        """The headings that the road has at positions of shape (n, 2); none where it has none."""
+        """The headings that lanes have at positions of shape (n, 2); none where they have none."""
         return self._direction.values_many(xy)
 
 

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 import shapely
 
-from scenicq.geometry.features import REFERENCES
+from scenicq.geometry.features import LINES, REFERENCES
 from scenicq.store.schema import ArrowTable
 from scenicq.store.validation import invalid
 from scenicq.store.value_rules import json_object
@@ -81,8 +81,9 @@ def properties_problem(kind: str, properties: Mapping[str, Any] | None) -> str |
     for key in REFERENCES.get(kind, {}):
         if not _is_reference(properties.get(key)):
             return f"`{key}` is neither an id nor a list of ids"
-    if not _is_lines(properties.get("centerline") or []):
-        return "`centerline` is no list of lines on a map"
+    for key in LINES:
+        if not _is_lines(properties.get(key) or []):
+            return f"`{key}` is no list of lines on a map"
     return "is nested too deeply" if _is_deep(properties) else None
 
 

@@ -22,7 +22,7 @@ from shapely.affinity import translate
 from shapely.geometry import mapping
 
 from scenicq.compiler.default_street import street
-from scenicq.geometry.features import REFERENCES, MapFeature, names
+from scenicq.geometry.features import LINES, REFERENCES, MapFeature, names
 from scenicq.importers.base import Entry, Labels
 from scenicq.importers.report import Report
 from scenicq.importers.segments import Job, World, fingerprint, write_segments
@@ -64,8 +64,9 @@ def fleet_map() -> tuple[MapFeature, ...]:
 
 def _moved(feature: MapFeature, prefix: str, dx: float, dy: float) -> MapFeature:
     properties: dict[str, Any] = dict(feature.properties)
-    if "centerline" in properties:
-        properties["centerline"] = [[[x + dx, y + dy] for x, y in line] for line in properties["centerline"]]
+    for key in LINES:
+        if key in properties:
+            properties[key] = [[[x + dx, y + dy] for x, y in line] for line in properties[key]]
     for key in REFERENCES.get(feature.kind, {}):
         if names(feature, key):
             value = properties[key]

@@ -216,11 +216,7 @@ def test_what_is_found_is_what_the_map_says() -> None:
         ("ego = new Object\nx = ego.lane\n", ("unknown-attribute", "lane")),
         ("ego = new Car\nif ego.lane.isForward:\n    pass\n", ("random-branch", "ego.lane.isForward")),
         ("ego = new Car at (500, 500)\nx = ego.lane\n", ("impossible-requirement", "lane")),
-        ("ego = new Car\nx = network.roads[0].sections\n", ("unsupported-construct", "sections")),
-        (
-            "ego = new Car\nx = network.nominalDirectionsAt(ego)\n",
-            ("unsupported-construct", "nominalDirectionsAt(ego)"),
-        ),
+        ("ego = new Car\nx = network.roads[0].sections\n", ("map-lacks", "sections")),
         ("ego = new Car\nx = resample(ego.lane)\n", ("wrong-type", "resample(ego.lane)")),
         ("ego = new Car\nx = network.findPointIn(ego, [1])\n", ("wrong-type", "network.findPointIn(ego, [1])")),
     ],

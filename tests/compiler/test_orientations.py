@@ -10,7 +10,7 @@ from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest.bounds import scalar_bounds
-from scenicq.forest.nodes import DirectionAt, Node, Range
+from scenicq.forest.nodes import Constant, DirectionAt, Node, Range, Select
 from scenicq.forest.walk import postorder
 
 MODEL = "model scenic.domains.driving.model\nego = new Car\n"
@@ -45,6 +45,11 @@ def test_what_lies_on_a_part_that_some_elements_lack_has_either_heading(place: s
     assert found == ({Range, DirectionAt} if either else {DirectionAt})
 
 
-def test_where_the_class_says_the_same_there_is_nothing_to_choose() -> None:
+def test_what_a_part_that_some_elements_lack_gives_and_what_the_class_says_are_both_directions() -> None:
     heading = heading_of_the_last("new Car on ego.laneGroup.opposite\n")
-    assert [type(node) for node in postorder([heading]) if isinstance(node, Range | DirectionAt)] == [DirectionAt]
+    nodes = list(postorder([heading]))
+    fields = [node.field for node in nodes if isinstance(node, DirectionAt)]
+    assert any(isinstance(field, Select) for field in fields), "that of the group"
+    traffic = street().roadDirection.name
+    assert any(isinstance(field, Constant) and field.value.name == traffic for field in fields), "that of traffic"
+    assert not any(isinstance(node, Range) for node in nodes)

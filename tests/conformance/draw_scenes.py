@@ -8,8 +8,8 @@ object a line on standard input and standard output: {"text": program, "count": 
 limit}, or "file" with a path in place of the text, with {"scenes": [...]}, each with its objects (the ego first,
 headings in Scenic's convention) and parameters, or with {"error": text} where Scenic refuses the program. No scenes at
 all means that none was found in time. {"text": program, "witness": values, "labels": objects, "seconds": limit} asks
-whether the program allows them, see `replay_witness`. {"points": how many, "seed": number} and {"elements": true} ask
-the network, see `map_answers`.
+whether the program allows them, see `replay_witness`. {"points": how many, "seed": number} and {"elements": points of
+each, "seed": number} ask the network, see `map_answers`.
 """
 
 from __future__ import annotations
@@ -148,7 +148,9 @@ def _answer(request: dict[str, Any], chart: Path, network: Any) -> dict[str, Any
         return replayed(request, chart)
     if "points" in request:
         return {"points": at_points(network, request["points"], request["seed"])}
-    return {"elements": of_elements(network)} if "elements" in request else draw(request, chart)
+    if "elements" in request:
+        return {"elements": of_elements(network, request["elements"], request["seed"])}
+    return draw(request, chart)
 
 
 if __name__ == "__main__":

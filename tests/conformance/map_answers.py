@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import random
+from enum import Enum
 from typing import Any
 
 import numpy as np
-
-NEIGHBOURS = ("_laneToLeft", "_laneToRight", "_fasterLane", "_slowerLane")
-LOOKED_UP = ("laneAt", "laneSectionAt", "laneGroupAt", "roadAt", "intersectionAt", "sidewalkAt", "shoulderAt")
+from map_attributes import ATTRIBUTES, LOOKED_UP, NETWORK_LOOK_UPS
+from scenic.core.distributions import RejectionException
+from scenic.core.vectors import Vector
 
 
 def at_points(network: Any, count: int, seed: int) -> list[dict[str, Any]]:
@@ -23,58 +24,80 @@ def at_points(network: Any, count: int, seed: int) -> list[dict[str, Any]]:
                 "x": float(point.x),
                 "y": float(point.y),
                 "direction": float(network.roadDirection[point].yaw),
-                **{name: _name(getattr(network, name)(point)) for name in LOOKED_UP},
+                **{name: plain(getattr(network, name)(point)) for name in NETWORK_LOOK_UPS},
+                "nominalDirectionsAt": [float(each.yaw) for each in network.nominalDirectionsAt(point)],
             }
         )
     return found
 
 
-def of_elements(network: Any) -> dict[str, dict[str, Any]]:
-    """What the elements say of each other, by name; lists whose order means nothing are sorted."""
-    found: dict[str, dict[str, Any]] = {}
-    for lane in network.lanes:
-        found[lane.uid] = {
-            "predecessor": _name(lane._predecessor),
-            "successor": _name(lane._successor),
-            "adjacentLanes": _names(lane.adjacentLanes),
-            "sections": [each.uid for each in lane.sections],
-            "maneuvers": sorted(map(_way, lane.maneuvers)),
-        }
-        for section in lane.sections:
-            known = {name: _name(getattr(section, name)) for name in NEIGHBOURS}
-            found[section.uid] = {**known, "isForward": bool(section.isForward)}
-    for group in network.laneGroups:
-        found[group.uid] = {"opposite": _name(group._opposite), "lanes": _names(group.lanes)}
-    for road in network.allRoads:
-        found[road.uid] = {"is1Way": bool(road.is1Way), "lanes": _names(road.lanes)}
-    for crossing in network.intersections:
-        found[crossing.uid] = {
-            "is3Way": bool(crossing.is3Way),
-            "is4Way": bool(crossing.is4Way),
-            "isSignalized": bool(crossing.isSignalized),
-            "incomingLanes": _names(crossing.incomingLanes),
-            "outgoingLanes": _names(crossing.outgoingLanes),
-            "maneuvers": sorted(
-                [
-                    _way(each),
-                    each.type.name,
-                    sorted(map(_way, each.reverseManeuvers)),
-                    sorted(map(_way, each.conflictingManeuvers)),
-                ]
-                for each in crossing.maneuvers
-            ),
-        }
+def of_elements(network: Any, count: int, seed: int) -> list[dict[str, Any]]:
+    """What the network and each element, maneuver and signal say, and what they say of some points.
+
+    Args:
+        network: Scenic's.
+        count: Points of each element; half of them lie in it, the others around it.
+        seed: Of the random numbers.
+    """
+    random.seed(seed)
+    np.random.seed(seed)
+    found = [{"kind": "Network", "name": "network", "says": _said(network, "Network")}]
+    for element in network.elements.values():
+        kind = type(element).__name__
+        points = [_place(element, inside=number % 2 == 0) for number in range(count)]
+        at = [_at_point(element, kind, point) for point in points]
+        found.append({"kind": kind, "name": element.uid, "says": _said(element, kind), "points": at})
+        for name, plural in (("Maneuver", "maneuvers"), ("Signal", "signals")):
+            own = getattr(element, plural, ()) if kind != "Lane" or name == "Signal" else ()
+            for number, each in enumerate(own):
+                found.append({"kind": name, "name": f"{element.uid}.{plural}[{number}]", "says": _said(each, name)})
     return found
 
 
-def _name(element: Any) -> str | None:
-    return None if element is None else str(element.uid)
+def _place(element: Any, inside: bool) -> Any:
+    if inside:
+        return element.uniformPointInner()
+    west, south, east, north = element.polygon.bounds
+    return Vector(random.uniform(west - 5, east + 5), random.uniform(south - 5, north + 5))
 
 
-def _names(elements: Any) -> list[str]:
-    return sorted({each.uid for each in elements})
+def _at_point(element: Any, kind: str, point: Any) -> dict[str, Any]:
+    asked = {name: plain(getattr(element, name)(point)) for name in LOOKED_UP.get(kind, ())}
+    asked["orientation"] = float(element.orientation[point].yaw)
+    asked["nominalDirectionsAt"] = [float(each.yaw) for each in element.nominalDirectionsAt(point)]
+    return {"x": float(point.x), "y": float(point.y), **asked}
 
 
-def _way(maneuver: Any) -> list[str]:
-    lanes = (maneuver.startLane, maneuver.connectingLane, maneuver.endLane)
-    return [lane.uid if lane else "" for lane in lanes]
+def _said(thing: Any, kind: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name in ATTRIBUTES[kind]:
+        try:
+            found[name] = plain(getattr(thing, name))
+        except RejectionException:
+            found[name] = "rejected"
+    return found
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON knows it: elements by name, regions by what they measure."""
+    if hasattr(value, "connectingLane"):
+        return [plain(lane) for lane in (value.startLane, value.connectingLane, value.endLane)]
+    if hasattr(value, "uid"):
+        return value.uid
+    if hasattr(value, "lineString"):
+        line = value.lineString
+        return {"points": len(value.points), "length": line.length, "middle": [line.centroid.x, line.centroid.y]}
+    if hasattr(value, "polygons"):
+        area = value.polygons
+        return {"area": area.area, "middle": [area.centroid.x, area.centroid.y]} if area.area else {"area": 0.0}
+    if isinstance(value, dict):
+        return {str(key): plain(each) for key, each in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain(each) for each in value]
+    if isinstance(value, frozenset):
+        return sorted(str(each) for each in value)
+    if isinstance(value, Enum):
+        return value.name
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    return {"area": 0.0}  # the empty region

@@ -131,13 +131,13 @@ class Original:
         """
         return self._ask({"points": count, "seed": seed})["points"]
 
-    def of_elements(self) -> dict[str, dict[str, Any]]:
-        """What its elements say of each other.
+    def of_elements(self, count: int, seed: int) -> list[dict[str, Any]]:
+        """What its elements say, of themselves and of some points each.
 
         Raises:
             SystemExit: The process has ended.
         """
-        return self._ask({"elements": True})["elements"]
+        return self._ask({"elements": count, "seed": seed})["elements"]
 
     def _ask(self, request: dict[str, Any]) -> Any:
         assert self._process.stdin is not None

@@ -158,7 +158,7 @@ def test_sections_and_their_neighbours() -> None:
     assert second.slowerLane is outer
     assert outer.laneToLeft is first
     assert outer.fasterLane is first
-    assert [one.id for one in lane(network, "inner").adjacentLanes] == ["outer", "back"]
+    assert [one.id for one in lane(network, "inner").adjacentLanes] == ["outer", "back", "outer"]
     assert [section.isForward for section in (first, second, outer, back)] == [True, True, True, False]
 
 
@@ -203,7 +203,10 @@ def test_regions() -> None:
     assert not Network("bare", []).sidewalkRegion.pieces
     assert network.laneRegion.orientation is network.roadRegion.orientation is network.roadDirection
     assert network.sidewalkRegion.orientation is None
-    assert lane(network, "inner").region.orientation is network.roadDirection
+    inner = lane(network, "inner")
+    assert inner.region.orientation is inner.orientation is not network.roadDirection
+    assert contains(network.roadRegion, 1, 5)
+    assert not contains(network.roadRegion, 7, 45), "the road inside the intersection is none of the roads"
 
 
 def test_lookups() -> None:
@@ -227,7 +230,6 @@ def test_lookups() -> None:
     assert name(network.elementAt(-5, 5)) == "edge"
     lookups = (network.laneAt, network.laneSectionAt, network.roadAt, network.intersectionAt, network.elementAt)
     assert [lookup(99, 99) for lookup in lookups] == [None] * 5
-    assert network.nominalDirectionsAt(-1, 5) == (math.pi,)
     assert network.roadDirection.values(9, 5) == (0.0,)
     assert network.roadDirection.values(45, 5) == ()
 

@@ -245,7 +245,11 @@ class ConditionReader:
         for term in terms:
             alternatives = [ARITHMETIC.add(total, more) for total in alternatives for more in bounds.intervals(term)]
         each = turned_within(own, alternatives, self.tolerance.of(index, "heading").size + SLACK, along)
-        return f"({own} IS NULL OR {each})" if each and along else each
+        return f"({own} IS NULL OR {self.off_lanes(along)}{each})" if each and along else each
+
+    def off_lanes(self, directions: str) -> str:
+        """That a place is off all lanes, with `OR`, where the columns of directions know less there than the map."""
+        return f"{directions.removesuffix('road_directions')}lane IS NULL OR " if self.road.beside else ""
 
     def heading_terms(self, index: int, node: Node, bounds: SqlBounds) -> tuple[str, Sequence[Node], str]:
         """A heading's column, the terms that it is the sum of, and the column of directions that one of them is.

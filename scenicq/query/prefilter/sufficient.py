@@ -168,7 +168,10 @@ class _Prover:
         alternatives, _ = _sum([_filled(term, bounds) for term in terms])
         # `turned_within` allows for slack where what is asked for is certain
         within = turned_within(own, alternatives, sure - SLACK, directions)
-        return " AND ".join([f"len({directions}) > 0"] * bool(directions) + [within] * bool(within)) or "true"
+        known = [f"len({directions}) > 0"] * bool(directions)
+        if directions and (off := self.reader.off_lanes(directions)):
+            known.append(f"NOT ({off}false)")
+        return " AND ".join([*known, *[within] * bool(within)]) or "true"
 
     def _position(
         self, index: int, node: Node, bounds: SqlBounds, sure: float

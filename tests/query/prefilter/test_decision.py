@@ -154,7 +154,7 @@ LEFT: dict[str, tuple[str, str, MatchOptions]] = {
         "lane = Uniform(*network.lanes)\nego = new Car\n"
         "turn = Uniform(*filter(lambda each: each.type is ManeuverType.STRAIGHT, lane.maneuvers))\n"
         "other = new Car on turn.endLane",
-        "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car\nother = new Car on lane",
+        "lane = Uniform(*Uniform(*network.roads).lanes)\nego = new Car\nother = new Car on lane, facing 30 deg",
         MatchOptions(),
     ),
     "three in a group": (
