@@ -19,7 +19,7 @@ from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
-__all__ = ["ONE_HEADING", "TIE", "DirectedAreas", "DirectedLane", "Pairs", "distinct_pairs"]
+__all__ = ["ONE_HEADING", "TIE", "AreaPairs", "DirectedAreas", "DirectedLane", "distinct_pairs"]
 
 TIE = 1e-9
 """Metres within which distances are the same."""
@@ -28,7 +28,7 @@ ONE_HEADING = 1e-6
 _DIGITS = 9
 """Of a radian, to which headings are one."""
 
-Pairs: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
+AreaPairs: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
 """Numbers of places and of the areas that belong to them, shapes (n,)."""
 
 
@@ -114,7 +114,7 @@ class DirectedAreas:
         away = segment_distances(np.array((x, y)), segments[own])
         return tuple(sorted({*headings[own][away <= away.min() + TIE].tolist()}))
 
-    def within(self, xy: Coordinates, reach: NDArray[np.float64]) -> Pairs:
+    def within(self, xy: Coordinates, reach: NDArray[np.float64]) -> AreaPairs:
         """Pairs (point, area) that are within reach of each other; shapes (n, 2) and (n,)."""
         if not len(self):
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
@@ -122,7 +122,7 @@ class DirectedAreas:
         near = shapes.within_many(self.areas[area], shapes.points(xy)[point], reach[point])
         return point[near], area[near]
 
-    def nearest(self, xy: Coordinates, reach: float, more: NDArray[np.float64] | float = 0.0) -> Pairs:
+    def nearest(self, xy: Coordinates, reach: float, more: NDArray[np.float64] | float = 0.0) -> AreaPairs:
         """Pairs (point, area) of the areas within reach that are nearest, or by so much more, ties included."""
         if not len(self):
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
@@ -135,14 +135,14 @@ class DirectedAreas:
         near = (least[point] <= reach + more[point]) & (away <= least[point] + 2 * more[point] + TIE)
         return point[near], area[near]
 
-    def headings_of(self, xy: Coordinates, pairs: Pairs) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def headings_of(self, xy: Coordinates, pairs: AreaPairs) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Pairs (point, heading) of the nearest segments of each point's areas, ties included, in the areas' order."""
         order = np.lexsort(pairs[::-1])
         point, segment = self._nearest_segments(xy, (pairs[0][order], pairs[1][order]), np.zeros(len(xy)))
         return point, self.segments[1][segment]
 
     def headings_around(
-        self, xy: Coordinates, pairs: Pairs, radius: NDArray[np.float64]
+        self, xy: Coordinates, pairs: AreaPairs, radius: NDArray[np.float64]
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """The same for all points within a radius (n,) of each, with headings rounded, each pair once."""
         point, segment = self._nearest_segments(xy, pairs, 2 * radius)
@@ -152,7 +152,7 @@ class DirectedAreas:
         found = found[np.diff(found, prepend=-1) != 0]
         return found // max(1, len(distinct)), distinct[found % max(1, len(distinct))]
 
-    def _nearest_segments(self, xy: Coordinates, pairs: Pairs, more: NDArray[np.float64]) -> Pairs:
+    def _nearest_segments(self, xy: Coordinates, pairs: AreaPairs, more: NDArray[np.float64]) -> AreaPairs:
         """Pairs (point, segment) of the nearest segments of each point's areas, and those farther by no more."""
         segments, _, starts = self.segments
         point, area = pairs
@@ -165,7 +165,7 @@ class DirectedAreas:
         chosen = np.nonzero(away <= best[pair] + more[point[pair]] + TIE)[0]
         return point[pair[chosen]], segment[chosen]
 
-    def covering(self, boxes: NDArray[np.float64], pairs: Pairs) -> NDArray[np.bool_]:
+    def covering(self, boxes: NDArray[np.float64], pairs: AreaPairs) -> NDArray[np.bool_]:
         """Which of some boxes (n, 4) one of their areas covers."""
         box, area = pairs
         covered = np.zeros(len(boxes), dtype=bool)

@@ -17,7 +17,7 @@ from scenicq.geometry.directed_areas import TIE, DirectedAreas
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["Surroundings"]
+__all__ = ["OffLanes"]
 
 _MARGIN = 0.01
 """Metres by which a box of cells is grown."""
@@ -43,7 +43,7 @@ class _Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
+class OffLanes:
     """What counts off some areas.
 
     Attributes:

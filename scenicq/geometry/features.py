@@ -13,7 +13,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry import shapes
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["LINES", "REFERENCES", "MapFeature", "ProblemSink", "dangling", "names", "read_geojson"]
+__all__ = ["LINES", "REFERENCES", "MapFeature", "ProblemSink", "dangling", "farthest", "names", "read_geojson"]
 
 ProblemSink = Callable[[str, str], None]
 """Takes the id of a feature ("" if it has none) and what is wrong with it."""
@@ -73,6 +73,14 @@ def names(feature: MapFeature, key: str) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     return tuple(str(item) for item in cast("Iterable[Any]", value) if item is not None)
+
+
+def farthest(feature: MapFeature) -> float:
+    """The largest coordinate of a feature's shape and lines, without its sign, in metres."""
+    lines = [line for key in LINES for line in cast("list[list[list[float]]]", feature.properties.get(key) or [])]
+    return max(
+        (abs(each) for each in (*feature.shape.bounds, *(x for line in lines for xy in line for x in xy))), default=0.0
+    )
 
 
 def dangling(features: Iterable[MapFeature]) -> list[tuple[str, str]]:

@@ -19,8 +19,8 @@ from shapely import LineString
 
 from scenicq.geometry import shapes
 from scenicq.geometry.cell_guards import Off
-from scenicq.geometry.directed_areas import ONE_HEADING, TIE, DirectedAreas, DirectedLane, Pairs, distinct_pairs
-from scenicq.geometry.direction_surroundings import Surroundings
+from scenicq.geometry.directed_areas import ONE_HEADING, TIE, AreaPairs, DirectedAreas, DirectedLane, distinct_pairs
+from scenicq.geometry.direction_surroundings import OffLanes
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
@@ -154,7 +154,7 @@ class RoadDirection:
         owner, heading = areas.headings_of(xy[left], pairs)
         return np.concatenate([*owners, left[owner]]), np.concatenate([*headings, heading])
 
-    def _off_all(self, xy: Coordinates, radius: NDArray[np.float64]) -> tuple[DirectedAreas, Pairs]:
+    def _off_all(self, xy: Coordinates, radius: NDArray[np.float64]) -> tuple[DirectedAreas, AreaPairs]:
         """What counts at points off lanes and what is beside them, or within a radius (n,) of such points."""
         if len(self._elsewhere):
             return self._elsewhere, (np.arange(len(xy)), np.zeros(len(xy), dtype=np.intp))
@@ -181,8 +181,8 @@ class RoadDirection:
         return distinct_pairs(np.concatenate([each for each, _ in found]), np.concatenate([each for _, each in found]))
 
     @cached_property
-    def _surroundings(self) -> Surroundings:
-        return Surroundings(self._lanes, self._beside, self._elsewhere, self.farthest)
+    def _surroundings(self) -> OffLanes:
+        return OffLanes(self._lanes, self._beside, self._elsewhere, self.farthest)
 
 
 def along_lines(lines: Sequence[Shape], name: str) -> RoadDirection:

@@ -295,11 +295,11 @@ def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict
 
 def _element_problem(feature: MapFeature) -> str | None:
     """What an element of a map has that no dataset may have."""
-    if not _farthest(feature) <= FARTHEST_M:
-        return "is at no place on a map"
-    from scenicq.geometry.features import REFERENCES, names  # noqa: PLC0415 - slow to load, and for maps
+    from scenicq.geometry.features import REFERENCES, farthest, names  # noqa: PLC0415 - slow to load, and for maps
     from scenicq.store.map_validation import properties_problem  # noqa: PLC0415 - the same
 
+    if not farthest(feature) <= FARTHEST_M:
+        return "is at no place on a map"
     # the centreline is numbers by now, and most of what there is
     properties = {key: value for key, value in feature.properties.items() if key != "centerline"}
     if problem := properties_problem(feature.kind, json_object(json.dumps(properties))):
@@ -308,16 +308,6 @@ def _element_problem(feature: MapFeature) -> str | None:
     for key in REFERENCES.get(feature.kind, {}):
         texts += names(feature, key) if key in feature.properties else ()
     return f"has a name of more than {LONGEST_NAME} characters" if max(map(len, texts)) > LONGEST_NAME else None
-
-
-def _farthest(feature: MapFeature) -> float:
-    """The largest coordinate of an element's shape and lines, without its sign."""
-    from scenicq.geometry.features import LINES  # noqa: PLC0415 - slow to load, and for maps
-
-    lines = [line for key in LINES for line in cast("list[list[list[float]]]", feature.properties.get(key) or [])]
-    return max(
-        (abs(each) for each in (*feature.shape.bounds, *(x for line in lines for xy in line for x in xy))), default=0.0
-    )
 
 
 def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapFeature, ...]]:
