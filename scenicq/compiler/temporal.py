@@ -69,10 +69,14 @@ class TimedStatements:
         self.used = True
         self._requirements.append(TemporalRequirement(self._formula(deferred, wanted), span))
 
-    def end(self, span: Span, *, condition: Callable[[], Node] | None = None, after_s: float | None = None) -> None:
+    def end(
+        self, span: Span, *, condition: Callable[[], Node] | None = None, after_s: float | None = None,
+        simulation: bool = False,
+    ) -> None:  # fmt: skip
         """Add what ends a run."""
         self.used = True
-        self._terminations.append(Termination(span, None if condition is None else self.atom(condition), after_s))
+        atom = None if condition is None else self.atom(condition)
+        self._terminations.append(Termination(span, atom, after_s, simulation))
 
     def watch(self, monitor: Monitor) -> None:
         """Add a monitor."""

@@ -67,7 +67,8 @@ def timed_statement(
                 raise fail("wrong-type", "this is no monitor", node.monitor.span, f"this is {describe(value)}")
             _watch(run, timed, value, node.span)
         case ast.DynamicStatement(kind="terminate when" | "terminate simulation") if node.operand is not None:
-            timed.end(node.span, condition=deferred(run, node.operand, scope, node.span))
+            simulation = node.kind == "terminate simulation"
+            timed.end(node.span, condition=deferred(run, node.operand, scope, node.span), simulation=simulation)
         case ast.DynamicStatement(kind="terminate after"):
             timed.end(node.span, after_s=_seconds(run, node, scope))
         case _:

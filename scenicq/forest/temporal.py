@@ -126,11 +126,14 @@ class Termination:
         span: Where the program says it.
         condition: `terminate when C`: at the first sample where it holds.
         after_s: `terminate after N seconds`: at the first sample at least so many seconds after the start.
+        simulation: Whether the condition is read after the monitors of the sample (`terminate simulation when`), not
+            before.
     """
 
     span: Span
     condition: Atom | None = None
     after_s: float | None = None
+    simulation: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,8 @@ from scenicq.smt.answer import Solver
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
 from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
 from scenicq.temporal.hidden_examples import ExampleOutcome, Examples, Remembered, examine_start
-from scenicq.temporal.run_columns import RunColumns, Runs
-from scenicq.temporal.runs import Run
+from scenicq.temporal.run_columns import RunColumns
+from scenicq.temporal.runs import Run, Runs
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.thresholds import thresholds_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -148,10 +148,8 @@ class HiddenRuns:
         for cell in cells(columns, expanded):
             look()
             runs = self._in_cell(stretch, columns.assigned(cell.values), expanded)
-            for mine, start, end, truth, broken, cut_off in zip(
-                found, starts, runs.ends.tolist(), runs.truth.tolist(), runs.broken, runs.cut_off.tolist(), strict=True
-            ):
-                mine.append((Run(start, end, truth, broken, cut_off), cell))
+            for number, (mine, start) in enumerate(zip(found, starts, strict=True)):
+                mine.append((runs.run(number, start), cell))
         matched_again = 0
         for number, mine in zip(stretch.numbers.tolist(), found, strict=True):
             ranked = sorted(mine, key=lambda each: (-each[0].truth, -each[0].end))
@@ -207,9 +205,7 @@ class HiddenRuns:
                 values[each.number] = columns.truth_of(expanded[each.number])
             return values[each.number]
 
-        runs = self.runs.follow(one, atom)
-        start, end = int(one.starts[0]), int(runs.ends[0])
-        return Run(start, end, int(runs.truth[0]), runs.broken[0], bool(runs.cut_off[0]), bool(runs.open_[0]))
+        return self.runs.follow(one, atom).run(0, int(one.starts[0]))
 
     def _in_cell(self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node]) -> Runs:
         known: dict[int, Truth] = {}

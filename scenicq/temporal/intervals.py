@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from scenicq.errors import Span
 from scenicq.forest.condition import expand
-from scenicq.forest.nodes import Feature, Node
+from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.preprocess import ready
 from scenicq.match.verdict import WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.tracks import TrackKey
@@ -28,9 +29,9 @@ from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
 from scenicq.temporal.hidden_runs import Detail, HiddenFound, HiddenRuns, Remembered
 from scenicq.temporal.interval_options import IntervalOptions
+from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
 from scenicq.temporal.presence import by_presence
 from scenicq.temporal.run_columns import RunColumns
-from scenicq.temporal.samples import MOVING
 from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -78,6 +79,33 @@ class _Found:
     cut_off: NDArray[np.bool_]
     details: Mapping[tuple[int, int], Detail]
 
+    def renumbered(self, numbers: NDArray[np.int64]) -> _Found:
+        """The same with other numbers of the starts."""
+        details = {(int(numbers[origin]), end): each for (origin, end), each in self.details.items()}
+        return replace(self, origins=numbers[self.origins], details=details)
+
+
+@dataclass(eq=False, slots=True)
+class _Program:
+    """What the program says about time with one outcome of its choices, made ready.
+
+    Attributes:
+        scenario: The scenario with this outcome.
+        runs: What it says; None where it says nothing.
+        apart: Whether what is read at the start of a run is another value for each.
+    """
+
+    scenario: Scenario
+    runs: RunColumns | None = field(init=False)
+    apart: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Make ready."""
+        scenario, dynamics = self.scenario, self.scenario.dynamics
+        self.runs = None if dynamics is None else RunColumns(dynamics)
+        conditions = () if dynamics is None else dynamics.conditions
+        self.apart = any(reads_start(expand(each, lambda f: steady_value(scenario, f))) for each in conditions)
+
 
 @dataclass(eq=False)
 class IntervalMatcher:
@@ -88,26 +116,25 @@ class IntervalMatcher:
         match: Options of the matcher, for initial scenes.
         options: Of intervals.
         solver: Decides what is not decided otherwise.
+        outcomes: The outcomes of the choices that conditions over time hang on.
     """
 
     scenario: Scenario
     match: MatchOptions
     options: IntervalOptions
     solver: Solver | None = None
+    outcomes: tuple[Outcome, ...] = field(init=False)
+    _programs: dict[int, _Program] = field(init=False, default_factory=dict["int", _Program])
 
     def __post_init__(self) -> None:
-        """Make ready what the program says about time."""
-        dynamics = self.scenario.dynamics
-        self._runs = None if dynamics is None else RunColumns(dynamics)
-        # what is read at the start of a run is another value for each
-        still = [] if dynamics is None else [expand(each, self._own_value) for each in dynamics.conditions]
-        self._apart = any(map(reads_start, still))
+        """Split off the choices."""
+        self.scenario = ready(self.scenario)
+        self.outcomes = outcomes_of(self.scenario)
 
-    def _own_value(self, feature: Feature) -> Node | None:
-        """What the program says of a property that does not change, should no label tell."""
-        if feature.property in MOVING:
-            return None
-        return self.scenario.objects[feature.object].properties[feature.property].value
+    def _program(self, outcome: int) -> _Program:
+        if outcome not in self._programs:
+            self._programs[outcome] = _Program(self.outcomes[outcome].scenario)
+        return self._programs[outcome]
 
     def intervals(self, table: StartTable, remember: Callable[[int], Remembered]) -> list[IntervalVerdict]:
         """What became of each binding: the intervals to report, or else the one that came furthest.
@@ -121,37 +148,42 @@ class IntervalMatcher:
         """
         order, bindings = _sorted(table)
         table = table.chosen(order)
-        parts = [
-            part
-            for stretches in stretches_of(table, self.options.gap_s, apart=self._apart)
-            for part in self._followed(stretches, table, lambda number: remember(int(order[number])))
-        ]
+        parts: list[_Found] = []
+        for outcome in cast("list[int]", np.unique(table.outcomes).tolist()):
+            which = np.flatnonzero(table.outcomes == outcome)
+            own, program = table.chosen(which), self._program(outcome)
+
+            def remembered(number: int, which: NDArray[np.int64] = which) -> Remembered:
+                return remember(int(order[which[number]]))
+
+            for stretches in stretches_of(own, self.options.gap_s, apart=program.apart):
+                parts += (part.renumbered(which) for part in self._followed(program, stretches, own, remembered))
         found = [each for part in self._reported(parts, table, bindings) for each in part]
         found = [replace(each, origin=int(order[each.origin])) for each in found]
         return sorted(found, key=lambda each: (each.recording, each.start, each.end, each.binding))
 
     def _followed(
-        self, stretches: Stretches, table: StartTable, remember: Callable[[int], Remembered]
+        self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], Remembered]
     ) -> Iterator[_Found]:
         """The runs of some stretches, those together in which the same features are observed."""
-        dynamics = self.scenario.dynamics
+        dynamics = program.scenario.dynamics
         if dynamics is None:
             yield _static(stretches, table)
             return
         for chosen_ in by_presence(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
             some = stretches if len(chosen_) == len(stretches.labels) else stretches.some(chosen_)
-            columns = AtomColumns(self.scenario, some.places, start=some.heads())
+            columns = AtomColumns(program.scenario, some.places, start=some.heads())
             expanded = [columns.expanded(condition) for condition in dynamics.conditions]
-            yield self._dynamic(some, table, columns, expanded, remember)
+            yield self._dynamic(program, some, table, columns, expanded, remember)
 
     def _dynamic(
-        self, stretches: Stretches, table: StartTable, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        self, program: _Program, stretches: Stretches, table: StartTable, columns: AtomColumns,
+        expanded: Sequence[Node], remember: Callable[[int], Remembered],
     ) -> _Found:  # fmt: skip
-        assert self._runs is not None
+        assert program.runs is not None
         if random_variables(expanded):
             every = self.options.intervals == "all"
-            hidden = HiddenRuns(self._runs, self.scenario, self.match, self.solver, every)
+            hidden = HiddenRuns(program.runs, program.scenario, self.match, self.solver, every)
             return _found(stretches, table, hidden.follow(stretches, columns, expanded, remember))
         known: dict[int, Truth] = {}
 
@@ -160,7 +192,7 @@ class IntervalMatcher:
                 known[each.number] = columns.truth_of(expanded[each.number])
             return known[each.number]
 
-        return _found(stretches, table, HiddenFound(self._runs.follow(stretches, atom)))
+        return _found(stretches, table, HiddenFound(program.runs.follow(stretches, atom)))
 
     def _reported(
         self, parts: Sequence[_Found], table: StartTable, bindings: NDArray[np.int64]
@@ -181,7 +213,8 @@ class IntervalMatcher:
         least = self.options.min_duration_s or 0.0
         order = np.lexsort((starts, bindings[origins]))
         groups = bindings[origins][order]
-        for mine in np.split(order, np.flatnonzero(np.diff(groups)) + 1):
+        for group in np.split(order, np.flatnonzero(np.diff(groups)) + 1):
+            mine = group if len(self.outcomes) == 1 else _surest(group, starts, ends, truth)
             kept = mine[chosen(starts[mine], ends[mine], truth[mine], lasting[mine], self.options.intervals, least)]
             matches = len(kept) > 0
             if not matches:
@@ -208,12 +241,22 @@ class IntervalMatcher:
         first, _ = block.runs[recording]
         binding = tuple((index, block.key(int(members[origin]))) for index, members in sorted(table.members.items()))
         reason, witness = detail
+        made = self.outcomes[int(table.outcomes[origin])].witness
         if truth == UNKNOWN and table.sure[origin]:
             reason = reason or "unobserved"
         return IntervalVerdict(
             span[0] - first, span[1] - first, truth, binding, recording, origin,
-            witness if truth == TRUE else {}, reason, broken, cut_off,
+            {**made, **witness} if truth == TRUE else {}, reason, broken, cut_off,
         )  # fmt: skip
+
+
+def _surest(
+    mine: NDArray[np.int64], starts: NDArray[np.int64], ends: NDArray[np.int64], truth: Truth
+) -> NDArray[np.int64]:
+    """The numbers of runs without those that another outcome makes as sure at least, from one sample to another."""
+    ordered = mine[np.lexsort((-truth[mine].astype(np.int64), ends[mine], starts[mine]))]
+    same = (starts[ordered][1:] == starts[ordered][:-1]) & (ends[ordered][1:] == ends[ordered][:-1])
+    return ordered[np.concatenate(([True], ~same))]
 
 
 def _sorted(table: StartTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -11,44 +11,15 @@ from numpy.typing import NDArray
 
 from scenicq.forest.temporal import Atom, Dynamics
 from scenicq.temporal.occurrences import Clause, bounds, clauses_of, joined, next_at
-from scenicq.temporal.runs import SLACK_S, Run, runs_from
+from scenicq.temporal.run_lanes import follow_lanes, times_out
+from scenicq.temporal.run_machine import RunMachine
+from scenicq.temporal.runs import Runs
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["RunColumns", "Runs", "ends_of"]
+__all__ = ["RunColumns", "ends_of"]
 
 Places = NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True)
-class Runs:
-    """What became of runs, side by side; see `Run`.
-
-    Attributes:
-        ends: Last places, shape (m,).
-        truth: Whether they match.
-        broken: What keeps each from matching, as an array of `Span | None`.
-        cut_off: Whether the samples are over before the program ends.
-        open_: Whether a later end is not excluded.
-    """
-
-    ends: Places
-    truth: Truth
-    broken: NDArray[np.object_]
-    cut_off: NDArray[np.bool_]
-    open_: NDArray[np.bool_]
-
-    @classmethod
-    def unknown(cls, ends: Places) -> Runs:
-        """Runs of which nothing is known, with their ends."""
-        n = len(ends)
-        return cls(ends, np.full(n, UNKNOWN), np.full(n, None, dtype=object), *np.zeros((2, n), np.bool_))
-
-    def put(self, where: slice, found: Sequence[Run], first: int) -> None:
-        """Write down what became of the runs of one stretch, which begins at place `first`."""
-        for place, run in zip(range(where.start, where.stop), found, strict=True):
-            self.ends[place], self.truth[place] = first + run.end, run.truth
-            self.broken[place], self.cut_off[place], self.open_[place] = run.broken, run.cut_off, run.open_
 
 
 @dataclass(eq=False, slots=True)
@@ -59,14 +30,17 @@ class RunColumns:
         dynamics: The program.
         clauses: Of each requirement; None if one has none or there are monitors.
         together: Of all of them.
+        machine: Decides what these do not.
     """
 
     dynamics: Dynamics
+    machine: RunMachine = field(init=False)
     clauses: list[list[Clause]] | None = field(init=False, default=None)
     together: list[Clause] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         """Find the clauses."""
+        self.machine = RunMachine(self.dynamics)
         found = [clauses_of(requirement.formula) for requirement in self.dynamics.requirements]
         known = [each for each in found if each is not None]
         if len(known) == len(found) and not self.dynamics.monitors:
@@ -80,10 +54,25 @@ class RunColumns:
             stretches: Stretches with their starts.
             atom: The value of an atom at each place.
         """
+        known: dict[int, Truth] = {}
+
+        def once(each: Atom) -> Truth:
+            if each.number not in known:
+                known[each.number] = atom(each)
+            return known[each.number]
+
+        every = np.arange(len(stretches.starts))
         if self.clauses is None:
-            return self._one_by_one(stretches, atom, Runs.unknown(stretches.starts.copy()))
-        if not self.dynamics.terminates:
-            return self._open(stretches, atom)
+            return follow_lanes(self.machine, stretches, once, every)
+        runs = self._closed(stretches, once) if self.dynamics.terminates else self._open(stretches, once)
+        left = every[(runs.truth == UNKNOWN) | runs.open_ | runs.cut_off]
+        if len(left):
+            runs.replace(left, follow_lanes(self.machine, stretches, once, left))
+        return runs
+
+    def _closed(self, stretches: Stretches, atom: Callable[[Atom], Truth]) -> Runs:
+        """Runs of a program that says when it ends; unknown where the end is."""
+        assert self.clauses is not None
         ends, over, unclear = ends_of(self.dynamics, stretches, atom)
         starts = stretches.starts
         truth = np.where(over, FALSE, TRUE)
@@ -93,20 +82,15 @@ class RunColumns:
             may = _hold(clauses, atom, int(UNKNOWN), starts, ends)
             broken[~may & (truth > FALSE)] = requirement.span
             truth = np.minimum(truth, np.where(sure, TRUE, np.where(may, UNKNOWN, FALSE)))
-        runs = Runs(ends, truth, broken, over, np.zeros(len(starts), np.bool_))
-        return self._one_by_one(stretches, atom, runs, unclear) if unclear.any() else runs
+        truth[unclear] = UNKNOWN
+        return Runs(ends, truth, broken, over, *np.zeros((2, len(starts)), np.bool_))
 
     def _open(self, stretches: Stretches, atom: Callable[[Atom], Truth]) -> Runs:
         """Runs that may end anywhere."""
         assert self.together is not None
         assert self.clauses is not None
         starts, last = stretches.starts, stretches.ends()
-        runs = Runs(
-            starts.copy(),
-            np.full(len(starts), FALSE),
-            np.full(len(starts), None, object),
-            *np.zeros((2, len(starts)), np.bool_),
-        )
+        runs = Runs.lost(starts.copy())
         for level in (UNKNOWN, TRUE):
             best = np.full(len(starts), -1)
             for clause in self.together:
@@ -121,24 +105,6 @@ class RunColumns:
             may = _hold(clauses, atom, int(UNKNOWN), starts[lost], starts[lost])
             runs.broken[lost[~may]] = requirement.span
             lost = lost[may]
-        return runs
-
-    def _one_by_one(
-        self, stretches: Stretches, atom: Callable[[Atom], Truth], runs: Runs, which: NDArray[np.bool_] | None = None
-    ) -> Runs:
-        """The runs of those stretches decided by themselves that have one of some starts."""
-        known: dict[int, Truth] = {}
-        for places, mine in stretches.apart():
-            if which is not None and not which[mine].any():
-                continue
-
-            def part(each: Atom, places: slice = places) -> Truth:
-                if each.number not in known:
-                    known[each.number] = atom(each)
-                return known[each.number][places]
-
-            starts = (stretches.starts[mine] - places.start).tolist()
-            runs.put(mine, runs_from(self.dynamics, part, stretches.seconds[places], starts), places.start)
         return runs
 
 
@@ -160,11 +126,7 @@ def ends_of(
     sure, possible = next_at(ended == TRUE)[starts], next_at(ended >= UNKNOWN)[starts]
     ends = np.minimum(sure, last + 1)
     after_s = min((each.after_s for each in dynamics.terminations if each.after_s is not None), default=math.inf)
-    if math.isfinite(after_s):
-        for places, mine in stretches.apart():
-            seconds, own = stretches.seconds[places], starts[mine]
-            late = np.searchsorted(seconds, stretches.seconds[own] + after_s - SLACK_S) + places.start
-            ends[mine] = np.minimum(ends[mine], np.maximum(late, own))
+    ends = np.minimum(ends, times_out(stretches, after_s))
     over = ends > last
     return np.minimum(ends, last), over, np.minimum(possible, last + 1) < np.where(over, last + 1, ends)
 

@@ -27,11 +27,12 @@ from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.plan_cache import PlanCache
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns
+from scenicq.temporal.outcomes import Outcome
 from scenicq.temporal.presence import by_presence, observes
 from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["RoleCandidates", "StartSearch", "Starts", "classes_of_twins"]
+__all__ = ["RoleCandidates", "StartSearch", "Starts", "classes_of_twins", "narrowed", "with_outcome"]
 
 Members = NDArray[np.int64]
 _MOST_TUPLES = 64
@@ -73,11 +74,11 @@ class Starts:
 
 
 @dataclass(eq=False)
-class _Rest(PlanCache):
-    """The plans without requirements that are known to hold; they still tell objects apart.
+class _Derived(PlanCache):
+    """The plans of a scenario that is made from another one: what told objects apart there still does.
 
     Attributes:
-        whole: The plans with them.
+        whole: The plans of the other one.
     """
 
     whole: PlanCache = field(kw_only=True)
@@ -87,10 +88,16 @@ class _Rest(PlanCache):
         self.relevant = self.whole.relevant
 
     def plan(self, signature: Signature) -> MatchPlan:
-        """The groups that are left for a signature."""
+        """The groups for a signature."""
         if signature not in self.plans:
             self.plans[signature] = replace(super().plan(signature), twins=self.whole.plan(signature).twins)
         return self.plans[signature]
+
+
+def with_outcome(matcher: Matcher, outcome: Outcome) -> Matcher:
+    """The matcher of a scenario with one outcome of its choices over time."""
+    plans = _Derived(outcome.scenario, matcher.options, whole=matcher.plans)
+    return Matcher(outcome.scenario, matcher.options, matcher.solver, plans)
 
 
 @dataclass(eq=False)
@@ -125,7 +132,7 @@ class StartSearch:
             mine = {id(requirement) for found in self.plain.values() for requirement in found}
             left = tuple(each for each in scenario.requirements if id(each) not in mine)
             left_over = replace(scenario, requirements=left)
-            plans = _Rest(left_over, options, whole=self.matcher.plans)
+            plans = _Derived(left_over, options, whole=self.matcher.plans)
             self.rest = Matcher(left_over, options, self.matcher.solver, plans)
         compared = {name for name, given in scenario.params.items() if given.explicit}
         # parameters are the labels' own, and not in arrays
@@ -159,9 +166,9 @@ class StartSearch:
             kept[where[holds > FALSE]] = True
             sure[where[holds == UNKNOWN]] = False
             if role != scenario.ego:
-                narrowed = np.zeros(len(candidates.members), np.bool_)
-                narrowed[chosen[holds > FALSE]] = True
-                may[role] = narrowed
+                still = np.zeros(len(candidates.members), np.bool_)
+                still[chosen[holds > FALSE]] = True
+                may[role] = still
             # what a label is excluded by is what its first candidate fails at
             gone = np.flatnonzero(~kept & ~out)
             first = np.full(n, -1)
@@ -176,7 +183,7 @@ class StartSearch:
         starts, decided = self._correspondences(block, candidates, np.flatnonzero(sure & ~out))
         left = ~out
         left[decided] = False
-        return Starts(starts, _narrowed(candidates, left, place), sure[left], failed)
+        return Starts(starts, narrowed(candidates, left, place), sure[left], failed)
 
     def _plain(self, places: BoundSamples, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
         """Whether all requirements hold at each place, and the number of the first that does not, -1 if none."""
@@ -310,7 +317,7 @@ def _in_order(block: TrackBlock, plan: MatchPlan, members: dict[int, Members], c
     return True
 
 
-def _narrowed(candidates: RoleCandidates, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> RoleCandidates:
+def narrowed(candidates: RoleCandidates, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> RoleCandidates:
     """The candidates of some of its labels; `place` is the label of each of its members."""
     mine = kept[place]
     return RoleCandidates(

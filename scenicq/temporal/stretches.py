@@ -6,7 +6,7 @@ make a stretch: from the first start to the last sample of that life.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,11 +30,13 @@ class StartTable:
         block: The recordings.
         members: By object of the scenario, who plays it, shape (m,).
         sure: Whether it is a match, shape (m,).
+        outcomes: With which outcome of the choices over time, by number, shape (m,).
     """
 
     block: TrackBlock
     members: Mapping[int, Members]
     sure: NDArray[np.bool_]
+    outcomes: NDArray[np.int64]
 
     def __len__(self) -> int:
         """The number of starts."""
@@ -47,7 +49,15 @@ class StartTable:
 
     def chosen(self, which: NDArray[np.int64]) -> StartTable:
         """Some of them."""
-        return StartTable(self.block, {index: mine[which] for index, mine in self.members.items()}, self.sure[which])
+        members = {index: mine[which] for index, mine in self.members.items()}
+        return StartTable(self.block, members, self.sure[which], self.outcomes[which])
+
+    @classmethod
+    def joined(cls, parts: Sequence[StartTable]) -> StartTable:
+        """Tables of one block one after the other."""
+        members = {index: np.concatenate([part.members[index] for part in parts]) for index in parts[0].members}
+        sure, outcomes = (np.concatenate([getattr(part, name) for part in parts]) for name in ("sure", "outcomes"))
+        return cls(parts[0].block, members, sure, outcomes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,8 @@ from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.folding import folded
 from scenicq.temporal.hidden import UnclearVariable, affine_sides, inside, support
 from scenicq.temporal.occurrences import Clause, FormulaPart, PartKind, bounds
-from scenicq.temporal.run_columns import RunColumns, Runs, ends_of
+from scenicq.temporal.run_columns import RunColumns, ends_of
+from scenicq.temporal.runs import Runs
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -159,7 +160,8 @@ def thresholds_of(
             broken[left] = runs.dynamics.requirements[-1].span
     except (_NoInterval, UnclearVariable):
         return None
-    return Thresholds(Runs(ends, truth, broken, over, np.zeros(len(ends), np.bool_)), values, unclear | (thin & ~over))
+    runs_ = Runs(ends, truth, broken, over, *np.zeros((2, len(ends)), np.bool_))
+    return Thresholds(runs_, values, unclear | (thin & ~over))
 
 
 @dataclass(eq=False, slots=True)

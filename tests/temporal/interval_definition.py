@@ -318,16 +318,17 @@ def matches(program: Program, trace: Trace, binding: dict[str, str], truth: Trut
         if last < 0 or (program.start is not None and not truth(program.start, i)):
             continue
         for j in range(i, last + 1):
-            done = [monitored(kind, atoms, truth, i, j) for kind, atoms in program.monitors]
-            ended = any(truth(each, j) for each in program.ends) or "end" in done
             late = [
                 k
                 for k in range(i, j + 1)
                 if program.after_s is not None and trace[k].time - trace[i].time >= program.after_s - 1e-6
             ]
+            # these stop the monitors before they run
+            stopped = any(truth(each, j) for each in program.ends) or bool(late and late[0] == j)
+            done = [monitored(kind, atoms, truth, i, j - stopped) for kind, atoms in program.monitors]
             before = any(truth(each, k) for each in program.ends for k in range(i, j)) or "ended" in done
-            before = before or bool(late and late[0] < j)
-            over = ended or bool(late and late[0] == j)
+            before = before or bool(late and late[0] < j) or (stopped and "end" in done)
+            over = stopped or "end" in done
             if program.terminates and (before or not over):
                 continue
             if "reject" not in done and all(holds(f, truth, i, j) for f in program.requirements):

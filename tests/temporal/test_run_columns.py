@@ -16,7 +16,7 @@ from scenicq.store.writer import write_dataset
 from scenicq.temporal import hidden_runs
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.run_columns import RunColumns
-from scenicq.temporal.runs import runs_from
+from scenicq.temporal.run_lanes import follow_lanes
 from scenicq.temporal.starts import StartSearch
 from scenicq.temporal.stretches import Stretches
 
@@ -40,7 +40,7 @@ def random_dynamics(draw: random.Random) -> Dynamics:
     return Dynamics((), tuple(requirements), tuple(ends))
 
 
-def test_runs_side_by_side_are_those_of_each_stretch():
+def test_runs_by_clauses_are_those_of_the_machine():
     draw = random.Random(3)
     decided = 0
     for _ in range(600):
@@ -51,15 +51,11 @@ def test_runs_side_by_side_are_those_of_each_stretch():
         columns = RunColumns(dynamics)
         decided += columns.clauses is not None
         found = columns.follow(stretches, lambda atom, truth=truth: truth[atom.number])
-        for places, mine in stretches.apart():
-            starts = (stretches.starts[mine] - places.start).tolist()
-            alone = runs_from(
-                dynamics, lambda atom, truth=truth, places=places: truth[atom.number][places],
-                stretches.seconds[places], starts,
-            )  # fmt: skip
-            for place, run in zip(range(mine.start, mine.stop), alone, strict=True):
-                got = found.ends[place] - places.start, found.truth[place], found.broken[place], found.cut_off[place]
-                assert got == (run.end, run.truth, run.broken, run.cut_off), dynamics
+        alone = follow_lanes(
+            columns.machine, stretches, lambda atom, truth=truth: truth[atom.number], np.arange(len(stretches.starts))
+        )
+        for number, start in enumerate(stretches.starts.tolist()):
+            assert found.run(number, start) == alone.run(number, start), dynamics
     assert decided > 200
 
 

@@ -32,7 +32,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import And, Atom, Dynamics, Formula, Goto, MonitorStep, Or, Test, Wait, operands
-from scenicq.forest.walk import children, is_leaf, leaves, postorder
+from scenicq.forest.walk import children, features, is_leaf, leaves, postorder
 from scenicq.geometry.regions import DifferenceOf, IntersectionOf, UnionOf
 from scenicq.match.tolerance import Tolerance
 
@@ -97,18 +97,26 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
 
 
 def interchangeable(
-    scenario: Scenario, groups: Sequence[Group], shapes: Sequence[GroupShape], tolerance: Tolerance
-) -> Mapping[int, int]:
+    scenario: Scenario, groups: Sequence[Group], shapes: Sequence[GroupShape], tolerance: Tolerance,
+    used: Sequence[frozenset[str]] = (),
+) -> Mapping[int, int]:  # fmt: skip
     """Interchangeable objects: for each, the one before it that swapping with changes nothing.
 
     Two objects are interchangeable if they are of one class and swapping them leaves some groups, and what the
     scenario says about time, as they are, and maps the shapes of all other groups onto themselves.
+
+    Args:
+        scenario: The scenario.
+        groups: What is asked of a label.
+        shapes: Of the groups.
+        tolerance: Per feature.
+        used: For each object the properties that matter, where what the program says of them must be alike, too.
     """
     involved: dict[int, list[int]] = {}
     for number, shape in enumerate(shapes):
         for index in shape.roles:
             involved.setdefault(index, []).append(number)
-    swaps = _Swaps(scenario.dynamics, groups, shapes, tolerance)
+    swaps = _Swaps(scenario, groups, shapes, tolerance, used)
     last: dict[Hashable, int] = {}
     found: dict[int, int] = {}
     for owner in scenario.objects:
@@ -127,10 +135,11 @@ def interchangeable(
 class _Swaps:
     """Tells which objects may be swapped."""
 
-    dynamics: Dynamics | None
+    scenario: Scenario
     groups: Sequence[Group]
     shapes: Sequence[GroupShape]
     tolerance: Tolerance
+    used: Sequence[frozenset[str]]
 
     def possible(self, one: int, other: int, about: Collection[int]) -> bool:
         """Whether two objects may be swapped, which some groups are about."""
@@ -141,15 +150,35 @@ class _Swaps:
             (self.shapes[number].key, tuple(swap.get(index, index) for index in self.shapes[number].roles))
             for number in left
         )
-        if plain != swapped:
+        if plain != swapped or not self._said_alike(one, other, forms, swap):
             return False
-        if self.dynamics is None:
+        dynamics = self.scenario.dynamics
+        if dynamics is None:
             return True
         # with the groups that are left, their random variables are swapped, too
         moved = {leaf.identity for number in left for leaf in self.groups[number].variables}
-        if any(leaf.identity in moved for leaf in leaves(*self.dynamics.conditions)):
+        if any(leaf.identity in moved for leaf in leaves(*dynamics.conditions)):
             return False
-        return forms.over_time(self.dynamics, {}) == forms.over_time(self.dynamics, swap)
+        return forms.over_time(dynamics, {}) == forms.over_time(dynamics, swap)
+
+    def _said_alike(self, one: int, other: int, forms: _Forms, swap: Mapping[int, int]) -> bool:
+        """Whether the program says the same of what it reads of two objects and no group compares."""
+        if not self.used:
+            return True
+        read = () if self.scenario.dynamics is None else features(*self.scenario.dynamics.conditions)
+        names = {name for index, name in read if index in swap} | self.used[one] | self.used[other]
+        owners = self.scenario.objects[one], self.scenario.objects[other]
+        given = [[owner.properties.get(name) for owner in owners] for name in sorted(names - {"position", "heading"})]
+        for mine, theirs in given:
+            if (mine is None) != (theirs is None):
+                return False
+            if mine is None or theirs is None or (mine.explicit and theirs.explicit):
+                continue
+            if mine.explicit != theirs.explicit:
+                return False
+            if forms.expression(mine.value, swap) != forms.expression(theirs.value, {}):
+                return False
+        return True
 
     def _is_unchanged(self, group: Group, forms: _Forms, swap: Mapping[int, int]) -> bool:
         return self._form(group, forms, {}) == self._form(group, forms, swap)
@@ -213,7 +242,8 @@ class _Forms:
         for requirement in dynamics.requirements:
             said["require", self._formula(requirement.formula, atoms)] += 1
         for each in dynamics.terminations:
-            said["terminate", None if each.condition is None else atoms[each.condition.number], each.after_s] += 1
+            atom = None if each.condition is None else atoms[each.condition.number]
+            said["terminate", atom, each.after_s, each.simulation] += 1
         for monitor in dynamics.monitors:
             steps = tuple(_step(step, atoms) for step in monitor.steps)
             said["monitor", steps] += 1

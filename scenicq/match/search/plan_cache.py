@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates, candidates_of
-from scenicq.match.problem.constraints import Signature, relevant_properties
+from scenicq.match.problem.constraints import Signature, build_groups, relevant_properties
+from scenicq.match.problem.symmetry import interchangeable, shape_of
 from scenicq.match.search.first_fit import FirstFit, LabelRow, first_fit_of, signature_of
 from scenicq.match.search.group_plan import MatchPlan, make_plan
 from scenicq.store.labels import Label
@@ -25,13 +26,16 @@ class PlanCache:
         options: What holds of all labels, of the tolerance its scopes alone.
         relevant: For each object, the properties for which it matters whether a label observes them.
         plans: By what is observed.
+        one_order: Whether interchangeable objects take one order in all labels, whatever is observed of them.
     """
 
     scenario: Scenario
     options: MatchOptions
     relevant: tuple[frozenset[str], ...] = field(init=False)
     plans: dict[Signature, MatchPlan] = field(default_factory=dict["Signature", "MatchPlan"])
+    one_order: bool = False
     _kinds: dict[Hashable, int] = field(default_factory=dict["Hashable", int])
+    _always_twins: Mapping[int, int] | None = None
     _fits: dict[MatchPlan, FirstFit | None] = field(default_factory=dict["MatchPlan", "FirstFit | None"])
 
     def __post_init__(self) -> None:
@@ -41,8 +45,31 @@ class PlanCache:
     def plan(self, signature: Signature) -> MatchPlan:
         """The groups for a signature, analysed once."""
         if signature not in self.plans:
-            self.plans[signature] = make_plan(self.scenario, signature, self.options, self._kinds)
+            plan = make_plan(self.scenario, signature, self.options, self._kinds)
+            self.plans[signature] = replace(plan, twins=self._twins(plan))
         return self.plans[signature]
+
+    def _twins(self, plan: MatchPlan) -> Mapping[int, int]:
+        """Interchangeable objects: those that the program treats alike, and for one label those of which it knows so.
+
+        What the program treats alike in all that it says is alike in every label. What it treats alike in what a label
+        tells is so only where it asks the same of both, and the label tells as much of one as of the other.
+        """
+        if self._always_twins is None:
+            every = (*self.relevant, frozenset(self.scenario.params))
+            groups = build_groups(self.scenario, every, self.options)
+            shapes = [shape_of(group, self.scenario.ego, self.options.tolerance) for group in groups]
+            self._always_twins = interchangeable(
+                self.scenario, groups, shapes, self.options.tolerance, used=self.relevant
+            )
+        if self.one_order:
+            return self._always_twins
+        here = {
+            one: other
+            for one, other in plan.twins.items()
+            if self.relevant[one] == self.relevant[other] and plan.signature[one] == plan.signature[other]
+        }
+        return {**self._always_twins, **here}
 
     def first_fits(
         self, labels: Iterable[tuple[Label, Candidates | None]], given: Mapping[str, str]

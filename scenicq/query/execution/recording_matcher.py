@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
+from scenicq.match.search.plan_cache import PlanCache
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.recording_starts import DecidedStart, few_findings, label_of, start_table, starts_of
 from scenicq.query.execution.results import IntervalSpan, Result
@@ -18,12 +19,12 @@ from scenicq.query.prefilter.executor import Block
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows
 from scenicq.store.classes import class_matches
 from scenicq.store.dataset import Dataset
-from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.hidden_runs import Remembered
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
-from scenicq.temporal.starts import RoleCandidates, StartSearch
+from scenicq.temporal.starts import RoleCandidates, StartSearch, narrowed, with_outcome
+from scenicq.temporal.stretches import StartTable
 from scenicq.temporal.truth import TRUE, UNKNOWN
 
 __all__ = ["CUT_OFF", "DecidedRecordings", "RecordingMatcher", "Survivors", "lost_recording"]
@@ -64,6 +65,58 @@ class Survivors:
     read: Callable[[NDArray[np.int64]], Iterator[Candidate]]
 
 
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """Labels of which starts are looked for.
+
+    Attributes:
+        block: Has them.
+        labels: Their places in the block.
+        candidates: Who may play whom, if that is a matter of the label's own ego.
+        read: As of `Survivors`.
+    """
+
+    block: TrackBlock
+    labels: NDArray[np.int64]
+    candidates: RoleCandidates | None
+    read: Callable[[NDArray[np.int64]], Iterator[Candidate]]
+
+    def some(self, which: NDArray[np.bool_]) -> _Asked:
+        """Some of them."""
+        candidates = self.candidates
+        if candidates is not None:
+            place = np.searchsorted(candidates.labels, self.block.label_of[candidates.members])
+            candidates = narrowed(candidates, which, place)
+        return _Asked(self.block, self.labels[which], candidates, self.read)
+
+
+@dataclass(frozen=True, slots=True)
+class _Starts:
+    """What is found of labels.
+
+    Attributes:
+        table: The starts.
+        decided: Those of them that the matcher has decided, by their numbers.
+        undecided: Labels that stay undecided, by their places in the block.
+    """
+
+    table: StartTable
+    decided: Mapping[int, DecidedStart]
+    undecided: Mapping[int, Unknown]
+
+    @classmethod
+    def joined(cls, parts: Sequence[_Starts]) -> _Starts:
+        """The starts with one outcome after the other."""
+        decided: dict[int, DecidedStart] = {}
+        undecided: dict[int, Unknown] = {}
+        first = 0
+        for part in parts:
+            decided.update({first + number: each for number, each in part.decided.items()})
+            undecided.update({at: each for at, each in part.undecided.items() if at not in undecided})
+            first += len(part.table)
+        return cls(StartTable.joined([part.table for part in parts]), decided, undecided)
+
+
 @dataclass(eq=False)
 class RecordingMatcher:
     """What a process keeps between blocks.
@@ -80,7 +133,11 @@ class RecordingMatcher:
 
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
+        given = self.matcher
+        plans = PlanCache(given.scenario, given.options, one_order=True)
+        self.matcher = Matcher(given.scenario, given.options, given.solver, plans)
         self._search = StartSearch(self.matcher)
+        self._searches: dict[int, StartSearch] = {}
         self._relevant = relevant_properties(self.matcher.scenario, self.matcher.options)
 
     def decide(self, rows: Block, left: Survivors) -> DecidedRecordings:
@@ -94,9 +151,13 @@ class RecordingMatcher:
         if not len(left.labels):
             return found
         with TrackBlock(self.dataset, rows.part, rows.runs) as block:
-            arrays, decided, undecided = self._starts(block, left, found)
-            table = start_table(self.matcher.scenario, block, arrays, decided)
-            by_number = dict(enumerate(decided, len(table) - len(decided)))
+            labels = left.labels - block.first_label
+            asked = _Asked(block, labels, self._candidates(block, labels, left), left.read)
+            starts = self._starts(asked, self._search, 0, found)
+            found.counts["starts"] += len(np.unique(starts.table.labels)) + len(starts.undecided)
+            if len(self.intervals.outcomes) > 1:
+                starts = self._by_outcomes(asked, starts)
+            table, by_number, undecided = starts.table, starts.decided, starts.undecided
 
             def remember(number: int) -> Remembered:
                 if number in by_number:
@@ -105,37 +166,57 @@ class RecordingMatcher:
                 return label_of(self.matcher.scenario, block, members, rows.map, self._relevant)
 
             intervals = self.intervals.intervals(table, remember)
-            found.counts["starts"] += len(np.unique(table.labels)) + len(undecided)
             found.counts["bindings"] += len({(each.recording, each.binding) for each in intervals})
             found.counts["cut off"] += sum(each.cut_off for each in intervals)
-            results = [(int(block.recording_of[at]), _undecided(block, at, verdict)) for at, verdict in undecided]
-            results += self._results(block, intervals, by_number, remember)
+            results = [
+                (int(block.recording_of[at]), _undecided(block, at, verdict)) for at, verdict in undecided.items()
+            ]
+            results += self._results(block, intervals, starts, remember)
             found.results += [result for _, result in sorted(results, key=lambda each: each[0])]
         return found
 
     # --- starts
 
-    def _starts(
-        self, block: TrackBlock, left: Survivors, found: DecidedRecordings
-    ) -> tuple[Mapping[int, NDArray[np.int64]], list[DecidedStart], list[tuple[int, Unknown]]]:
+    def _by_outcomes(self, asked: _Asked, whole: _Starts) -> _Starts:
+        """The starts with each outcome of the choices over time, among those with any."""
+        labels = np.union1d(whole.table.labels, np.array(list(whole.undecided), dtype=np.int64))
+        some = asked.some(np.isin(asked.labels, labels))
+        parts: list[_Starts] = []
+        for number, outcome in enumerate(self.intervals.outcomes):
+            if outcome.same_start:
+                again = replace(whole.table, outcomes=np.full(len(whole.table), number))
+                parts.append(replace(whole, table=again))
+            else:
+                parts.append(self._starts(some, self._search_of(number), number, DecidedRecordings()))
+        return _Starts.joined(parts)
+
+    def _search_of(self, outcome: int) -> StartSearch:
+        """What finds the starts with an outcome of the choices over time."""
+        made = self.intervals.outcomes[outcome]
+        if made.same_start:
+            return self._search
+        if outcome not in self._searches:
+            self._searches[outcome] = StartSearch(with_outcome(self.matcher, made))
+        return self._searches[outcome]
+
+    def _starts(self, asked: _Asked, search: StartSearch, outcome: int, found: DecidedRecordings) -> _Starts:
         """Starts that arrays have, those that the matcher has decided, and the labels that stay undecided."""
-        labels = left.labels - block.first_label
+        block, labels, candidates = asked.block, asked.labels, asked.candidates
         arrays: Mapping[int, NDArray[np.int64]] = {}
-        candidates = self._candidates(block, labels, left)
         sure = np.ones(len(labels), np.bool_)
         codes, classes = block.categories()
         own: list[int] = np.unique(codes[block.ego(labels)]).tolist()
         if candidates is not None and all(classes[code] for code in own):
-            starts = self._search.decide(block, candidates)
+            starts = search.decide(block, candidates)
             arrays, candidates, sure = starts.members, starts.left, starts.sure
             labels = candidates.labels
             found.failed.update(starts.failed)
         decided: list[DecidedStart] = []
-        undecided: list[tuple[int, Unknown]] = []
+        undecided: dict[int, Unknown] = {}
         known_starts: Counter[int] = Counter()
-        read = left.read(labels + block.first_label) if len(labels) else iter(())
-        for at, candidate, members, among, known in self._asked(block, left, labels, candidates, sure, read):
-            matcher = self._search.rest if known else self.matcher
+        read = asked.read(labels + block.first_label) if len(labels) else iter(())
+        for at, candidate, members, among, known in self._asked(block, labels, candidates, sure, read):
+            matcher = search.rest if known else search.matcher
             label = candidate.label
             recording = int(block.recording_of[at])
             findings = few_findings(matcher, label, known_starts[recording], among=among)
@@ -145,10 +226,11 @@ class RecordingMatcher:
                     found.failed[each.verdict.cause.what] += 1
             for start in starts_of(self.matcher.scenario, block, label, members, findings):
                 if isinstance(start, Unknown):
-                    undecided.append((at, start))
+                    undecided[at] = start
                 else:
                     decided.append(start)
-        return arrays, decided, undecided
+        table = start_table(self.matcher.scenario, block, arrays, decided, outcome)
+        return _Starts(table, dict(enumerate(decided, len(table) - len(decided))), undecided)
 
     def _candidates(self, block: TrackBlock, labels: NDArray[np.int64], left: Survivors) -> RoleCandidates | None:
         """Who may play whom, if that is a matter of the label's own ego."""
@@ -171,7 +253,7 @@ class RecordingMatcher:
         return RoleCandidates(labels, members, may)
 
     def _asked(
-        self, block: TrackBlock, left: Survivors, labels: NDArray[np.int64], candidates: RoleCandidates | None,
+        self, block: TrackBlock, labels: NDArray[np.int64], candidates: RoleCandidates | None,
         sure: NDArray[np.bool_], read: Iterator[Candidate],
     ) -> Iterator[tuple[int, Candidate, list[int], Mapping[int, tuple[int, ...]] | None, bool]]:  # fmt: skip
         """Labels for the matcher, with their members, who may play whom, and whether plain requirements hold."""
@@ -190,29 +272,33 @@ class RecordingMatcher:
     # --- results
 
     def _results(
-        self, block: TrackBlock, intervals: Sequence[IntervalVerdict], decided: Mapping[int, DecidedStart],
+        self, block: TrackBlock, intervals: Sequence[IntervalVerdict], starts: _Starts,
         remember: Callable[[int], Remembered],
     ) -> Iterator[tuple[int, Result]]:  # fmt: skip
         """Intervals as results, with the recordings that they are of."""
-        witnesses = self._witnesses(intervals, decided, remember)
+        witnesses = self._witnesses(intervals, starts, remember)
         for each in intervals:
-            start = decided.get(each.origin)
+            start = starts.decided.get(each.origin)
             reason = start.verdict.reason if start is not None and isinstance(start.verdict, Unknown) else ""
             yield each.recording, self._result(block, each, witnesses.get(each.origin, {}), each.reason or reason)
 
     def _witnesses(
-        self, intervals: Sequence[IntervalVerdict], decided: Mapping[int, DecidedStart],
-        remember: Callable[[int], Remembered],
+        self, intervals: Sequence[IntervalVerdict], starts: _Starts, remember: Callable[[int], Remembered]
     ) -> Mapping[int, Mapping[str, WitnessValue]]:  # fmt: skip
         """The witnesses of the initial scenes of intervals that match, by the numbers of their starts."""
         wanted = sorted({each.origin for each in intervals if each.truth == TRUE})
+        decided = starts.decided
         verdicts: dict[int, Verdict] = {each: decided[each].verdict for each in wanted if each in decided}
-        rest = [each for each in wanted if each not in decided]
+        rest: dict[int, list[int]] = {}
+        for each in wanted:
+            if each not in decided:
+                rest.setdefault(int(starts.table.outcomes[each]), []).append(each)
         scenario = self.matcher.scenario
         others = [owner.index for owner in scenario.objects if owner.index != scenario.ego]
         among = {index: (number,) for number, index in enumerate(others, 1)}
-        labels: list[tuple[Label, Mapping[int, tuple[int, ...]] | None]] = [(remember(each)[0], among) for each in rest]
-        verdicts.update(zip(rest, self._search.rest.match_all(labels), strict=True))
+        for outcome, numbers in rest.items():
+            labels = [(remember(each)[0], among) for each in numbers]
+            verdicts.update(zip(numbers, self._search_of(outcome).rest.match_all(labels), strict=True))
         return {number: each.witness for number, each in verdicts.items() if isinstance(each, Match)}
 
     def _result(

@@ -98,9 +98,18 @@ def starts_of(
 
 
 def start_table(
-    scenario: Scenario, block: TrackBlock, arrays: Mapping[int, NDArray[np.int64]], decided: Sequence[DecidedStart]
-) -> StartTable:
-    """All starts of a block: first those that arrays have, then those that the matcher has decided."""
+    scenario: Scenario, block: TrackBlock, arrays: Mapping[int, NDArray[np.int64]], decided: Sequence[DecidedStart],
+    outcome: int = 0,
+) -> StartTable:  # fmt: skip
+    """All starts of a block: first those that arrays have, then those that the matcher has decided.
+
+    Args:
+        scenario: The scenario.
+        block: The block.
+        arrays: Starts by who plays each object.
+        decided: Starts that the matcher has decided.
+        outcome: With which outcome of the choices over time, by number.
+    """
     indices = sorted(owner.index for owner in scenario.objects)
     members = {
         index: np.concatenate(
@@ -110,7 +119,7 @@ def start_table(
     }
     before = len(members[indices[0]]) - len(decided)
     sure = np.concatenate((np.ones(before, np.bool_), [isinstance(each.verdict, Match) for each in decided]))
-    return StartTable(block, members, sure.astype(np.bool_))
+    return StartTable(block, members, sure.astype(np.bool_), np.full(len(sure), outcome))
 
 
 def label_of(

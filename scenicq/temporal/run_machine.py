@@ -1,0 +1,315 @@
+"""What a program says about time as one machine: requirements, what ends a run, and monitors, stepped over samples.
+
+A mode says where a run stands: what is left of each requirement, and the step of each monitor. What is not observed at
+a sample may hold or not, there in all that reads it alike; so of a run a set of modes is known, one for each way that
+this may come out. A run is unknown only if two of these ways end differently.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import assert_never
+
+from scenicq.errors import Span
+from scenicq.forest.temporal import Atom, Dynamics, End, Formula, Goto, Monitor, Reject, Terminate, Test, Wait, operands
+from scenicq.temporal.progression import LOST, Progression, Rest, TooManyClausesError, accepts
+from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
+
+__all__ = ["Advance", "RunMachine", "Situation"]
+
+_MOST_WAYS = 1024
+"""In which what is not observed at one sample may come out."""
+_MOST_MODES = 256
+"""In which one run may be at once."""
+_MOST_SITUATIONS = 20_000
+"""Of one program."""
+
+_OVER, _REJECTED = -1, -2
+"""A monitor that says nothing any more, and one that has rejected the run."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Mode:
+    """What is left of each requirement, and the step of each monitor."""
+
+    rests: tuple[Rest, ...]
+    places: tuple[int, ...]
+
+    @property
+    def matches(self) -> bool:
+        """Whether a run that ends in it is a match."""
+        return _REJECTED not in self.places and all(map(accepts, self.rests))
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether no run that goes on from it is a match."""
+        return _REJECTED in self.places or LOST in self.rests
+
+
+_Modes = frozenset[_Mode]
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What is known of a run between two samples.
+
+    Attributes:
+        truth: Whether it is a match if it ends here.
+        is_lost: Whether no run that goes on from here is a match.
+        broken: What keeps it from matching if it ends here, in the program.
+        lost_to: What keeps it from matching wherever it ends.
+        undecided: Whether there are too many ways in which it may go on.
+        reads: The numbers of the atoms that it reads at the next sample.
+    """
+
+    truth: int
+    is_lost: bool
+    broken: Span | None
+    lost_to: Span | None
+    undecided: bool
+    reads: tuple[int, ...]
+    modes: _Modes
+
+
+@dataclass(frozen=True, slots=True)
+class Advance:
+    """What a sample makes of a situation.
+
+    Attributes:
+        situation: Its number after the sample; None where the run is over in any case.
+        may_match: Whether the run may end here as a match.
+        may_fail: Whether it may end here without being one.
+        broken: What keeps it from being one, in the program.
+    """
+
+    situation: int | None
+    may_match: bool = False
+    may_fail: bool = False
+    broken: Span | None = None
+
+
+class _NotObserved(Exception):
+    """An atom that has no value."""
+
+    def __init__(self, atom: int) -> None:
+        super().__init__()
+        self.atom = atom
+
+
+@dataclass(eq=False)
+class RunMachine:
+    """A program made ready to be followed.
+
+    Attributes:
+        dynamics: The program.
+        situations: All that have been met so far; a run begins in the first.
+        atoms: The numbers of the atoms that the program reads.
+    """
+
+    dynamics: Dynamics
+    situations: list[Situation] = field(init=False, default_factory=list[Situation])
+    atoms: tuple[int, ...] = field(init=False)
+    _progression: Progression = field(init=False, default_factory=Progression)
+    _numbers: dict[_Modes, int] = field(init=False, default_factory=dict["_Modes", int])
+    _known: dict[tuple[int, tuple[int, ...], bool], Advance] = field(
+        init=False, default_factory=dict["tuple[int, tuple[int, ...], bool]", Advance]
+    )
+    _ways: dict[tuple[_Mode, tuple[int, ...], bool], tuple[tuple[_Mode, bool], ...]] = field(
+        init=False, default_factory=dict["tuple[_Mode, tuple[int, ...], bool]", "tuple[tuple[_Mode, bool], ...]"]
+    )
+
+    def __post_init__(self) -> None:
+        """Begin."""
+        dynamics = self.dynamics
+        ends = [each for each in dynamics.terminations if each.condition is not None]
+        self._before = [each.condition.number for each in ends if each.condition and not each.simulation]
+        self._behind = [each.condition.number for each in ends if each.condition and each.simulation]
+        formulas = [each.formula for each in dynamics.requirements]
+        self._of_formulas = [frozenset(_atoms(each)) for each in formulas]
+        self._of_monitors = [_reads(each) for each in dynamics.monitors]
+        every = {*self._before, *self._behind}.union(*self._of_formulas, *(s for m in self._of_monitors for s in m))
+        self.atoms = tuple(sorted(every))
+        rests = tuple(map(self._progression.add, formulas))
+        self._situation(frozenset((_Mode(rests, (0,) * len(dynamics.monitors)),)))
+
+    def advance(self, situation: int, values: Mapping[int, int], *, due: bool) -> Advance:
+        """What a sample makes of a situation.
+
+        Args:
+            situation: Its number.
+            values: The truth value of each atom at the sample.
+            due: Whether the time of `terminate after` is over there.
+        """
+        reads = self.situations[situation].reads
+        key = situation, tuple([values[atom] for atom in reads]), due
+        if key not in self._known:
+            self._known[key] = self._advanced(self.situations[situation].modes, reads, key[1], due=due)
+        return self._known[key]
+
+    def _advanced(self, modes: _Modes, reads: tuple[int, ...], told: tuple[int, ...], *, due: bool) -> Advance:
+        values = dict(zip(reads, told, strict=True))
+        going: set[_Mode] = set()
+        ended: set[_Mode] = set()
+        try:
+            for mode in modes:
+                for after, over in self._ways_of(mode, told, values, due=due):
+                    (ended if over else going).add(after)
+        except TooManyClausesError:
+            return Advance(self._undecided())
+        if len(going) > _MOST_MODES:
+            return Advance(self._undecided())
+        failed = frozenset(each for each in ended if not each.matches)
+        return Advance(
+            self._situation(frozenset(going)) if going else None,
+            len(failed) < len(ended),
+            bool(failed),
+            self._broken(failed),
+        )
+
+    def _ways_of(
+        self, mode: _Mode, told: tuple[int, ...], values: Mapping[int, int], *, due: bool
+    ) -> tuple[tuple[_Mode, bool], ...]:
+        """The modes that a sample may lead to from one, each with whether the run is over."""
+        key = mode, told, due
+        if key not in self._ways:
+            found: set[tuple[_Mode, bool]] = set()
+            stack: list[dict[int, bool]] = [{}]
+            tried = 0
+            while stack:
+                assumed = stack.pop()
+                tried += 1
+                if tried > _MOST_WAYS:
+                    raise TooManyClausesError
+                try:
+                    found.add(self._step(mode, _holding(values, assumed), due=due))
+                except _NotObserved as error:
+                    stack += [{**assumed, error.atom: True}, {**assumed, error.atom: False}]
+            self._ways[key] = tuple(found)
+        return self._ways[key]
+
+    def _step(self, mode: _Mode, holds: Callable[[int], bool], *, due: bool) -> tuple[_Mode, bool]:
+        """The mode after a sample at which everything is known, and whether the run is over."""
+        rests = tuple([self._progression.after(rest, holds) for rest in mode.rests])
+        # these stop the monitors before they run
+        if due or any(map(holds, self._before)):
+            return _Mode(rests, mode.places), True
+        places: list[int] = []
+        over = False
+        for monitor, place in zip(self.dynamics.monitors, mode.places, strict=True):
+            after, terminates = _watched(monitor, place, holds)
+            places.append(after)
+            over = over or terminates
+        return _Mode(rests, tuple(places)), over or any(map(holds, self._behind))
+
+    def _situation(self, modes: _Modes) -> int:
+        if modes not in self._numbers:
+            if self.situations and len(self.situations) >= _MOST_SITUATIONS:
+                return self._undecided()
+            self._numbers[modes] = len(self.situations)
+            matching = [mode.matches for mode in modes]
+            truth = int(TRUE if all(matching) else UNKNOWN if any(matching) else FALSE)
+            lost = all(mode.is_lost for mode in modes)
+            reads = tuple(sorted({atom for mode in modes for atom in self._reads(mode)}))
+            broken = self._broken(modes) if truth == FALSE else None
+            lost_to = self._broken(modes, for_good=True) if lost else None
+            self.situations.append(Situation(truth, lost, broken, lost_to, undecided=False, reads=reads, modes=modes))
+        return self._numbers[modes]
+
+    def _undecided(self) -> int:
+        none = _Modes()
+        if none not in self._numbers:
+            self._numbers[none] = len(self.situations)
+            self.situations.append(
+                Situation(int(UNKNOWN), is_lost=False, broken=None, lost_to=None, undecided=True, reads=(), modes=none)
+            )
+        return self._numbers[none]
+
+    def _reads(self, mode: _Mode) -> Iterator[int]:
+        yield from (*self._before, *self._behind)
+        for atoms, rest in zip(self._of_formulas, mode.rests, strict=True):
+            if any(rest):
+                yield from atoms
+        for steps, place in zip(self._of_monitors, mode.places, strict=True):
+            if place >= 0:
+                yield from steps[place]
+
+    def _broken(self, modes: _Modes, *, for_good: bool = False) -> Span | None:
+        """What keeps runs in some modes from matching: what does so in all of them, else in the first."""
+        if not modes:
+            return None
+        ways = [self._causes(mode, for_good=for_good) for mode in modes]
+        common = set[int](ways[0]).intersection(*ways[1:])
+        number = min(common or {min(each) for each in ways if each} or {-1})
+        if number < 0:
+            return None
+        said = [*self.dynamics.requirements, *self.dynamics.monitors]
+        return said[number].span
+
+    def _causes(self, mode: _Mode, *, for_good: bool) -> list[int]:
+        found = [n for n, rest in enumerate(mode.rests) if rest == LOST or not (for_good or accepts(rest))]
+        return found + [len(mode.rests) + n for n, place in enumerate(mode.places) if place == _REJECTED]
+
+
+def _holding(values: Mapping[int, int], assumed: Mapping[int, bool]) -> Callable[[int], bool]:
+    """Whether an atom holds, which is known or assumed."""
+
+    def holds(atom: int) -> bool:
+        value = values[atom]
+        if value != UNKNOWN:
+            return value == TRUE
+        if atom not in assumed:
+            raise _NotObserved(atom)
+        return assumed[atom]
+
+    return holds
+
+
+def _watched(monitor: Monitor, place: int, holds: Callable[[int], bool]) -> tuple[int, bool]:
+    """The step at which a monitor goes on after a sample, and whether it ends the run."""
+    while place >= 0:
+        step = monitor.steps[place]
+        match step:
+            case Test():
+                place = step.then if holds(step.condition.number) else step.otherwise
+            case Goto():
+                place = step.then
+            case Wait():
+                return step.then, False
+            case Terminate():
+                return _OVER, True
+            case Reject():
+                return _REJECTED, False
+            case End():
+                return _OVER, False
+            case _:
+                assert_never(step)
+    return place, False
+
+
+def _reads(monitor: Monitor) -> list[frozenset[int]]:
+    """The numbers of the atoms that a monitor may read at one sample, by the step at which it goes on."""
+    found: list[frozenset[int]] = []
+    for first in range(len(monitor.steps)):
+        seen, stack = {first}, [first]
+        atoms: set[int] = set()
+        while stack:
+            step = monitor.steps[stack.pop()]
+            if isinstance(step, Test):
+                atoms.add(step.condition.number)
+            after = [step.then, step.otherwise] if isinstance(step, Test) else []
+            after += [step.then] if isinstance(step, Goto) else []
+            new = [each for each in after if each not in seen]
+            seen.update(new)
+            stack += new
+        found.append(frozenset(atoms))
+    return found
+
+
+def _atoms(formula: Formula) -> Iterator[int]:
+    stack = [formula]
+    while stack:
+        node = stack.pop()
+        stack.extend(operands(node))
+        if isinstance(node, Atom):
+            yield node.number

@@ -1,0 +1,204 @@
+"""Runs against their definition: every completion of what is not observed, one sample after the other."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from test_ltlf import ATOMS, random_formula, recursive
+from test_run_columns import SOURCE, random_stretches
+
+from scenicq.errors import Span
+from scenicq.forest.temporal import (
+    Atom,
+    Dynamics,
+    End,
+    Goto,
+    Monitor,
+    Reject,
+    TemporalRequirement,
+    Terminate,
+    Termination,
+    Test,
+    Wait,
+)
+from scenicq.temporal import progression, run_machine
+from scenicq.temporal.run_columns import RunColumns
+from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
+
+GAPS = 6
+
+
+def random_monitor(draw: random.Random) -> Monitor:
+    """A graph of steps; every circle holds a `Wait`."""
+    count = draw.randint(2, 7)
+    steps: list[object] = []
+    for number in range(count):
+        later = [draw.randint(number + 1, count) for _ in range(2)]
+        kind = draw.choices(["test", "wait", "goto", "terminate", "reject", "again"], [35, 25, 10, 10, 10, 10])[0]
+        steps.append(
+            {
+                "test": Test(Atom(draw.randrange(ATOMS)), *later), "wait": Wait(draw.randint(0, count)),
+                "goto": Goto(later[0]), "terminate": Terminate(Span(SOURCE, 1, 2)),
+                "reject": Reject(Span(SOURCE, 3, 4)), "again": Wait(0),
+            }[kind]
+        )  # fmt: skip
+    return Monitor(Span(SOURCE, 50, 51), (*steps, End()))
+
+
+def random_dynamics(draw: random.Random) -> Dynamics:
+    formulas = [random_formula(draw, 3) for _ in range(draw.randint(0, 2))]
+    ends = [
+        Termination(Span(SOURCE, 90, 91), Atom(draw.randrange(ATOMS)), simulation=draw.random() < 0.5)
+        for _ in range(draw.choice([0, 0, 1, 2]))
+    ]
+    ends += [Termination(Span(SOURCE, 92, 93), after_s=draw.choice([0.5, 1.0, 2.0]))] if draw.random() < 0.3 else []
+    monitors = [random_monitor(draw) for _ in range(draw.choice([0, 0, 1, 1, 2]))]
+    requirements = [TemporalRequirement(formula, Span(SOURCE, k, k + 1)) for k, formula in enumerate(formulas)]
+    return Dynamics((), tuple(requirements), tuple(ends), tuple(monitors))
+
+
+@dataclass
+class Definition:
+    """What a program says of one trace in which everything is known: a list of tuples of truth values."""
+
+    dynamics: Dynamics
+    seconds: list[float]
+    trace: list[tuple[bool, ...]]
+
+    def holds(self, i: int, j: int) -> bool:
+        return all(recursive(each.formula, self.trace[: j + 1], i) for each in self.dynamics.requirements)
+
+    def ends(self, i: int) -> tuple[int | None, bool] | set[int]:
+        """The end of the run from i and whether it is a match; of a program without one, every end that is."""
+        places: list[int | None] = [0] * len(self.dynamics.monitors)
+        rejected, found = False, set[int]()
+        for k in range(i, len(self.trace)):
+            over = False
+            for each in self.dynamics.terminations:
+                late = each.after_s is not None and self.seconds[k] - self.seconds[i] >= each.after_s - 1e-6
+                when = each.condition is not None and not each.simulation and self.trace[k][each.condition.number]
+                over = over or late or when
+            if not over:
+                for number, monitor in enumerate(self.dynamics.monitors):
+                    place = places[number]
+                    places[number] = None
+                    while place is not None:
+                        step = monitor.steps[place]
+                        place = None
+                        match step:
+                            case Test():
+                                place = step.then if self.trace[k][step.condition.number] else step.otherwise
+                            case Goto():
+                                place = step.then
+                            case Wait():
+                                places[number] = step.then
+                            case Terminate():
+                                over = True
+                            case Reject():
+                                rejected = True
+                            case _:
+                                pass
+                over = over or any(
+                    each.simulation and self.trace[k][each.condition.number] for each in self.dynamics.terminations
+                )
+            if self.dynamics.terminates:
+                if over:
+                    return k, not rejected and self.holds(i, k)
+            elif not rejected and self.holds(i, k):
+                found.add(k)
+        return (None, False) if self.dynamics.terminates else found
+
+
+def completions(rows: list[list[int]]) -> list[list[tuple[bool, ...]]]:
+    gaps = [(k, a) for k, row in enumerate(rows) for a, value in enumerate(row) if value == UNKNOWN]
+    found = []
+    for values in itertools.product((False, True), repeat=len(gaps)):
+        whole = [[value == TRUE for value in row] for row in rows]
+        for (k, a), value in zip(gaps, values, strict=True):
+            whole[k][a] = value
+        found.append([tuple(row) for row in whole])
+    return found
+
+
+def expected(dynamics: Dynamics, seconds: list[float], rows: list[list[int]], i: int) -> tuple[int, set[int]]:
+    """The truth of the run from a sample, and its ends: of an unknown one all that are possible."""
+    ways = [Definition(dynamics, seconds, trace).ends(i) for trace in completions(rows)]
+    if dynamics.terminates:
+        ends = {end for end, matches in ways if matches}
+        sure = len(set(ways)) == 1 and ways[0][1]
+        return int(TRUE if sure else UNKNOWN if ends else FALSE), ends
+    common, some = set.intersection(*ways), set.union(*ways)
+    if common:
+        return int(TRUE), {max(common)}
+    return (int(UNKNOWN), {max(some)}) if some else (int(FALSE), {i})
+
+
+def random_rows(draw: random.Random, n: int) -> list[list[int]]:
+    rows = [[int(draw.choice([FALSE, TRUE])) for _ in range(ATOMS)] for _ in range(n)]
+    places = [(k, a) for k in range(n) for a in range(ATOMS)]
+    for k, a in draw.sample(places, min(draw.choice([0, 1, 3, GAPS]), len(places))):
+        rows[k][a] = int(UNKNOWN)
+    return rows
+
+
+def compare(draw: random.Random, programs: int, *, limited: bool = False) -> int:
+    """Runs of random programs against the definition; how many are known.
+
+    Args:
+        draw: The source of randomness.
+        programs: How many.
+        limited: Whether limits may make runs unknown.
+    """
+    decided = 0
+    for _ in range(programs):
+        stretches, dynamics = random_stretches(draw), random_dynamics(draw)
+        columns = RunColumns(dynamics)
+        rows: list[list[int]] = []
+        for places, _mine in stretches.apart():
+            rows += random_rows(draw, places.stop - places.start)
+        truth = np.array(rows, dtype=np.int8)
+        found = columns.follow(stretches, lambda atom, truth=truth: truth[:, atom.number])
+        for places, mine in stretches.apart():
+            own, seconds = rows[places], stretches.seconds[places].tolist()
+            for number in range(mine.start, mine.stop):
+                run = found.run(number, int(stretches.starts[number]))
+                start = run.start - places.start
+                value, ends = expected(dynamics, seconds, own, start)
+                if limited and run.truth == UNKNOWN:
+                    continue
+                assert run.truth == value, (dynamics, own, start)
+                decided += value != UNKNOWN
+                if value == TRUE or (value == UNKNOWN and not dynamics.terminates):
+                    further = limited and run.open_ and run.end - places.start < max(ends)
+                    assert further or {run.end - places.start} == ends, (dynamics, own, start)
+                if value == FALSE and not run.cut_off:
+                    assert run.broken is not None
+                assert not (run.cut_off and run.broken)
+    return decided
+
+
+def test_runs_are_unknown_only_where_completions_differ():
+    assert compare(random.Random(1), 250) > 900
+
+
+@pytest.mark.parametrize(
+    ("where", "name"),
+    [
+        (progression, "_MOST_CLAUSES"), (run_machine, "_MOST_WAYS"), (run_machine, "_MOST_MODES"),
+        (run_machine, "_MOST_SITUATIONS"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("least", [0, 1, 2])
+def test_a_limit_makes_unknown_at_most(monkeypatch: pytest.MonkeyPatch, where: object, name: str, least: int):
+    monkeypatch.setattr(where, name, least)
+    compare(random.Random(2), 40, limited=True)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_many_runs_are_unknown_only_where_completions_differ():
+    assert compare(random.Random(3), 10_000) > 40_000
