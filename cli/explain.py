@@ -50,8 +50,8 @@ def _recording(query: Query, named: str) -> tuple[str, int | float | None] | Non
         "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
         "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a "
-        "program about what happens over time that of a recording, and after `@` when the interval begins: a "
-        "timestamp, or the seconds from where the recording begins (`@3.5s`).",
+        "program about what happens over time the frame in which the interval begins, or the name of a recording, and "
+        "after `@` when the interval begins: a timestamp, or the seconds from where the recording begins (`@3.5s`).",
     },
     exits={0: "the frame or recording matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
     topics={"What counts as a match": SHARED},
@@ -91,7 +91,12 @@ def explain(
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)
-    say(plain(show_explanation(explanation)))
+        matches, told = isinstance(explanation.verdict, Match), show_explanation(explanation)
+        if query.is_over_time():
+            begun = explain_recording(query, solver, label.recording, label.timestamp_us)
+            # without a start, the frame itself is what keeps it from matching
+            matches, told = (begun.matches, begun.text()) if begun.interval is not None else (False, told)
+    say(plain(told))
     if smt2 is not None:
         try:
             smt2.mkdir(parents=True, exist_ok=True)
@@ -99,7 +104,7 @@ def explain(
                 (smt2 / f"{formula.name}.smt2").write_text(formula.text, encoding="utf-8")
         except OSError as error:
             raise DataError(Diagnostic("target-unwritable", f"{smt2} cannot be written: {error.strerror}")) from None
-    if not isinstance(explanation.verdict, Match) and not exit_zero:
+    if not matches and not exit_zero:
         ctx.exit(NOTHING)
 
 

@@ -41,7 +41,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children, leaves, postorder
 from scenicq.temporal.atoms import AtomColumns
 
-__all__ = ["Cell", "UnclearVariable", "affine_sides", "cells", "inside", "random_variables", "support"]
+__all__ = ["Cell", "UnclearVariable", "affine_sides", "cells", "has_cells", "inside", "random_variables", "support"]
 
 _MOST_CELLS = 3000
 """Combinations of values that are tried for one binding."""
@@ -199,6 +199,19 @@ def _affine(root: Node, leaf: Leaf) -> bool:
             case _:
                 return False
     return True
+
+
+def has_cells(condition: Node) -> bool:
+    """Whether values of the random variables of a condition can be cut into cells, by its form."""
+    try:
+        found = [(leaf, list(_comparisons(leaf, [condition]))) for leaf in random_variables([condition])]
+    except UnclearVariable:
+        return False
+    return all(
+        len(leaves(each)) == 1 and all(_affine(side, leaf) for side in children(each))
+        for leaf, comparisons in found
+        for each in comparisons
+    )
 
 
 def affine_sides(

@@ -259,7 +259,9 @@ def _within(joint: Sequence[Leaf], some: Sequence[Cell]) -> Node:
         bounds: list[Node] = []
         for leaf in joint:
             low, high = cell.ranges[leaf.identity]
-            for op, end in ((CompareOp.GE, low), (CompareOp.LE, high)):
+            # a cell of more than one value has not its ends
+            ops = (CompareOp.GE, CompareOp.LE) if low == high else (CompareOp.GT, CompareOp.LT)
+            for op, end in zip(ops, (low, high), strict=True):
                 if np.isfinite(end):
                     bounds.append(Compare(op, leaf, Constant(float(end))))
         options.append(Logic(LogicOp.AND, tuple(bounds)) if bounds else Constant(True))

@@ -52,7 +52,7 @@ class IntervalVerdict:
         witness: Values of random variables of conditions over time that prove a match, by their place in the program.
         reason: Why it is unknown; empty where it is so because its start is.
         broken: What keeps it from matching, in the program.
-        cut_off: Whether the recording or a track ends before the program does.
+        cut_off: Whether the recording or a track ends before the program does; `broken` says what is lost by then.
     """
 
     start: int
@@ -219,7 +219,8 @@ class IntervalMatcher:
             matches = len(kept) > 0
             if not matches:
                 # what was cut off might have matched; else what was matched but is too short, else what came furthest
-                rank = np.lexsort((-starts[mine], ends[mine] - starts[mine], truth[mine], cut_off[mine]))
+                hopeful = cut_off[mine] & np.array([broken[each] is None for each in mine.tolist()], dtype=np.bool_)
+                rank = np.lexsort((-starts[mine], ends[mine] - starts[mine], truth[mine], hopeful))
                 kept = mine[rank[-1:]]
             numbers: list[int] = kept.tolist()
             verdicts: list[int] = truth[kept].tolist() if matches else [int(FALSE)]

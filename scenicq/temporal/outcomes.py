@@ -12,11 +12,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from scenicq.forest.condition import condition, expand
+from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Constant, DiscreteRange, Feature, Identity, Index, Leaf, Node
-from scenicq.forest.scenario import Scenario
+from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.simplify import rebuilt, roots_of
-from scenicq.forest.walk import deciding_first, leaves
+from scenicq.forest.temporal import Atom, TemporalRequirement
+from scenicq.forest.walk import deciding_first, features, leaves, transform
 from scenicq.match.verdict import WitnessValue
+from scenicq.temporal.hidden import has_cells
 from scenicq.temporal.samples import MOVING
 
 __all__ = ["Outcome", "outcomes_of", "place_of", "steady_value"]
@@ -53,11 +56,11 @@ def outcomes_of(scenario: Scenario) -> tuple[Outcome, ...]:
         outcome = stack.pop()
         choice = _choice(outcome.scenario)
         if choice is None:
-            found.append(outcome)
+            found.append(replace(outcome, scenario=_from_the_start(outcome.scenario)))
             continue
         stack += reversed(list(_made(outcome, *choice)))
         if len(found) + len(stack) > _MOST_OUTCOMES:
-            return (whole,)
+            return (replace(whole, scenario=_from_the_start(scenario)),)
     return tuple(found)
 
 
@@ -87,6 +90,45 @@ def _choice(scenario: Scenario) -> tuple[Leaf, range] | None:
             case _:
                 pass
     return None
+
+
+def _from_the_start(scenario: Scenario) -> Scenario:
+    """The scenario with requirements on its first sample among those over time, where both hang on a hidden number.
+
+    What both say of the number is then decided together, exactly. The initial scene may leave these requirements out
+    where nothing else in it hangs on the numbers.
+    """
+    dynamics = scenario.dynamics
+    if dynamics is None:
+        return scenario
+
+    def written_out(root: Node) -> Node:
+        return expand(root, lambda feature: steady_value(scenario, feature))
+
+    hidden = {leaf.identity for leaf in leaves(*map(written_out, dynamics.conditions))}
+    nodes, requirements = list(dynamics.conditions), list(dynamics.requirements)
+    left: list[Requirement] = []
+    for each in scenario.requirements:
+        read = {index for index, _ in features(each.condition)}
+        plain = each.built_in is None and PARAMS not in read
+        noisy = any(scenario.objects[index].mutated for index in read if index != PARAMS)
+        said = written_out(each.condition) if plain and not noisy else each.condition
+        own = {leaf.identity for leaf in leaves(said)}
+        if each.span is None or not (plain and not noisy and own and own <= hidden and has_cells(said)):
+            left.append(each)
+            continue
+        requirements.append(TemporalRequirement(Atom(len(nodes)), each.span))
+        nodes.append(transform(each.condition, _at_sample))
+    over_time = replace(dynamics, conditions=tuple(nodes), requirements=tuple(requirements))
+    without = replace(scenario, requirements=tuple(left), dynamics=None)
+    still = {leaf.identity for leaf in leaves(*roots_of(without))}
+    needed = scenario.requirements if still & hidden else tuple(left)
+    return replace(scenario, requirements=needed, dynamics=over_time)
+
+
+def _at_sample(node: Node) -> Node:
+    """A feature as it is at a sample, which is the first one here."""
+    return replace(node, current=True) if isinstance(node, Feature) else node
 
 
 def _made(outcome: Outcome, leaf: Leaf, options: range) -> Iterator[Outcome]:

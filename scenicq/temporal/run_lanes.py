@@ -196,5 +196,5 @@ class _Lanes:
         for lane in np.flatnonzero(over).tolist():
             situation = self.machine.situations[int(self.situation[lane])]
             runs.broken[lane] = situation.lost_to if situation.is_lost else None
-            runs.cut_off[lane] = not situation.is_lost
+        runs.cut_off[over] = True
         return runs

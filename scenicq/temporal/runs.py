@@ -31,7 +31,8 @@ class Run:
         start: The sample.
         end: The last sample; of a run that is no match, how far it came.
         truth: Whether it matches.
-        broken: What keeps it from matching, in the program; None where nothing does, and where it is cut off.
+        broken: What keeps it from matching, in the program; None where nothing does, and where it is cut off before
+            a requirement is lost for good.
         cut_off: Whether the samples are over before the program ends.
         open_: Whether a later end is not excluded: of a match that what is unknown may let go on.
         undecided: Whether it is unknown because there are too many ways in which it may go on.

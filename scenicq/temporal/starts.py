@@ -32,7 +32,7 @@ from scenicq.temporal.presence import by_presence, observes
 from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["RoleCandidates", "StartSearch", "Starts", "classes_of_twins", "narrowed", "with_outcome"]
+__all__ = ["RoleCandidates", "StartSearch", "Starts", "classes_of_twins", "narrowed", "start_matchers"]
 
 Members = NDArray[np.int64]
 _MOST_TUPLES = 64
@@ -94,10 +94,21 @@ class _Derived(PlanCache):
         return self.plans[signature]
 
 
-def with_outcome(matcher: Matcher, outcome: Outcome) -> Matcher:
-    """The matcher of a scenario with one outcome of its choices over time."""
-    plans = _Derived(outcome.scenario, matcher.options, whole=matcher.plans)
-    return Matcher(outcome.scenario, matcher.options, matcher.solver, plans)
+def start_matchers(matcher: Matcher, outcomes: Sequence[Outcome]) -> list[Matcher]:
+    """What decides single labels where they are starts, one matcher for each outcome of the choices over time.
+
+    Interchangeable objects take one order in all labels.
+    """
+    plans = PlanCache(matcher.scenario, matcher.options, one_order=True)
+    whole = Matcher(matcher.scenario, matcher.options, matcher.solver, plans)
+
+    def with_outcome(outcome: Outcome) -> Matcher:
+        if outcome.same_start:
+            return whole
+        derived = _Derived(outcome.scenario, matcher.options, whole=plans)
+        return Matcher(outcome.scenario, matcher.options, matcher.solver, derived)
+
+    return [with_outcome(outcome) for outcome in outcomes]
 
 
 @dataclass(eq=False)

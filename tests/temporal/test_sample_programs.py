@@ -108,7 +108,8 @@ def test_limit_counts_intervals(town):
 def test_all_tells_what_kept_a_binding_from_matching(town):
     records = [json.loads(line) for line in run(town, "01_pedestrian_crosses", "--all").splitlines()]
     causes = {each["correspondence"]["walker"]: each["cause"]["what"] for each in records if "cause" in each}
-    assert set(causes.values()) == {"recording-ends"}
+    # lost for good before the recordings end
+    assert set(causes.values()) == {"require always (distance to walker) < 40"}
 
 
 def test_an_export_has_the_frames_of_the_interval_with_the_objects_of_the_roles(town, tmp_path):

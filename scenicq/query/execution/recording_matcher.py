@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
-from scenicq.match.search.plan_cache import PlanCache
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.recording_starts import DecidedStart, few_findings, label_of, start_table, starts_of
 from scenicq.query.execution.results import IntervalSpan, Result
@@ -23,7 +22,8 @@ from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.hidden_runs import Remembered
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
-from scenicq.temporal.starts import RoleCandidates, StartSearch, narrowed, with_outcome
+from scenicq.temporal.outcomes import Outcome
+from scenicq.temporal.starts import RoleCandidates, StartSearch, narrowed, start_matchers
 from scenicq.temporal.stretches import StartTable
 from scenicq.temporal.truth import TRUE, UNKNOWN
 
@@ -133,10 +133,11 @@ class RecordingMatcher:
 
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
-        given = self.matcher
-        plans = PlanCache(given.scenario, given.options, one_order=True)
-        self.matcher = Matcher(given.scenario, given.options, given.solver, plans)
-        self._search = StartSearch(self.matcher)
+        whole, *self._matchers = start_matchers(
+            self.matcher, [Outcome(self.matcher.scenario, {}), *self.intervals.outcomes]
+        )
+        self.matcher = whole
+        self._search = StartSearch(whole)
         self._searches: dict[int, StartSearch] = {}
         self._relevant = relevant_properties(self.matcher.scenario, self.matcher.options)
 
@@ -167,7 +168,7 @@ class RecordingMatcher:
 
             intervals = self.intervals.intervals(table, remember)
             found.counts["bindings"] += len({(each.recording, each.binding) for each in intervals})
-            found.counts["cut off"] += sum(each.cut_off for each in intervals)
+            found.counts["cut off"] += sum(each.cut_off and each.broken is None for each in intervals)
             results = [
                 (int(block.recording_of[at]), _undecided(block, at, verdict)) for at, verdict in undecided.items()
             ]
@@ -192,11 +193,10 @@ class RecordingMatcher:
 
     def _search_of(self, outcome: int) -> StartSearch:
         """What finds the starts with an outcome of the choices over time."""
-        made = self.intervals.outcomes[outcome]
-        if made.same_start:
+        if self.intervals.outcomes[outcome].same_start:
             return self._search
         if outcome not in self._searches:
-            self._searches[outcome] = StartSearch(with_outcome(self.matcher, made))
+            self._searches[outcome] = StartSearch(self._matchers[outcome])
         return self._searches[outcome]
 
     def _starts(self, asked: _Asked, search: StartSearch, outcome: int, found: DecidedRecordings) -> _Starts:
@@ -338,7 +338,7 @@ def _named(track: TrackKey) -> str:
 
 def _cause(seconds: float, interval: IntervalVerdict) -> Cause:
     """Why an interval that ends after some seconds of its recording does not match."""
-    if interval.cut_off:
+    if interval.cut_off and interval.broken is None:
         return Cause(CUT_OFF, f"at {seconds:.1f} s, before the program ends")
     if interval.broken is None:
         return Cause("--min-duration", f"matches only up to {seconds:.1f} s")

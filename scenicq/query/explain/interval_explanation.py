@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenicq.errors import DataError, Diagnostic, Span, render
+from scenicq.errors import DataError, Diagnostic, render
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import Atom
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.interval_frames import locate
@@ -20,14 +18,14 @@ from scenicq.query.execution.recording_starts import DecidedStart, few_findings,
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, columns_of, show_bands
-from scenicq.query.explain.interval_changes import Change, least_changes, may_still_hold
+from scenicq.query.explain.interval_changes import Change, least_changes
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader
-from scenicq.temporal.atoms import HiddenVariable
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
-from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
+from scenicq.temporal.starts import start_matchers
+from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 __all__ = ["IntervalExplanation", "changes_of", "explain_recording", "placed"]
 
@@ -36,6 +34,10 @@ _MOST_ROUNDS = 8
 
 _ROUNDED_S = 0.05
 """Seconds are shown to a tenth."""
+
+
+_Start = tuple[DecidedStart, int]
+"""A start, and the number of the outcome of the choices over time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,30 +168,31 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
     with TrackReader(query.dataset, part) as reader:
         tracks = reader.read(first, end)
     scenario, _ = query.compile(labels[0].map)
-    matcher = Matcher(scenario, query.options.match, solver)
+    intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
+    matchers = start_matchers(Matcher(scenario, query.options.match, solver), intervals.outcomes)
     time_us = None if begins is None else _frame_time(tracks, begins)
     failed: Counter[str] = Counter()
     examples: dict[str, str] = {}
     with TrackBlock(query.dataset, part, [(first, end)]) as block:
-        starts: list[DecidedStart] = []
+        starts: list[_Start] = []
         for sample, label in enumerate(labels):
             if time_us is not None and label.timestamp_us != time_us:
                 continue
-            findings = few_findings(matcher, label, len(starts))
             members = [
                 int(block.ego(np.array([sample]))[0]),
                 *range(*block.object_starts[sample : sample + 2].tolist()),
             ]
-            found = [
-                each for each in starts_of(scenario, block, label, members, findings) if isinstance(each, DecidedStart)
-            ]
-            starts += found
-            if not found:
-                causes = [each.verdict.cause for each in findings if not isinstance(each.verdict, Match)]
-                what = causes[0].what if causes else "tracks"
+            causes: list[str] = []
+            before = len(starts)
+            for outcome, matcher in enumerate(matchers):
+                findings = few_findings(matcher, label, len(starts))
+                found = starts_of(scenario, block, label, members, findings)
+                starts += [(each, outcome) for each in found if isinstance(each, DecidedStart)]
+                causes += [each.verdict.cause.what for each in findings if not isinstance(each.verdict, Match)]
+            if len(starts) == before:
+                what = causes[0] if causes else "tracks"
                 failed[what] += 1
                 examples.setdefault(what, label.frame)
-        intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
         results = _intervals(intervals, scenario, block, starts)
         # what is cut off is looked at where no run comes to its end
         whole = starts
@@ -203,8 +206,6 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
         rarest = min(failed, key=lambda what: failed[what], default="")
         return IntervalExplanation(tracks, None, failed=failed, example=examples.get(rarest, ""))
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
-    if best.cut_off:
-        best = replace(best, broken=_already_broken(scenario, tracks, best))
     roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
     changes = tuple(change.text() for change in changes_of(scenario, tracks, best))
     return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best), changes)
@@ -240,33 +241,18 @@ def changes_of(
 
 
 def _intervals(
-    matcher: IntervalMatcher, scenario: Scenario, block: TrackBlock, starts: Sequence[DecidedStart]
+    matcher: IntervalMatcher, scenario: Scenario, block: TrackBlock, starts: Sequence[_Start]
 ) -> list[IntervalVerdict]:
-    table = start_table(scenario, block, {}, starts)
-    return matcher.intervals(table, lambda number: (starts[number].label, starts[number].correspondence))
+    table = start_table(scenario, block, {}, [start for start, _ in starts])
+    table = replace(table, outcomes=np.array([outcome for _, outcome in starts], dtype=np.int64))
+    return matcher.intervals(table, lambda number: (starts[number][0].label, starts[number][0].correspondence))
 
 
-def _is_after(block: TrackBlock, start: DecidedStart, samples: Mapping[tuple[tuple[int, TrackKey], ...], int]) -> bool:
+def _is_after(block: TrackBlock, start: _Start, samples: Mapping[tuple[tuple[int, TrackKey], ...], int]) -> bool:
     """Whether a start is at the sample that its binding has among some, or after it."""
-    binding = tuple((index, block.key(member)) for index, member in sorted(start.members.items()))
-    return binding in samples and int(block.label_of[next(iter(start.members.values()))]) >= samples[binding]
-
-
-def _already_broken(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> Span | None:
-    """The first requirement that does not hold on an interval, however its recording would go on."""
-    dynamics = scenario.dynamics
-    if dynamics is None:
-        return None
-    columns = columns_of(scenario, tracks, interval)
-
-    def at_each(atom: Atom) -> Truth:
-        return columns.truth(dynamics.conditions[atom.number])
-
-    for requirement in dynamics.requirements:
-        with suppress(HiddenVariable):
-            if not may_still_hold(requirement.formula, at_each):
-                return requirement.span
-    return None
+    members = start[0].members
+    binding = tuple((index, block.key(member)) for index, member in sorted(members.items()))
+    return binding in samples and int(block.label_of[next(iter(members.values()))]) >= samples[binding]
 
 
 def placed(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, IntervalVerdict]:
