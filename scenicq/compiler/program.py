@@ -250,7 +250,7 @@ def _scenario(
     requirements += [_written(condition, span) for condition, span in (*run.excluded.conditions(), *excluded)]
     requirements = [requirement for requirement in requirements if requirement is not None]
     requirements += _built_in(run, ego)
-    ego.label = ego.label or "ego"
+    ego.label = "ego"
     names = _names(run.objects)
     objects = tuple(_object(instance, names[number]) for number, instance in enumerate(run.objects))
     check_directions(objects, requirements)

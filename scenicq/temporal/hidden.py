@@ -11,7 +11,6 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,6 @@ from scenicq.forest.nodes import (
     Logic,
     Node,
     Normal,
-    PointIn,
     Range,
     Scale,
     Select,
@@ -83,29 +81,12 @@ def cells(columns: AtomColumns, conditions: Sequence[Node]) -> Iterator[Cell]:
         UnclearVariable: A condition is not affine in a variable or hangs on two at once, or there are too many cells.
     """
     variables = random_variables(conditions)
-    discrete = [leaf for leaf in variables if isinstance(leaf, Index | DiscreteRange)]
-    continuous = [leaf for leaf in variables if not isinstance(leaf, Index | DiscreteRange)]
-    total = 0
-    for picked in itertools.product(*map(_options, discrete)):
-        fixed: dict[Identity, Value] = {leaf.identity: value for leaf, value in zip(discrete, picked, strict=True)}
-        cuts = [_cuts(columns.assigned(fixed), leaf, continuous, conditions) for leaf in continuous]
-        total += math.prod(map(len, cuts))
-        if total > _MOST_CELLS:
-            raise UnclearVariable("too many values of random variables to tell apart")
-        exact = {identity: (cast(float, value), cast(float, value)) for identity, value in fixed.items()}
-        for parts in itertools.product(*cuts):
-            ranges = {leaf.identity: part for leaf, part in zip(continuous, parts, strict=True)}
-            values = {identity: inside(*part) for identity, part in ranges.items()}
-            yield Cell(fixed | values, exact | ranges)
-
-
-def _options(leaf: Leaf) -> Sequence[float]:
-    if isinstance(leaf, Index):
-        return [float(number) for number in range(len(leaf.weights))]
-    low, high = (_known(part) for part in children(leaf))
-    if abs(high - low) > _MOST_CELLS:
+    cuts = [_cuts(columns, leaf, variables, conditions) for leaf in variables]
+    if math.prod(map(len, cuts)) > _MOST_CELLS:
         raise UnclearVariable("too many values of random variables to tell apart")
-    return [float(number) for number in range(math.ceil(min(low, high)), math.floor(max(low, high)) + 1)]
+    for parts in itertools.product(*cuts):
+        ranges = {leaf.identity: part for leaf, part in zip(variables, parts, strict=True)}
+        yield Cell({identity: inside(*part) for identity, part in ranges.items()}, ranges)
 
 
 def _known(node: Node) -> float:
@@ -128,17 +109,18 @@ def support(leaf: Leaf) -> tuple[float, float]:
             return _known(leaf.low), _known(leaf.high)
         case Normal():
             return -math.inf, math.inf
+        case Index() | DiscreteRange():
+            raise UnclearVariable("too many outcomes of random choices to tell apart")
         case _:
-            kind = "point" if isinstance(leaf, PointIn) else "variable"
-            raise UnclearVariable(f"a hidden random {kind} in a condition over time")
+            raise UnclearVariable("a hidden random point in a condition over time")
 
 
 def _cuts(
-    columns: AtomColumns, leaf: Leaf, continuous: Sequence[Leaf], conditions: Sequence[Node]
+    columns: AtomColumns, leaf: Leaf, variables: Sequence[Leaf], conditions: Sequence[Node]
 ) -> list[tuple[float, float]]:
     """The values at which some condition may change, and the open ranges between them."""
     low, high = support(leaf)
-    others = {each.identity for each in continuous} - {leaf.identity}
+    others = {each.identity for each in variables} - {leaf.identity}
     found: set[float] = {end for end in (low, high) if math.isfinite(end)}
     for node in _comparisons(leaf, conditions):
         if any(each.identity in others for each in leaves(node)):

@@ -7,17 +7,17 @@ matches the scenario of one of them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from scenicq.forest.condition import condition, expand
 from scenicq.forest.groups import PARAMS
-from scenicq.forest.nodes import Constant, DiscreteRange, Feature, Identity, Index, Leaf, Node
+from scenicq.forest.nodes import Feature, Identity, Leaf, Node
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.simplify import rebuilt, roots_of
 from scenicq.forest.temporal import Atom, TemporalRequirement
 from scenicq.forest.walk import deciding_first, features, leaves, transform
+from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import WitnessValue
 from scenicq.temporal.hidden import has_cells
 from scenicq.temporal.samples import MOVING
@@ -61,7 +61,7 @@ def outcomes_of(scenario: Scenario) -> tuple[Outcome, ...]:
         stack += reversed(list(_made(outcome, *choice)))
         if len(found) + len(stack) > _MOST_OUTCOMES:
             return (replace(whole, scenario=_from_the_start(scenario)),)
-    return tuple(found)
+    return tuple(found) or (whole,)
 
 
 def place_of(leaf: Leaf) -> str:
@@ -82,13 +82,9 @@ def _choice(scenario: Scenario) -> tuple[Leaf, range] | None:
     conditions = () if dynamics is None else dynamics.conditions
     # a choice that decides which others matter comes first
     for leaf in deciding_first([expand(each, lambda feature: steady_value(scenario, feature)) for each in conditions]):
-        match leaf:
-            case Index():
-                return leaf, range(len(leaf.weights))
-            case DiscreteRange(low=Constant(value=float() as low), high=Constant(value=float() as high)):
-                return leaf, range(math.ceil(min(low, high)), math.floor(max(low, high)) + 1)
-            case _:
-                pass
+        options = options_of(leaf)
+        if options is not None:
+            return leaf, options
     return None
 
 

@@ -6,17 +6,13 @@ go to a linear program. Every step is exact or says that it does not know.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from typing import cast
 
 from scenicq.budget import look
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import (
     Constant,
-    DiscreteRange,
     Identity,
-    Index,
     Leaf,
     Value,
 )
@@ -25,7 +21,7 @@ from scenicq.match.linear.affine_forms import affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
 from scenicq.match.linear.linear_program import NotLinear
 from scenicq.match.linear.linear_relaxation import solve_affine
-from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.problem.conditioned import Item, conditioned, options_of
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
@@ -80,7 +76,7 @@ class _Cascade:
         if depth > _MOST_CHOSEN:
             raise _Exhausted
         for leaf in deciding_first([node for _, node, _ in open_items]):
-            options = _options(leaf)
+            options = options_of(leaf)
             if options is not None:
                 return self._try_each(items, leaf, options, given, depth + 1)
         if len(open_items) == 1 and isinstance(open_items[0][0], Comparison):
@@ -148,14 +144,3 @@ class _Cascade:
         values = given | found
         holding = replay(items, values, self.tolerance, SLACK)
         return Satisfied(values) if holding else Undecided(constraint, "nonlinear")
-
-
-def _options(leaf: Leaf) -> range | None:
-    match leaf:
-        case Index():
-            return range(len(leaf.weights))
-        case DiscreteRange() if isinstance(leaf.low, Constant) and isinstance(leaf.high, Constant):
-            low, high = cast(float, leaf.low.value), cast(float, leaf.high.value)
-            return range(math.ceil(low), math.floor(high) + 1)
-        case _:
-            return None

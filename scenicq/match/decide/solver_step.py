@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from scenicq.budget import waiting
 from scenicq.forest.groups import Comparison, Constraint
+from scenicq.forest.nodes import Identity, Leaf, Node, Value
+from scenicq.forest.walk import deciding_first
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.conditioned import Item, conditioned, options_of
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 
@@ -16,8 +19,10 @@ if TYPE_CHECKING:  # takes long to load, and most queries ask no solver
     from scenicq.smt.answer import Solver
     from scenicq.smt.encode import Encoding, Target
 
-__all__ = ["ask", "encoded"]
+__all__ = ["ask", "discrete_options", "encoded"]
 
+_MOST_OUTCOMES = 64
+"""Joint outcomes of discrete variables that are asked about one by one; where there are more, the solver has them."""
 _ATTEMPTS = 3
 _REFINED = 100.0
 
@@ -40,13 +45,43 @@ def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: 
 
 
 def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None) -> Outcome:
-    """Decide groups together by a solver; a witness that does not replay is repaired, refined, then given up.
+    """Decide groups together by a solver, for one outcome of their discrete variables after the other.
 
     Args:
         items: The groups after conditioning.
         options: The options.
         solver: The solver, if there is one.
     """
+    known = discrete_options([node for group in items for _, node, _ in group])
+    if solver is None or not known or math.prod(len(numbers) for _, numbers in known) > _MOST_OUTCOMES:
+        return _ask_once(items, options, solver)
+    blamed: Outcome = Refuted(next(constraint for group in items for constraint, _, _ in group))
+    todo: list[tuple[Sequence[Sequence[Item]], dict[Identity, Value]]] = [(items, {})]
+    while todo:
+        asked, given = todo.pop()
+        open_ = discrete_options([node for group in asked for _, node, _ in group])
+        if not open_:
+            outcome = _ask_once(asked, options, solver)
+            if isinstance(outcome, Satisfied):
+                return Satisfied({**outcome.values, **given})
+            blamed = blamed if isinstance(blamed, Undecided) else outcome
+            continue
+        leaf, numbers = open_[0]
+        for number in reversed(numbers):
+            chosen: dict[Identity, Value] = {leaf.identity: float(number)}
+            memo: dict[int, Node] = {}
+            todo.append(([conditioned(group, chosen, memo=memo) for group in asked], given | chosen))
+    return blamed
+
+
+def discrete_options(roots: Sequence[Node]) -> list[tuple[Leaf, range]]:
+    """The discrete variables of expressions whose options are known; those that decide which others matter first."""
+    found = [(leaf, options_of(leaf)) for leaf in deciding_first(roots)]
+    return [(leaf, options) for leaf, options in found if options is not None]
+
+
+def _ask_once(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None) -> Outcome:
+    """Decide groups by one question; a witness that does not replay is repaired, refined, then given up."""
     flat = [item for group in items for item in group]
     blame = flat[0][0]
     if solver is None:

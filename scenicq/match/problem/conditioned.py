@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import cast
 
 from scenicq.forest import build
 from scenicq.forest.condition import Observation, condition
 from scenicq.forest.groups import Comparison, Condition, Constraint, Group
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Compare, CompareOp, Feature, Identity, Index, Logic, LogicOp, Node, Select, Value
+from scenicq.forest.nodes import (
+    Compare,
+    CompareOp,
+    Constant,
+    DiscreteRange,
+    Feature,
+    Identity,
+    Index,
+    Leaf,
+    Logic,
+    LogicOp,
+    Node,
+    Select,
+    Value,
+)
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import children, postorder
 
-__all__ = ["Item", "condition_group", "conditioned", "fact", "item_conjuncts"]
+__all__ = ["Item", "condition_group", "conditioned", "fact", "item_conjuncts", "options_of"]
 
 Item = tuple[Constraint, Node, Value]
 """A constraint, what conditioning left of its expression, and the label's value if it is a comparison."""
@@ -96,3 +112,14 @@ def item_conjuncts(item: Item) -> list[Item]:
             index = Index((1.0,) * len(args), span=node.span)
             found.append((constraint, Select(index, args, span=node.span), seen))
     return found
+
+
+def options_of(leaf: Leaf) -> range | None:
+    """The values of a discrete variable; None if it is none, or they are not known."""
+    match leaf:
+        case Index():
+            return range(len(leaf.weights))
+        case DiscreteRange(low=Constant(value=low), high=Constant(value=high)):
+            return range(math.ceil(cast(float, low)), math.floor(cast(float, high)) + 1)
+        case _:
+            return None
