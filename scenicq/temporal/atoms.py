@@ -7,7 +7,6 @@ allows several directions, any of them will do.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
@@ -73,18 +72,22 @@ class AtomColumns:
         samples: The samples.
         assignment: Values of random variables.
         start: For each sample the first one of its run, at which what is not current is read; None where each is one.
+        undecided: Samples at which more directions were allowed than were tried.
     """
 
     scenario: Scenario
     samples: Observed
     assignment: Mapping[Identity, Value] = field(default_factory=dict["Identity", "Value"])
     start: NDArray[np.int64] | None = None
+    undecided: list[NDArray[np.bool_]] = field(default_factory=list["NDArray[np.bool_]"])
     _features: dict[tuple[int, str], Column | None] = field(default_factory=dict["tuple[int, str]", "Column | None"])
     _looked_up: dict[int, _LookedUp] = field(default_factory=dict["int", "_LookedUp"])
 
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
         """The same with values of random variables; what is observed, and the map's answers about it, are shared."""
-        return AtomColumns(self.scenario, self.samples, assignment, self.start, self._features, self._looked_up)
+        return AtomColumns(
+            self.scenario, self.samples, assignment, self.start, self.undecided, self._features, self._looked_up
+        )
 
     def expanded(self, condition: Node) -> Node:
         """A condition with the program's own value of what no label observes and what does not change."""
@@ -103,21 +106,42 @@ class AtomColumns:
         return self.truth_of(self.expanded(condition))
 
     def truth_of(self, condition: Node) -> Truth:
-        """As `truth`, of an expanded condition."""
-        most: dict[int, int] = {}
-        found = self._truth(condition, {}, most)
-        for picks in itertools.islice(itertools.product(*map(range, most.values())), 1, _MOST_CHOICES):
-            found = np.maximum(found, self._truth(condition, dict(zip(most, picks, strict=True)), {}))
+        """As `truth`, of an expanded condition; unknown where too many directions are allowed to try them all."""
+        found = np.full(len(self.samples), FALSE)
+        several = np.zeros(len(self.samples), np.bool_)
+        todo: list[dict[int, int]] = [{}]
+        seen = {frozenset[tuple[int, int]]()}
+        for _ in range(_MOST_CHOICES):
+            if not todo:
+                return found
+            picks = todo.pop(0)
+            counts: dict[int, NDArray[np.intp]] = {}
+            found = np.maximum(found, self._truth(condition, picks, counts))
+            for node, count in counts.items():
+                several |= count > 1
+                # a direction may lead to where other ones are allowed
+                for number in range(1, int(count.max())) if node not in picks else ():
+                    further = {**picks, node: number}
+                    if (key := frozenset(further.items())) not in seen:
+                        seen.add(key)
+                        todo.append(further)
+        if todo:
+            open_ = several & (found != TRUE)
+            self.undecided.append(open_)
+            found[open_] = UNKNOWN
         return found
 
     def number(self, node: Node) -> Numbers | None:
-        """The values of an expanded scalar expression, nan where it has none; None if it is no number."""
+        """The values of an expanded scalar expression, nan where it has none; None if it is no one number."""
         found = self.scalar(node)
         return None if found is None else found[0]
 
     def scalar(self, node: Node) -> tuple[Numbers, NDArray[np.bool_]] | None:
         """As `number`, with where the value is not known."""
-        data, status = self._evaluate(node, {}, {})
+        found = self.column(node)
+        if found is None:
+            return None
+        data, status = found
         if not isinstance(data, np.ndarray) or data.dtype == np.bool_:
             return None
         n = len(self.samples)
@@ -130,9 +154,9 @@ class AtomColumns:
         Raises:
             HiddenVariable: It hangs on a random variable without a value.
         """
-        most: dict[int, int] = {}
-        found = self._evaluate(node, {}, most)
-        return None if most else found
+        counts: dict[int, NDArray[np.intp]] = {}
+        found = self._evaluate(node, {}, counts)
+        return None if any((each > 1).any() for each in counts.values()) else found
 
     def observed(self, feature: Feature, sample: int) -> Value:
         """What is observed of a feature at a sample; None if nothing is."""
@@ -154,23 +178,23 @@ class AtomColumns:
             return None
         return self.scenario.objects[feature.object].properties[feature.property].value
 
-    def _truth(self, condition: Node, chosen: Mapping[int, int], most: dict[int, int]) -> Truth:
-        data, status = self._evaluate(condition, chosen, most)
+    def _truth(self, condition: Node, chosen: Mapping[int, int], counts: dict[int, NDArray[np.intp]]) -> Truth:
+        data, status = self._evaluate(condition, chosen, counts)
         held = np.where(truth_of(data), TRUE, FALSE)
         found = np.where(status == DEFINED, held, np.where(status == UNDEFINED, FALSE, UNKNOWN))
         return np.broadcast_to(found, len(self.samples)).copy()
 
-    def _evaluate(self, root: Node, chosen: Mapping[int, int], most: dict[int, int]) -> Column:
+    def _evaluate(self, root: Node, chosen: Mapping[int, int], counts: dict[int, NDArray[np.intp]]) -> Column:
         """The values of an expression.
 
         Args:
             root: The expression.
             chosen: Which of several directions a field takes, by the id of its node; the first if not given.
-            most: Gets how many directions a field allows at most, where these are several.
+            counts: Gets how many directions a field allows at each sample, where these are several somewhere.
         """
 
-        def pick(node: DirectionAt, counts: NDArray[np.intp]) -> NDArray[np.intp]:
-            most[id(node)] = int(counts.max())
+        def pick(node: DirectionAt, allowed: NDArray[np.intp]) -> NDArray[np.intp]:
+            counts[id(node)] = allowed
             return np.full(1, chosen.get(id(node), 0))
 
         domain = ColumnDomain(self._observed, self._assigned, pick)

@@ -220,7 +220,7 @@ def affine_sides(
         assigned = columns.assigned({**columns.assignment, leaf.identity: value})
         left, right = (assigned.scalar(side) for side in (node.left, node.right))
         if left is None or right is None:
-            raise UnclearVariable("a comparison of what are no numbers with a hidden random variable")
+            raise UnclearVariable("a comparison of what is not one number with a hidden random variable")
         sides.append(left[0] - right[0])
         unknown = left[1] | right[1]
     assert unknown is not None

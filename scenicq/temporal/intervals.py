@@ -21,7 +21,6 @@ from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.preprocess import ready
 from scenicq.match.verdict import WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.tracks import TrackKey
@@ -128,7 +127,6 @@ class IntervalMatcher:
 
     def __post_init__(self) -> None:
         """Split off the choices."""
-        self.scenario = ready(self.scenario)
         self.outcomes = outcomes_of(self.scenario)
 
     def _program(self, outcome: int) -> _Program:
@@ -184,7 +182,7 @@ class IntervalMatcher:
         if random_variables(expanded):
             every = self.options.intervals == "all"
             hidden = HiddenRuns(program.runs, program.scenario, self.match, self.solver, every)
-            return _found(stretches, table, hidden.follow(stretches, columns, expanded, remember))
+            return _found(stretches, table, columns, hidden.follow(stretches, columns, expanded, remember))
         known: dict[int, Truth] = {}
 
         def atom(each: Atom) -> Truth:
@@ -192,7 +190,7 @@ class IntervalMatcher:
                 known[each.number] = columns.truth_of(expanded[each.number])
             return known[each.number]
 
-        return _found(stretches, table, HiddenFound(program.runs.follow(stretches, atom)))
+        return _found(stretches, table, columns, HiddenFound(program.runs.follow(stretches, atom)))
 
     def _reported(
         self, parts: Sequence[_Found], table: StartTable, bindings: NDArray[np.int64]
@@ -274,7 +272,7 @@ def _sorted(table: StartTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return distinct[order], np.concatenate(([0], np.cumsum(changes))) if len(order) else np.empty(0, np.int64)
 
 
-def _found(stretches: Stretches, table: StartTable, found: HiddenFound) -> _Found:
+def _found(stretches: Stretches, table: StartTable, columns: AtomColumns, found: HiddenFound) -> _Found:
     """The runs of stretches as labels of their block; a start that is not sure makes a run that is not."""
     runs, labels = found.runs, stretches.labels
     which, ends = np.arange(len(stretches.starts)), runs.ends
@@ -288,6 +286,12 @@ def _found(stretches: Stretches, table: StartTable, found: HiddenFound) -> _Foun
     origins = stretches.numbers[which]
     truth = np.minimum(truth, np.where(table.sure[origins], TRUE, UNKNOWN))
     details = {(number, int(labels[end])): each for (number, end), each in found.details.items()}
+    limited = runs.undecided.copy()
+    for undecided in columns.undecided:
+        before = np.concatenate(([0], np.cumsum(undecided)))
+        limited |= before[stretches.ends() + 1] > before[stretches.starts]
+    for start in np.flatnonzero(limited & (runs.truth == UNKNOWN)).tolist():
+        details.setdefault((int(stretches.numbers[start]), int(labels[runs.ends[start]])), ("budget", {}))
     return _Found(labels[stretches.starts[which]], labels[ends], truth, origins, broken, cut_off, details)
 
 

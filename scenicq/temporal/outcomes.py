@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from scenicq.compiler.occupancy import Ranked
 from scenicq.forest.condition import condition, expand
 from scenicq.forest.groups import PARAMS
-from scenicq.forest.nodes import Feature, Identity, Leaf, Node
+from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, Select
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.simplify import rebuilt, roots_of
 from scenicq.forest.temporal import Atom, TemporalRequirement
-from scenicq.forest.walk import deciding_first, features, leaves, transform
+from scenicq.forest.walk import children, deciding_first, features, leaves, postorder, transform
 from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import WitnessValue
 from scenicq.temporal.hidden import has_cells
@@ -47,7 +48,7 @@ def outcomes_of(scenario: Scenario) -> tuple[Outcome, ...]:
     """The joint outcomes of the choices that conditions over time hang on; one without choices if there are none.
 
     Args:
-        scenario: The scenario, made ready to be matched.
+        scenario: The scenario as compiled.
     """
     found: list[Outcome] = []
     whole = Outcome(scenario, {})
@@ -80,12 +81,26 @@ def _choice(scenario: Scenario) -> tuple[Leaf, range] | None:
     """A choice that conditions over time hang on, with its options."""
     dynamics = scenario.dynamics
     conditions = () if dynamics is None else dynamics.conditions
+    roots = [expand(each, lambda feature: steady_value(scenario, feature)) for each in conditions]
+    # which of several elements lie at a hidden place is for the matcher to tell
+    of_places = {
+        node.index.identity
+        for node in postorder(roots)
+        if isinstance(node, Select) and isinstance(node.index, Index) and all(map(_is_hidden_lookup, node.options))
+    }
     # a choice that decides which others matter comes first
-    for leaf in deciding_first([expand(each, lambda feature: steady_value(scenario, feature)) for each in conditions]):
+    for leaf in deciding_first(roots):
         options = options_of(leaf)
-        if options is not None:
+        if options is not None and leaf.identity not in of_places:
             return leaf, options
     return None
+
+
+def _is_hidden_lookup(node: Node) -> bool:
+    return any(
+        isinstance(each, DirectionAt) and isinstance(each.field, Constant) and isinstance(each.field.value, Ranked)
+        for each in (node, *children(node))
+    ) and bool(leaves(node))
 
 
 def _from_the_start(scenario: Scenario) -> Scenario:

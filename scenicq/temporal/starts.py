@@ -23,6 +23,8 @@ from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearE
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint, relevant_properties
 from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.symmetry import classes_of_twins
 from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.plan_cache import PlanCache
 from scenicq.store.track_block import TrackBlock
@@ -32,7 +34,7 @@ from scenicq.temporal.presence import by_presence, observes
 from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["RoleCandidates", "StartSearch", "Starts", "classes_of_twins", "narrowed", "start_matchers"]
+__all__ = ["RoleCandidates", "StartSearch", "Starts", "narrowed", "start_matchers"]
 
 Members = NDArray[np.int64]
 _MOST_TUPLES = 64
@@ -87,6 +89,11 @@ class _Derived(PlanCache):
         """What matters of a label is what mattered before."""
         self.relevant = self.whole.relevant
 
+    @property
+    def always_twins(self) -> Mapping[int, int]:
+        """Those of the other scenario."""
+        return self.whole.always_twins
+
     def plan(self, signature: Signature) -> MatchPlan:
         """The groups for a signature."""
         if signature not in self.plans:
@@ -105,8 +112,9 @@ def start_matchers(matcher: Matcher, outcomes: Sequence[Outcome]) -> list[Matche
     def with_outcome(outcome: Outcome) -> Matcher:
         if outcome.same_start:
             return whole
-        derived = _Derived(outcome.scenario, matcher.options, whole=plans)
-        return Matcher(outcome.scenario, matcher.options, matcher.solver, derived)
+        scenario = ready(outcome.scenario)
+        derived = _Derived(scenario, matcher.options, whole=plans)
+        return Matcher(scenario, matcher.options, matcher.solver, derived)
 
     return [with_outcome(outcome) for outcome in outcomes]
 
@@ -359,18 +367,3 @@ def _getter(places: BoundSamples, number: int) -> Get:
         return value if isinstance(value, str | bool) else float(value)  # type: ignore[arg-type]
 
     return get
-
-
-def classes_of_twins(twins: Mapping[int, int]) -> list[list[int]]:
-    """Objects that are interchangeable with each other.
-
-    Args:
-        twins: For an object, an earlier one that is interchangeable with it.
-    """
-    found: dict[int, list[int]] = {}
-    first: dict[int, int] = {}
-    for index, earlier in sorted(twins.items()):
-        head = first.get(earlier, earlier)
-        first[index] = head
-        found.setdefault(head, [head]).append(index)
-    return list(found.values())

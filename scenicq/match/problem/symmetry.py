@@ -36,7 +36,7 @@ from scenicq.forest.walk import children, features, is_leaf, leaves, postorder
 from scenicq.geometry.regions import DifferenceOf, IntersectionOf, UnionOf
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["GroupShape", "interchangeable", "shape_of"]
+__all__ = ["GroupShape", "classes_of_twins", "in_one_order", "interchangeable", "shape_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +129,34 @@ def interchangeable(
             found[owner.index] = earlier
         last[key] = owner.index
     return found
+
+
+def classes_of_twins(twins: Mapping[int, int]) -> list[list[int]]:
+    """Objects that are interchangeable with each other.
+
+    Args:
+        twins: For an object, an earlier one that is interchangeable with it.
+    """
+    found: dict[int, list[int]] = {}
+    first: dict[int, int] = {}
+    for index, earlier in sorted(twins.items()):
+        head = first.get(earlier, earlier)
+        first[index] = head
+        found.setdefault(head, [head]).append(index)
+    return list(found.values())
+
+
+def in_one_order(assignment: Mapping[int, int], twins: Mapping[int, int]) -> frozenset[tuple[int, int]]:
+    """Who plays whom, interchangeable objects in ascending order.
+
+    Args:
+        assignment: The number of the label object of each object.
+        twins: For an object, an earlier one that is interchangeable with it.
+    """
+    found = dict(assignment)
+    for alike in classes_of_twins(twins):
+        found.update(zip(sorted(alike), sorted(assignment[index] for index in alike), strict=True))
+    return frozenset(found.items())
 
 
 @dataclass(frozen=True, slots=True)

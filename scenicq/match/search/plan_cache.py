@@ -49,12 +49,9 @@ class PlanCache:
             self.plans[signature] = replace(plan, twins=self._twins(plan))
         return self.plans[signature]
 
-    def _twins(self, plan: MatchPlan) -> Mapping[int, int]:
-        """Interchangeable objects: those that the program treats alike, and for one label those of which it knows so.
-
-        What the program treats alike in all that it says is alike in every label. What it treats alike in what a label
-        tells is so only where it asks the same of both, and the label tells as much of one as of the other.
-        """
+    @property
+    def always_twins(self) -> Mapping[int, int]:
+        """Objects that are interchangeable in every label: for each, an earlier one."""
         if self._always_twins is None:
             every = (*self.relevant, frozenset(self.scenario.params))
             groups = build_groups(self.scenario, every, self.options)
@@ -62,14 +59,22 @@ class PlanCache:
             self._always_twins = interchangeable(
                 self.scenario, groups, shapes, self.options.tolerance, used=self.relevant
             )
+        return self._always_twins
+
+    def _twins(self, plan: MatchPlan) -> Mapping[int, int]:
+        """Interchangeable objects: those that the program treats alike, and for one label those of which it knows so.
+
+        What the program treats alike in all that it says is alike in every label. What it treats alike in what a label
+        tells is so only where it asks the same of both, and the label tells as much of one as of the other.
+        """
         if self.one_order:
-            return self._always_twins
+            return self.always_twins
         here = {
             one: other
             for one, other in plan.twins.items()
             if self.relevant[one] == self.relevant[other] and plan.signature[one] == plan.signature[other]
         }
-        return {**self._always_twins, **here}
+        return {**self.always_twins, **here}
 
     def first_fits(
         self, labels: Iterable[tuple[Label, Candidates | None]], given: Mapping[str, str]

@@ -14,10 +14,10 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.explanation import Finding
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.candidates import Candidates
+from scenicq.match.problem.symmetry import classes_of_twins
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.store.labels import Label, LabelObject, Motion
 from scenicq.store.track_block import TrackBlock
-from scenicq.temporal.starts import classes_of_twins
 from scenicq.temporal.stretches import StartTable
 
 __all__ = ["DecidedStart", "few_findings", "label_of", "start_table", "starts_of"]

@@ -1,0 +1,495 @@
+"""Choices over time straight from their definition: every outcome, every binding, every pair of samples.
+
+A program is drawn as data, of which the text is one reading and the plain functions here the other. All random
+variables have finitely many values that make a difference: outcomes of choices, and numbers half a unit apart. What is
+not observed of a condition at a sample may be either; of few such places every completion is tried.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from interval_definition import GAP_S, MONITORS, Formula, conditions, holds, monitored, text_of
+
+from scenicq.store.labels import Label, LabelObject, Recording
+
+MOST_GAPS = 6
+COMPLETIONS = 12
+Values = Mapping[str, float]
+"""The value of each random variable."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a label says of an object: place, heading in degrees, velocity; None where it does not."""
+
+    x: float
+    y: float
+    heading: float | None
+    velocity: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Time in seconds, and what is seen of each track; the ego is the track "ego"."""
+
+    time: float
+    seen: dict[str, Seen]
+
+
+Trace = list[Moment]
+
+
+def recording_of(name: str, trace: Trace) -> Recording:
+    """The recording that shows a trace."""
+
+    def shown(seen: Seen, id_: str, track: str | None) -> LabelObject:
+        heading = None if seen.heading is None else math.radians(seen.heading)
+        return LabelObject(id_, "Car", "car", seen.x, seen.y, heading, velocity=seen.velocity, track=track)
+
+    labels = [
+        Label(
+            f"{name}-{number}", name, round(each.time * 1e6), "none", shown(each.seen["ego"], "ego", None),
+            tuple(shown(seen, f"{track}{number}", track) for track, seen in each.seen.items() if track != "ego"),
+        )
+        for number, each in enumerate(trace)
+    ]  # fmt: skip
+    return Recording(name, "none", tuple(labels))
+
+
+def speed(trace: Trace, track: str, k: int) -> float | None:
+    """The label's own, else by differences over the neighbouring samples of the track."""
+    own = [m for m, each in enumerate(trace) if track in each.seen]
+    if k not in own:
+        return None
+    if (velocity := trace[k].seen[track].velocity) is not None:
+        return math.hypot(*velocity)
+    place = own.index(k)
+    near = [m for m in own[max(place - 1, 0) : place + 2] if abs(trace[m].time - trace[k].time) <= 1.5]
+    first, last = trace[near[0]], trace[near[-1]]
+    if first is last:
+        return None
+    one, other = first.seen[track], last.seen[track]
+    return math.hypot(other.x - one.x, other.y - one.y) / (last.time - first.time)
+
+
+@dataclass(frozen=True)
+class Situation:
+    """A trace, the track of each role, and the value of each random variable."""
+
+    trace: Trace
+    binding: dict[str, str]
+    values: Values
+
+    def seen(self, role: str, k: int) -> Seen | None:
+        return self.trace[k].seen.get(self.binding[role])
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """An atom: its text, and its value at a sample, None where it is not observed."""
+
+    text: str
+    value: Callable[[Situation, int], bool | None]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A random variable: its name, what the program says of it, the values of its leaves, and its own value.
+
+    Attributes:
+        name, text: Of the program.
+        leaves: Values of each leaf, by name.
+        value: The value, given those of the leaves: a number, the number of an option.
+    """
+
+    name: str
+    text: str
+    leaves: dict[str, tuple[float, ...]]
+    value: Callable[[Values], float]
+    regions: tuple[tuple[float, float, float], ...] = ()
+    objects: tuple[str, ...] = ()
+
+
+def halves(low: float, high: float) -> tuple[float, ...]:
+    """Every value that makes a difference: what is compared with it are whole numbers and halves."""
+    return tuple(low + n / 4 for n in range(round((high - low) * 4) + 1))
+
+
+def random_choice(draw: random.Random, name: str, roles: list[str], earlier: list[Choice]) -> Choice:
+    """Draw a random variable."""
+    numbers = [choice for choice in earlier if not choice.regions and not choice.objects]
+    kinds = [
+        "uniform",
+        "discrete",
+        "range",
+        "continuous",
+        "ranges",
+        "objects",
+        "regions",
+        *(["nested"] * 2 * bool(numbers)),
+    ]
+    some = draw.sample([-3, -1, 0, 1, 2, 4], draw.randint(2, 3))
+    leaf = f"{name}.index"
+    match draw.choice(kinds):
+        case "uniform":
+            return Choice(name, f"Uniform({', '.join(map(str, some))})", {leaf: tuple(range(len(some)))},
+                          lambda v: some[int(v[leaf])])  # fmt: skip
+        case "discrete":
+            weighted = ", ".join(f"{each}: {draw.choice([1, 2])}" for each in some)
+            return Choice(name, f"Discrete({{{weighted}, 99: 0}})", {leaf: tuple(range(len(some)))},
+                          lambda v: some[int(v[leaf])])  # fmt: skip
+        case "range":
+            low = draw.randint(-3, 1)
+            high = low + draw.randint(1, 3)
+            return Choice(name, f"DiscreteRange({low}, {high})", {leaf: tuple(range(low, high + 1))}, lambda v: v[leaf])
+        case "continuous":
+            low = draw.randint(-3, 1)
+            high = low + draw.randint(1, 3)
+            return Choice(name, f"Range({low}, {high})", {leaf: halves(low, high)}, lambda v: v[leaf])
+        case "ranges":
+            ends = [(low := draw.randint(-3, 2), low + draw.randint(1, 2)) for _ in range(2)]
+            parts = {f"{name}.{n}": halves(*each) for n, each in enumerate(ends)}
+            text = ", ".join(f"Range({low}, {high})" for low, high in ends)
+            return Choice(name, f"Uniform({text})", {leaf: (0, 1), **parts}, lambda v: v[f"{name}.{int(v[leaf])}"])
+        case "objects":
+            who = tuple(draw.sample(["ego", *roles], draw.randint(1, len(roles) + 1)))
+            return Choice(name, f"Uniform({', '.join(who)})", {leaf: tuple(range(len(who)))}, lambda v: v[leaf],
+                          objects=who)  # fmt: skip
+        case "regions":
+            circles = tuple((draw.randint(-3, 3), draw.randint(-3, 3), draw.choice([2.5, 5])) for _ in range(2))
+            text = ", ".join(f"CircularRegion(({x}, {y}), {r})" for x, y, r in circles)
+            return Choice(name, f"Uniform({text})", {leaf: (0, 1)}, lambda v: v[leaf], regions=circles)
+        case _:
+            inner, factor = draw.choice(numbers), draw.choice([-2, 2, 3])
+            return Choice(
+                name, f"Uniform({inner.name}, {factor} * {inner.name}, {some[0]})", {leaf: (0, 1, 2), **inner.leaves},
+                lambda v: [1, factor, 0][int(v[leaf])] * inner.value(v) + some[0] * (v[leaf] == 2),
+            )  # fmt: skip
+
+
+def random_condition(draw: random.Random, roles: list[str], choices: list[Choice]) -> Condition:
+    """Draw an atom."""
+    role, number = draw.choice(["ego", *roles]), draw.randint(-3, 4) + draw.choice([0, 0.5])
+    if not choices or draw.random() < 0.35:
+        match draw.choice(["x", "speed", "distance"]):
+            case "x":
+                return Condition(
+                    f"({role}.position.x > {number})",
+                    lambda s, k: None if (p := s.seen(role, k)) is None else p.x > number,
+                )
+            case "speed":
+                return Condition(
+                    f"({role}.speed <= {abs(number)})",
+                    lambda s, k: None if (v := speed(s.trace, s.binding[role], k)) is None else v <= abs(number),
+                )
+            case _:
+                other = draw.choice(roles)
+
+                def near(s: Situation, k: int) -> bool | None:
+                    p, q = s.seen(role, k), s.seen(other, k)
+                    return None if p is None or q is None else math.hypot(p.x - q.x, p.y - q.y) < abs(number) + 1
+
+                return Condition(f"((distance from {role} to {other}) < {abs(number) + 1})", near)
+    choice = draw.choice(choices)
+    name = choice.name
+    if choice.regions:
+
+        def inside(s: Situation, k: int) -> bool | None:
+            x, y, r = choice.regions[int(choice.value(s.values))]
+            return None if (p := s.seen(role, k)) is None else math.hypot(p.x - x, p.y - y) <= r
+
+        return Condition(f"({role}.position in {name})", inside)
+    if choice.objects:
+
+        def of_option(s: Situation, k: int) -> bool | None:
+            p = s.seen(choice.objects[int(choice.value(s.values))], k)
+            return None if p is None else p.x > number
+
+        return Condition(f"({name}.position.x > {number})", of_option)
+    match draw.choice(["alone", "x", "x", "speed"]):
+        case "alone":
+            return Condition(f"({name} > {number})", lambda s, k: choice.value(s.values) > number)
+        case "x":
+            return Condition(
+                f"({role}.position.x <= {name})",
+                lambda s, k: None if (p := s.seen(role, k)) is None else p.x <= choice.value(s.values),
+            )
+        case _:
+            return Condition(
+                f"({role}.speed > {name})",
+                lambda s, k: None if (v := speed(s.trace, s.binding[role], k)) is None else v > choice.value(s.values),
+            )
+
+
+def random_formula(draw: random.Random, atom: Callable[[], Condition], depth: int) -> Formula:
+    """Draw a formula with an operator of time outside."""
+    kind = draw.choice(["always", "always", "eventually", "eventually", "next", "until", "and", "or", "not"])
+    parts = 2 if kind in ("and", "or", "until") else 1
+    inner = [
+        random_formula(draw, atom, depth - 1) if depth and draw.random() < 0.5 else ("atom", atom())
+        for _ in range(parts)
+    ]
+    if kind in ("and", "or", "not"):
+        inner = [("always", each) if each[0] == "atom" else each for each in inner]
+    return kind, *inner
+
+
+@dataclass
+class Program:
+    """A dynamic program with one or two roles."""
+
+    roles: list[str]
+    faces: Choice | None
+    choices: list[Choice]
+    start: list[Condition]
+    requirements: list[Formula]
+    ends: list[Condition]
+    late_ends: list[Condition]
+    after_s: float | None
+    monitors: list[tuple[str, list[Condition]]]
+    atoms: list[Condition] = field(default_factory=list[Condition])
+
+    @property
+    def terminates(self) -> bool:
+        """Whether it says when it ends."""
+        by_monitor = any(kind != "demands" for kind, _ in self.monitors)
+        return bool(self.ends or self.late_ends) or self.after_s is not None or by_monitor
+
+    def text(self) -> str:
+        """The program in Scenic."""
+        anywhere = "new Object at (Range(-999, 999), Range(-999, 999)), facing"
+        lines = [f"ego = {anywhere} Range(-180, 180) deg"]
+        if self.faces is not None:
+            lines.append(f"{self.faces.name} = {self.faces.text}")
+        for role in self.roles:
+            facing = self.faces.name if self.faces is not None and role == "a" else "Range(-180, 180)"
+            lines.append(f"{role} = {anywhere} {facing} deg")
+        lines += [f"{each.name} = {each.text}" for each in self.choices if each is not self.faces]
+        lines += [f"require {each.text}" for each in self.start]
+        lines += [f"require {text_of(each)}" for each in self.requirements]
+        lines += [f"terminate when {each.text}" for each in self.ends]
+        lines += [f"terminate simulation when {each.text}" for each in self.late_ends]
+        lines += [f"terminate after {self.after_s} seconds"] if self.after_s is not None else []
+        for number, (kind, atoms) in enumerate(self.monitors):
+            body = MONITORS[kind][0].format(*(atom.text for atom in atoms))
+            lines += [f"monitor M{number}():\n    {body}", f"require monitor M{number}()"]
+        return "\n".join(lines) + "\n"
+
+    def assignments(self) -> Iterator[Values]:
+        """Every value of the leaves."""
+        leaves = {name: values for choice in self.choices for name, values in choice.leaves.items()}
+        used = {name for choice in self.used() for name in choice.leaves}
+        leaves = {name: values if name in used else values[:1] for name, values in leaves.items()}
+        for values in itertools.product(*leaves.values()):
+            yield dict(zip(leaves, values, strict=True))
+
+    def used(self) -> list[Choice]:
+        """The random variables that something reads, or that one of these is made of."""
+        text = " ".join(line for line in self.text().splitlines() if not re.match(r"[A-Z]\d ?=", line))
+        words = set(re.findall(r"\w+", text))
+        for choice in reversed(self.choices):
+            if choice.name in words:
+                words |= set(re.findall(r"\w+", choice.text))
+        return [choice for choice in self.choices if choice.name in words]
+
+    def tells_apart(self) -> bool:
+        """Whether the program says something of `a` that it does not say of `b`, whatever alike choices are called."""
+        if len(self.roles) < 2 or self.faces is not None:
+            return True
+
+        def said(names: Mapping[str, str]) -> list[str]:
+            text = "".join(names.get(word, word) for word in re.split(r"\b", self.text()))
+            text = re.sub(r"from (\w+) to (\w+)", lambda m: "from {} to {}".format(*sorted(m.groups())), text)
+            return sorted(re.sub(r"M\d", "M", text).splitlines())
+
+        alike = [choice.name for choice in self.choices]
+        ways = itertools.permutations(alike) if len(alike) < 4 else [alike]
+        return all(said({}) != said({"a": "b", "b": "a", **dict(zip(alike, way, strict=True))}) for way in ways)
+
+
+def random_program(draw: random.Random) -> Program:
+    """Draw a program."""
+    roles = ["a", "b"][: draw.randint(1, 2)]
+    choices: list[Choice] = []
+    for number in range(draw.randint(0, 3)):
+        choices.append(random_choice(draw, f"C{number}", roles, choices))
+    faces = None
+    if draw.random() < 0.2:
+        some = draw.sample([-90, 0, 90], 2)
+        faces = Choice("F9", f"Uniform({some[0]}, {some[1]})", {"F9.index": (0, 1)}, lambda v: some[int(v["F9.index"])])
+        choices = [faces, *choices]
+    atoms: list[Condition] = []
+
+    def atom() -> Condition:
+        if atoms and draw.random() < 0.25:
+            # the same again, of the other role where there is one
+            again = draw.choice(atoms)
+            atoms.append(Condition(again.text, again.value))
+        else:
+            atoms.append(random_condition(draw, roles, choices))
+        return atoms[-1]
+
+    start = [atom() for _ in range(draw.choice([0, 1, 1, 2]))]
+    requirements = [random_formula(draw, atom, 1) for _ in range(draw.randint(0, 2))]
+    ends = [atom() for _ in range(draw.choice([0, 0, 1]))]
+    late_ends = [atom() for _ in range(draw.choice([0, 0, 0, 1]))]
+    after_s = draw.choice([None, None, 0.5, 1.0])
+    kinds = [draw.choice(list(MONITORS)) for _ in range(draw.choice([0, 0, 1]))]
+    monitors = [(kind, [atom() for _ in range(MONITORS[kind][1])]) for kind in kinds]
+    if not (requirements or ends or late_ends or monitors) and after_s is None:
+        after_s = 1.0
+    return Program(roles, faces, choices, start, requirements, ends, late_ends, after_s, monitors, atoms)
+
+
+def alike(program: Program) -> Program:
+    """The program that says of `b` all that it says of `a`, too, where it has no choice of objects."""
+    if len(program.roles) < 2 or program.faces is not None or any(each.objects for each in program.choices):
+        return program
+
+    def other(condition: Condition) -> Condition:
+        swap = {"a": "b", "b": "a"}
+        text = "".join(swap.get(word, word) for word in re.split(r"\b", condition.text))
+
+        def value(s: Situation, k: int) -> bool | None:
+            turned = {swap.get(role, role): track for role, track in s.binding.items()}
+            return condition.value(replace(s, binding=turned), k)
+
+        return Condition(text, value)
+
+    def turned(formula: Formula) -> Formula:
+        if formula[0] == "atom":
+            return "atom", other(formula[1])
+        return formula[0], *map(turned, formula[1:])
+
+    return replace(
+        program,
+        start=[*program.start, *map(other, program.start)],
+        requirements=[*program.requirements, *map(turned, program.requirements)],
+        ends=[*program.ends, *map(other, program.ends)],
+        late_ends=[*program.late_ends, *map(other, program.late_ends)],
+        monitors=[*program.monitors, *((kind, [other(each) for each in atoms]) for kind, atoms in program.monitors)],
+    )
+
+
+def random_trace(draw: random.Random) -> Trace:
+    """Draw a trace."""
+    tracks = ["ego", "t", "u", "v"][: draw.randint(2, 4)]
+    time, trace = 0.0, list[Moment]()
+    gaps = draw.random() < 0.5
+    places = {track: (draw.randint(-3, 5), draw.randint(-3, 5)) for track in tracks}
+    for _ in range(draw.randint(1, 6)):
+        seen = {
+            track: Seen(
+                float(x), float(y), draw.choice([None, 0.0, 90.0, -90.0]) if gaps else draw.choice([0.0, 90.0, -90.0]),
+                draw.choice([None, (3.0, 4.0), (1.0, 0.0), (0.0, 0.0)]),
+            )
+            for track, (x, y) in places.items()
+            if track == "ego" or not gaps or draw.random() < 0.65
+        }  # fmt: skip
+        trace.append(Moment(time, seen))
+        time += draw.choice([0.5, 0.5, 0.5, 1.0, 1.6 if gaps else 0.5])
+        places = {t: (x + draw.randint(-3, 3), y + draw.randint(-2, 2)) for t, (x, y) in places.items()}
+    return trace
+
+
+def bindings(program: Program, trace: Trace) -> list[dict[str, str]]:
+    """Every way to give roles distinct tracks."""
+    tracks = sorted({track for each in trace for track in each.seen} - {"ego"})
+    return [
+        {"ego": "ego", **dict(zip(program.roles, chosen, strict=True))}
+        for chosen in itertools.permutations(tracks, len(program.roles))
+    ]
+
+
+def life_end(trace: Trace, binding: dict[str, str], i: int) -> int:
+    """The last sample of the common life of the tracks of a binding; -1 where one is not observed at i."""
+    end = len(trace) - 1
+    for track in binding.values():
+        own = [k for k, each in enumerate(trace) if track in each.seen and k >= i]
+        if not own or own[0] != i:
+            return -1
+        last = i
+        for k in own[1:]:
+            if round(trace[k].time - trace[last].time, 6) > GAP_S:
+                break
+            last = k
+        end = min(end, last)
+    return end
+
+
+def ends_in(program: Program, trace: Trace, truth: Callable[[Condition, int], bool], i: int, last: int) -> set[int]:
+    """The samples at which the run from one may end as a match, in one completion."""
+    found = set[int]()
+    if not all(truth(each, i) for each in program.start):
+        return found
+    for j in range(i, last + 1):
+        late = program.after_s is not None and trace[j].time - trace[i].time >= program.after_s - 1e-6
+        # these stop the monitors before they run
+        stopped = late or any(truth(each, j) for each in program.ends)
+        done = [monitored(kind, atoms, truth, i, j - stopped) for kind, atoms in program.monitors]
+        over = stopped or "end" in done or any(truth(each, j) for each in program.late_ends)
+        fits = "reject" not in done and all(holds(each, truth, i, j) for each in program.requirements)
+        if fits and (over or not program.terminates):
+            found.add(j)
+        if over and program.terminates:
+            break
+    return found
+
+
+@dataclass
+class Expected:
+    """What is right of a start.
+
+    Attributes:
+        sure: Ends of matches: those in every completion, of a program without an end the last one.
+        common: Every sample at which some outcome matches in every completion.
+        possible: Whether some outcome matches in some completion.
+        exact: Whether all completions were tried.
+    """
+
+    sure: set[int] = field(default_factory=set[int])
+    common: set[int] = field(default_factory=set[int])
+    possible: bool = False
+    exact: bool = True
+
+
+def expected(program: Program, trace: Trace, binding: dict[str, str], i: int) -> Expected:
+    """What is right of a start."""
+    last, right = life_end(trace, binding, i), Expected()
+    if last < 0:
+        return right
+    facing = trace[i].seen[binding["a"]].heading if program.faces is not None else None
+    atoms = every_atom(program)
+    for values in program.assignments():
+        if program.faces is not None and facing is not None and program.faces.value(values) != facing:
+            continue
+        situation = Situation(trace, binding, values)
+        known = {(id(each), k): each.value(situation, k) for each in atoms for k in range(i, last + 1)}
+        gaps = [key for key, value in known.items() if value is None]
+        some: Iterator[tuple[bool, ...]] = itertools.product((False, True), repeat=len(gaps))
+        if len(gaps) > MOST_GAPS:
+            right.exact = False
+            draw = random.Random(len(gaps))
+            some = (tuple(draw.random() < 0.5 for _ in gaps) for _ in range(COMPLETIONS))
+        common = set(range(i, last + 1))
+        for completion in some:
+            whole = {**known, **dict(zip(gaps, completion, strict=True))}
+            ends = ends_in(program, trace, lambda c, k, whole=whole: bool(whole[id(c), k]), i, last)
+            common &= ends
+            right.possible = right.possible or bool(ends)
+        right.common |= common
+        right.sure |= {max(common)} if common else set()
+    return right
+
+
+def every_atom(program: Program) -> list[Condition]:
+    """The atoms of a program."""
+    found = [*program.start, *program.ends, *program.late_ends]
+    found += [each for formula in program.requirements for each in conditions(formula)]
+    return found + [each for _, atoms in program.monitors for each in atoms]
