@@ -45,6 +45,7 @@ from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.definedness import untrue
 from scenicq.temporal.enclosures import Bounds, certainly, unchanging
+from scenicq.temporal.hidden import UnclearVariable, inside, support
 from scenicq.temporal.runs import Run
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -304,10 +305,13 @@ class Examples:
         known = finding.values()
         values: dict[Identity, Value] = {}
         for leaf in leaves(*self.conditions.values()):
-            # of what was not chosen, any option does
+            # of what the scene says nothing, any value does
             value = known.get(leaf.identity, 0.0 if isinstance(leaf, Index) else None)
             if value is None:
-                return None
+                try:
+                    value = inside(*support(leaf))
+                except UnclearVariable:
+                    return None
             values[leaf.identity] = value
         columns = self.columns.assigned(values)
         truth = {number: columns.truth_of(each) for number, each in self.conditions.items()}

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from scenicq.budget import waiting
 from scenicq.forest.groups import Comparison, Constraint
-from scenicq.forest.nodes import Identity, Leaf, Node, Value
+from scenicq.forest.nodes import Constant, Identity, Leaf, Node, Value
 from scenicq.forest.walk import deciding_first
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import Item, conditioned, options_of
-from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.evaluation import holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 
 if TYPE_CHECKING:  # takes long to load, and most queries ask no solver
@@ -60,8 +60,15 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
     while todo:
         asked, given = todo.pop()
         open_ = discrete_options([node for group in asked for _, node, _ in group])
+        ground = [item for group in asked for item in group if isinstance(item[1], Constant)]
+        lost = next((c for c, node, seen in ground if not _is_met(c, node, seen, options)), None)
+        if lost is not None:
+            blamed = blamed if isinstance(blamed, Undecided) else Refuted(lost)
+            continue
         if not open_:
-            outcome = _ask_once(asked, options, solver)
+            rest = [[item for item in group if not isinstance(item[1], Constant)] for group in asked]
+            rest = [group for group in rest if group]
+            outcome = _ask_once(rest, options, solver) if rest else Satisfied({})
             if isinstance(outcome, Satisfied):
                 return Satisfied({**outcome.values, **given})
             blamed = blamed if isinstance(blamed, Undecided) else outcome
@@ -72,6 +79,10 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
             memo: dict[int, Node] = {}
             todo.append(([conditioned(group, chosen, memo=memo) for group in asked], given | chosen))
     return blamed
+
+
+def _is_met(constraint: Constraint, node: Node, seen: Value, options: MatchOptions) -> bool:
+    return isinstance(node, Constant) and holds(constraint, node.value, seen, options.tolerance)
 
 
 def discrete_options(roots: Sequence[Node]) -> list[tuple[Leaf, range]]:
