@@ -10,7 +10,7 @@ LINTED := scenicq cli tests sample_data
 FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/search/test_backtracking.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check test test-all test-oldest test-newest golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames mutate browser dreal clean
+.PHONY: help setup demo check test test-all test-oldest test-newest golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames oracle-time mutate browser dreal clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
@@ -100,6 +100,9 @@ fuzz: $(READY) ## Attack with hostile programs, datasets, sources and kills, MIN
 
 oracle-frames: $(READY) ## Judge random programs over random labels by the definition, MINUTES=60, SEED=
 	$(BIN)/python tests/oracle/frames_attack.py --minutes $(MINUTES) --seed $(SEED)
+
+oracle-time: $(READY) ## Judge random programs with choices over time by the definition, MINUTES=60, SEED=
+	$(BIN)/python tests/temporal/test_choices.py --minutes $(MINUTES) $(if $(SEED),--seed $(SEED))
 
 MUTATIONS ?= 200
 mutate: $(READY) ## Change the code in MUTATIONS=200 small ways and count which the fast tests notice
