@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -20,6 +21,8 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 __all__ = ["follow_lanes", "times_out"]
 
 Places = NDArray[np.int64]
+_TIMED_AT_ONCE = 32
+"""Runs at once, where each has situations of its own."""
 _MOST_COLUMNS = 64
 """Situations of which it is remembered at which places they lead elsewhere."""
 
@@ -35,9 +38,17 @@ def follow_lanes(
         atom: The value of an atom at each place.
         which: The numbers of these starts.
     """
-    lanes = _Lanes(machine, stretches, atom, which)
-    lanes.run()
-    return lanes.closed() if machine.dynamics.terminates else lanes.open()
+    runs = Runs.unknown(stretches.starts[which].copy())
+    # a situation that waits for a time is of one run alone
+    size = _TIMED_AT_ONCE if machine.timed else max(len(which), 1)
+    for first in range(0, len(which), size):
+        if machine.timed:
+            machine.begin()
+        lanes = _Lanes(machine, stretches, atom, which[first : first + size])
+        lanes.run()
+        found = lanes.closed() if machine.dynamics.terminates else lanes.open()
+        runs.replace(np.arange(first, min(first + size, len(which))), found)
+    return runs
 
 
 def times_out(stretches: Stretches, after_s: float) -> Places:
@@ -112,12 +123,17 @@ class _Lanes:
         out = there > self.last[lanes]
         self.going[lanes[out]] = True
         lanes, there = lanes[~out], there[~out]
-        kinds = self.code[there] * 2 + (self.due[lanes] == there)
+        kinds = (there if self.machine.timed else self.code[there]) * 2 + (self.due[lanes] == there)
         following: list[tuple[NDArray[np.int64], Places]] = []
         for kind in cast("list[int]", np.unique(kinds).tolist()):
             some = kinds == kind
             row, due = divmod(kind, 2)
-            advance = self.machine.advance(number, self.rows[row], due=bool(due))
+            if self.machine.timed:
+                here = row
+                row, later = int(self.code[here]), partial(self._later, here)
+                advance = self.machine.advance(number, self.rows[row], due=bool(due), here=here, later=later)
+            else:
+                advance = self.machine.advance(number, self.rows[row], due=bool(due))
             own, place = lanes[some], there[some]
             self._ends(advance, own, place)
             if advance.situation is None:
@@ -139,6 +155,8 @@ class _Lanes:
 
     def _leaves(self, number: int) -> Places:
         """For each place the first one from there that leads elsewhere."""
+        if self.machine.timed:
+            return np.arange(len(self.code))
         if number not in self._columns:
             if len(self._columns) >= _MOST_COLUMNS:
                 self._columns.clear()
@@ -146,6 +164,13 @@ class _Lanes:
             leads = [self.machine.advance(number, row, due=False) != stays for row in self.rows]
             self._columns[number] = next_at(np.array(leads, dtype=np.bool_)[self.code])
         return self._columns[number]
+
+    def _later(self, here: int, time_s: float) -> int:
+        """The first place of a stretch so many seconds after one, and at least the next one."""
+        end = int(self.stretches.bounds[np.searchsorted(self.stretches.bounds, here, side="right")])
+        seconds = self.stretches.seconds
+        found = here + int(np.searchsorted(seconds[here:end], float(seconds[here]) + time_s - SLACK_S))
+        return max(found, here + 1)
 
     def _note(self, number: int, lanes: NDArray[np.int64], places: Places) -> None:
         """Write down that runs of a program without an end may end at some places, in a situation."""

@@ -25,8 +25,13 @@ _MOST_MODES = 256
 _MOST_SITUATIONS = 20_000
 """Of one program."""
 
-_OVER, _REJECTED = -1, -2
+_OVER, _REJECTED = (-1, 0), (-2, 0)
 """A monitor that says nothing any more, and one that has rejected the run."""
+
+_Place = tuple[int, int]
+"""The step of a monitor, and the first place of a sample at which it goes on there."""
+_Later = Callable[[float], int]
+"""The first place of a sample that is so many seconds later, and at least the next one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +39,7 @@ class _Mode:
     """What is left of each requirement, and the step of each monitor."""
 
     rests: tuple[Rest, ...]
-    places: tuple[int, ...]
+    places: tuple[_Place, ...]
 
     @property
     def matches(self) -> bool:
@@ -105,18 +110,20 @@ class RunMachine:
         dynamics: The program.
         situations: All that have been met so far; a run begins in the first.
         atoms: The numbers of the atoms that the program reads.
+        timed: Whether a monitor waits for a time: then a situation is one of a single run.
     """
 
     dynamics: Dynamics
     situations: list[Situation] = field(init=False, default_factory=list[Situation])
     atoms: tuple[int, ...] = field(init=False)
+    timed: bool = field(init=False)
     _progression: Progression = field(init=False, default_factory=Progression)
     _numbers: dict[_Modes, int] = field(init=False, default_factory=dict["_Modes", int])
-    _known: dict[tuple[int, tuple[int, ...], bool], Advance] = field(
-        init=False, default_factory=dict["tuple[int, tuple[int, ...], bool]", Advance]
+    _known: dict[tuple[int, tuple[int, ...], bool, int], Advance] = field(
+        init=False, default_factory=dict["tuple[int, tuple[int, ...], bool, int]", Advance]
     )
-    _ways: dict[tuple[_Mode, tuple[int, ...], bool], tuple[tuple[_Mode, bool], ...]] = field(
-        init=False, default_factory=dict["tuple[_Mode, tuple[int, ...], bool]", "tuple[tuple[_Mode, bool], ...]"]
+    _ways: dict[tuple[_Mode, tuple[int, ...], bool, int], tuple[tuple[_Mode, bool], ...]] = field(
+        init=False, default_factory=dict["tuple[_Mode, tuple[int, ...], bool, int]", "tuple[tuple[_Mode, bool], ...]"]
     )
 
     def __post_init__(self) -> None:
@@ -130,30 +137,52 @@ class RunMachine:
         self._of_monitors = [_reads(each) for each in dynamics.monitors]
         every = {*self._before, *self._behind}.union(*self._of_formulas, *(s for m in self._of_monitors for s in m))
         self.atoms = tuple(sorted(every))
-        rests = tuple(map(self._progression.add, formulas))
-        self._situation(frozenset((_Mode(rests, (0,) * len(dynamics.monitors)),)))
+        steps = [step for monitor in dynamics.monitors for step in monitor.steps]
+        self.timed = any(isinstance(step, Wait) and step.for_s > 0 for step in steps)
+        self._rests = tuple(map(self._progression.add, formulas))
+        self.begin()
 
-    def advance(self, situation: int, values: Mapping[int, int], *, due: bool) -> Advance:
+    def begin(self) -> None:
+        """Forget all situations but the first."""
+        for known in (self.situations, self._numbers, self._known, self._ways):
+            known.clear()
+        self._situation(frozenset((_Mode(self._rests, ((0, 0),) * len(self.dynamics.monitors)),)))
+
+    def advance(
+        self, situation: int, values: Mapping[int, int], *, due: bool, here: int = 0, later: _Later | None = None
+    ) -> Advance:
         """What a sample makes of a situation.
 
         Args:
             situation: Its number.
             values: The truth value of each atom at the sample.
             due: Whether the time of `terminate after` is over there.
+            here: The place of the sample, where a monitor waits for a time.
+            later: Places of later samples, there.
         """
         reads = self.situations[situation].reads
-        key = situation, tuple([values[atom] for atom in reads]), due
+        key = situation, tuple([values[atom] for atom in reads]), due, here
         if key not in self._known:
-            self._known[key] = self._advanced(self.situations[situation].modes, reads, key[1], due=due)
+            modes = self.situations[situation].modes
+            self._known[key] = self._advanced(modes, reads, key[1], due=due, here=here, later=later)
         return self._known[key]
 
-    def _advanced(self, modes: _Modes, reads: tuple[int, ...], told: tuple[int, ...], *, due: bool) -> Advance:
+    def _advanced(
+        self,
+        modes: _Modes,
+        reads: tuple[int, ...],
+        told: tuple[int, ...],
+        *,
+        due: bool,
+        here: int,
+        later: _Later | None,
+    ) -> Advance:
         values = dict(zip(reads, told, strict=True))
         going: set[_Mode] = set()
         ended: set[_Mode] = set()
         try:
             for mode in modes:
-                for after, over in self._ways_of(mode, told, values, due=due):
+                for after, over in self._ways_of(mode, told, values, due=due, here=here, later=later):
                     (ended if over else going).add(after)
         except TooManyClausesError:
             return Advance(self._undecided())
@@ -168,10 +197,11 @@ class RunMachine:
         )
 
     def _ways_of(
-        self, mode: _Mode, told: tuple[int, ...], values: Mapping[int, int], *, due: bool
-    ) -> tuple[tuple[_Mode, bool], ...]:
+        self, mode: _Mode, told: tuple[int, ...], values: Mapping[int, int], *, due: bool, here: int,
+        later: _Later | None,
+    ) -> tuple[tuple[_Mode, bool], ...]:  # fmt: skip
         """The modes that a sample may lead to from one, each with whether the run is over."""
-        key = mode, told, due
+        key = mode, told, due, here
         if key not in self._ways:
             found: set[tuple[_Mode, bool]] = set()
             stack: list[dict[int, bool]] = [{}]
@@ -182,22 +212,24 @@ class RunMachine:
                 if tried > _MOST_WAYS:
                     raise TooManyClausesError
                 try:
-                    found.add(self._step(mode, _holding(values, assumed), due=due))
+                    found.add(self._step(mode, _holding(values, assumed), due=due, here=here, later=later))
                 except _NotObserved as error:
                     stack += [{**assumed, error.atom: True}, {**assumed, error.atom: False}]
             self._ways[key] = tuple(found)
         return self._ways[key]
 
-    def _step(self, mode: _Mode, holds: Callable[[int], bool], *, due: bool) -> tuple[_Mode, bool]:
+    def _step(
+        self, mode: _Mode, holds: Callable[[int], bool], *, due: bool, here: int, later: _Later | None
+    ) -> tuple[_Mode, bool]:
         """The mode after a sample at which everything is known, and whether the run is over."""
         rests = tuple([self._progression.after(rest, holds) for rest in mode.rests])
         # these stop the monitors before they run
         if due or any(map(holds, self._before)):
             return _Mode(rests, mode.places), True
-        places: list[int] = []
+        places: list[_Place] = []
         over = False
         for monitor, place in zip(self.dynamics.monitors, mode.places, strict=True):
-            after, terminates = _watched(monitor, place, holds)
+            after, terminates = (place, False) if place[1] > here else _watched(monitor, place, holds, later)
             places.append(after)
             over = over or terminates
         return _Mode(rests, tuple(places)), over or any(map(holds, self._behind))
@@ -231,8 +263,8 @@ class RunMachine:
             if any(rest):
                 yield from atoms
         for steps, place in zip(self._of_monitors, mode.places, strict=True):
-            if place >= 0:
-                yield from steps[place]
+            if place[0] >= 0:
+                yield from steps[place[0]]
 
     def _broken(self, modes: _Modes, *, for_good: bool = False) -> Span | None:
         """What keeps runs in some modes from matching: what does so in all of them, else in the first."""
@@ -265,17 +297,20 @@ def _holding(values: Mapping[int, int], assumed: Mapping[int, bool]) -> Callable
     return holds
 
 
-def _watched(monitor: Monitor, place: int, holds: Callable[[int], bool]) -> tuple[int, bool]:
-    """The step at which a monitor goes on after a sample, and whether it ends the run."""
-    while place >= 0:
-        step = monitor.steps[place]
+def _watched(
+    monitor: Monitor, place: _Place, holds: Callable[[int], bool], later: _Later | None
+) -> tuple[_Place, bool]:
+    """Where a monitor goes on after a sample, and whether it ends the run."""
+    number = place[0]
+    while number >= 0:
+        step = monitor.steps[number]
         match step:
             case Test():
-                place = step.then if holds(step.condition.number) else step.otherwise
+                number = step.then if holds(step.condition.number) else step.otherwise
             case Goto():
-                place = step.then
+                number = step.then
             case Wait():
-                return step.then, False
+                return (step.then, 0 if later is None or step.for_s <= 0 else later(step.for_s)), False
             case Terminate():
                 return _OVER, True
             case Reject():
