@@ -26,7 +26,6 @@ from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome
 from scenicq.match.problem.preprocess import ready
-from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.backtracking import Reporter
 from scenicq.match.search.batch_lookups import look_up_positions
 from scenicq.match.search.label_search import LabelSearch
@@ -157,16 +156,10 @@ class Matcher:
                 continue
             search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups)
             ended: Ended | None = None
-            given_orders: set[frozenset[tuple[int, int]]] = set()
             try:
                 for signature, candidates in roles.signatures(self.plans.relevant):
                     plan = self.plans.plan(signature)
-                    for solution in search.solutions(plan, candidates):
-                        # objects of which labels tell more or less have another order in another signature
-                        order = in_one_order(solution.assignment, self.plans.always_twins)
-                        if order in given_orders:
-                            continue
-                        given_orders.add(order)
+                    for solution in search.solutions(plan, candidates, self.plans.always_twins):
                         matched += 1
                         if matched > self.options.correspondences:
                             raise Exhausted

@@ -20,6 +20,7 @@ from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
 from scenicq.match.search.group_cache import Asker, GroupCache, known_of, surely, translated
@@ -91,26 +92,33 @@ class LabelSearch:
     failure: Failure | None = None
     undecided: Failure | None = None
     _open: bool = field(default=False, repr=False)
+    _orders: set[frozenset[tuple[int, int]]] = field(default_factory=set[frozenset[tuple[int, int]]], repr=False)
     _decisions: GroupCache = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Begin with nothing decided."""
         self._decisions = GroupCache(self.options, self.problem, self.ask, self.lookups)
 
-    def solutions(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
+    def solutions(
+        self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]], twins: Mapping[int, int]
+    ) -> Iterator[Solution]:
         """Every correspondence that matches, interchangeable objects in one order; what is left open is noted.
 
         Args:
             plan: The scenario's groups for what is observed of the candidates.
             candidates: For each object, the label objects that it may be.
+            twins: Objects that are interchangeable in every label: for each, an earlier one.
 
         Raises:
             Exhausted: The search takes more steps than it may.
         """
-        if self.options.method == "monolithic":
-            yield from self._monolithic(plan, candidates)
-        else:
-            yield from self._modular(plan, candidates)
+        monolithic = self.options.method == "monolithic"
+        for solution in self._monolithic(plan, candidates) if monolithic else self._modular(plan, candidates):
+            # objects of which a label tells more or less come in another order in another signature
+            order = in_one_order(solution.assignment, twins)
+            if order not in self._orders:
+                self._orders.add(order)
+                yield solution
 
     # --- deciding groups
 
