@@ -189,7 +189,7 @@ def random_condition(draw: random.Random, roles: list[str], choices: list[Choice
                     lambda s, k: None if (v := speed(s.trace, s.binding[role], k)) is None else v <= abs(number),
                 )
             case _:
-                other = draw.choice(roles)
+                other = draw.choice([each for each in ["ego", *roles] if each != role])
 
                 def near(s: Situation, k: int) -> bool | None:
                     p, q = s.seen(role, k), s.seen(other, k)
