@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from difflib import get_close_matches
 from typing import TypeAlias
 
@@ -10,11 +10,26 @@ from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
 from scenicq.compiler.values import Module, fail
 from scenicq.errors import Span
 from scenicq.syntax import ast
+from scenicq.syntax.walk import walk
 
-__all__ = ["Load", "import_into"]
+__all__ = ["Load", "import_into", "named_modules"]
 
 Load: TypeAlias = Callable[[str, int, Span], Module]
 """Resolves a module: its dotted name, the number of leading dots, the place."""
+
+
+def named_modules(module: ast.Program) -> Iterator[tuple[str, int]]:
+    """The modules that a program names, each with the number of leading dots."""
+    for node in walk(*module.body):
+        match node:
+            case ast.Model():
+                yield node.name, 0
+            case ast.Import():
+                yield from ((alias.path, 0) for alias in node.aliases)
+            case ast.ImportFrom():
+                yield node.module, node.level
+            case _:
+                pass
 
 
 def import_into(node: ast.Import | ast.ImportFrom | ast.Model, scope: Environment, load: Load, version: int) -> None:

@@ -19,6 +19,7 @@ from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.deviations import is_zero
 from scenicq.compiler.environment import Environment
+from scenicq.compiler.imports import named_modules
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.models import (
     default_library,
@@ -103,13 +104,12 @@ def _compiled(
     run = world.interpreter
     run.timed = timed
     try:
-        given = None if model is None or _imports(module) else model
-        library = given or _left_out(module, chosen)
+        library = None if world.is_named_in(module) else model or _left_out(module, chosen)
         names = {} if library is None else dict(world.load(library, 0, _start(source)).names)
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
         return _scenario(
-            run, module, chosen, network, _borrowed(module, scope, names, library) if given is None else ()
+            run, module, chosen, network, _borrowed(module, scope, names, library) if model is None else ()
         )
     except RecursionError:
         raise fail("budget-exceeded", "the program is nested too deeply", _start(source), "",
@@ -118,21 +118,13 @@ def _compiled(
         raise _on_map(error, network) from None
 
 
-_IMPORTS = (ast.Import, ast.ImportFrom, ast.Model)
-
-
 def _start(source: Source) -> Span:
     return Span(source, 0, min(1, len(source.text)))
 
 
-def _imports(module: ast.Program) -> bool:
-    """Whether a program brings in anything itself."""
-    return any(isinstance(node, _IMPORTS) for node in walk(*module.body))
-
-
 def _left_out(module: ast.Program, version: int) -> str | None:
-    """The library that an early program needs without importing any; None where it imports one."""
-    if version == 3 or _imports(module):
+    """The library that an early program needs without importing any."""
+    if version == 3:
         return None
     return default_library(version, frozenset(node.id for node in walk(*module.body) if isinstance(node, ast.Name)))
 
@@ -184,6 +176,21 @@ class _World:
             self.modules[name] = self._file(name, level, span) or self._model(name) or plain_module(name, span)
         return self.modules[name]
 
+    def is_named_in(self, module: ast.Program) -> bool:
+        """Whether a program, or a file that it imports, names a world model; Python's own modules are none."""
+        todo, seen = [*named_modules(module)], set[str]()
+        while todo:
+            name, level = todo.pop()
+            if name in seen:
+                continue
+            seen.add(name)
+            source = self._source(name, level)
+            if source is not None:
+                todo += named_modules(parse(source, self.interpreter.version))
+            elif libraries_of(name):
+                return True
+        return False
+
     def _model(self, name: str) -> Module | None:
         files = libraries_of(name)
         if not files:
@@ -194,9 +201,12 @@ class _World:
             self.interpreter.run(library_text(file).body, scope)
         return Module(name, {key: value for key, value in scope.names.items() if not key.startswith("_")})
 
-    def _file(self, name: str, level: int, span: Span) -> Module | None:
+    def _source(self, name: str, level: int) -> Source | None:
         path = str(PurePosixPath(*name.split("."))) + ".scenic"
-        source = self.loader(path) if self.loader and level <= 1 else None
+        return self.loader(path) if self.loader and level <= 1 else None
+
+    def _file(self, name: str, level: int, span: Span) -> Module | None:
+        source = self._source(name, level)
         if source is None:
             return None
         if name in self.loading:

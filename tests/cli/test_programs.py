@@ -67,6 +67,21 @@ def test_every_command_takes_a_program_on_the_command_line(run, crossroads, tmp_
         assert (modelled.exit_code, modelled.stderr) == (expected.exit_code, expected.stderr), command
 
 
+@pytest.mark.parametrize("line", ["from math import sin", "import math", "import math as m", "from math import *"])
+def test_modules_of_python_bring_no_model(run, crossroads, line):
+    """The driving model stays for what imports only them, in every command."""
+    for command, *others in (
+        ("match", crossroads, "--format", "ids"),
+        ("check",),
+        ("explain", crossroads, "03-busy-intersection/09", "--exit-zero"),
+        ("sample", "-n", "2"),
+    ):
+        expected = run(command, "-e", f"model scenic.domains.driving.model\n{PEDESTRIAN}", *others)
+        found = run(command, "-e", f"{line}\n{PEDESTRIAN}", *others)
+        assert (found.exit_code, found.stderr) == (expected.exit_code, expected.stderr), command
+        assert found.stdout.replace(line, "model scenic.domains.driving.model") == expected.stdout, command
+
+
 def test_what_cannot_be_meant_is_told_whole_of_a_program_that_is_no_file(run, crossroads, tmp_path):
     """No other command can be given it, so that none is advised."""
     text = "ego = new Car; new Pedestrian ahead of ego by Range(9, 5)"
