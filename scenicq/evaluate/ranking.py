@@ -21,6 +21,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import Signature, build_groups
 from scenicq.match.problem.observation import observe, observe_params
 from scenicq.match.verdict import Match
+from scenicq.query.execution.interval_frames import roles_in
 from scenicq.query.execution.results import LogDensity, Result
 from scenicq.query.execution.run import Query
 from scenicq.store.labels import Label
@@ -143,14 +144,10 @@ def densities(query: Query, results: Sequence[Result]) -> list[LogDensity | None
     found: list[LogDensity | None] = [None] * len(results)
     for name, numbers in by_map.items():
         scenario = query.compiled_map(name).scenario
-        bound = [(labels[results[n].frame], _correspondence(results[n])) for n in numbers]
+        bound = [(label := labels[results[n].frame], roles_in(label, results[n])) for n in numbers]
         for number, density in zip(numbers, log_densities(scenario, bound, query.options.match), strict=True):
             found[number] = density
     return found
-
-
-def _correspondence(result: Result) -> Mapping[str, str]:
-    return result.verdict.correspondence if isinstance(result.verdict, Match) else {}
 
 
 def rank_results(query: Query, results: Iterable[Result]) -> list[Result]:

@@ -12,7 +12,7 @@ from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.store.sql import sql_text
 
-__all__ = ["frames_of", "locate"]
+__all__ = ["frames_of", "locate", "roles_in"]
 
 
 def locate(dataset: Dataset, recording: str) -> tuple[int, int, int]:
@@ -46,9 +46,21 @@ def frames_of(dataset: Dataset, result: Result) -> Iterator[tuple[Label, dict[st
     where = f"recording = {sql_text(result.recording)} AND timestamp_us BETWEEN {result.timestamp_us} AND {span.end_us}"
     with closing(dataset.connect()) as connection:
         names = [name for (name,) in connection.execute(f"SELECT frame FROM labels WHERE {where}").fetchall()]
+    for label in dataset.labels(names):
+        yield label, roles_in(label, result)
+
+
+def roles_in(label: Label, result: Result) -> dict[str, str]:
+    """The label object of each role that is observed in a frame, by the name of the role.
+
+    Args:
+        label: Of the result's frame, or of any frame of its interval.
+        result: Its verdict names objects where it is on a frame, tracks where it is on an interval.
+    """
     verdict = result.verdict
     correspondence = verdict.partial if isinstance(verdict, NoMatch) else verdict.correspondence
-    for label in dataset.labels(names):
-        objects = {each.track if each.track is not None else each.id: each.id for each in label.objects}
-        objects["ego"] = "ego"
-        yield label, {role: objects[track] for role, track in correspondence.items() if track in objects}
+    if result.interval is None:
+        return dict(correspondence)
+    objects = {each.track if each.track is not None else each.id: each.id for each in label.objects}
+    objects["ego"] = "ego"
+    return {role: objects[track] for role, track in correspondence.items() if track in objects}
