@@ -14,7 +14,7 @@ from typing import BinaryIO, cast
 
 import click
 
-from scenicq.errors import DataError, Diagnostic
+from scenicq.errors import DataError, Diagnostic, plain_json
 from scenicq.evaluate.detection import Missing
 from scenicq.evaluate.evaluation import Evaluation
 from scenicq.evaluate.evaluation import evaluate as judge
@@ -120,7 +120,7 @@ def _format(name: str | None, file: Path | None) -> str:
 def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
     match form:
         case "json":
-            text = json.dumps(evaluation_record(found), ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+            text = plain_json(json.dumps(evaluation_record(found), ensure_ascii=False, indent=1, allow_nan=False)) + "\n"
         case "csv":
             lines = io.StringIO(newline="")
             rows = csv.DictWriter(lines, COLUMNS, lineterminator="\n")

@@ -10,7 +10,7 @@ import csv
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, BinaryIO, Protocol
 
-from scenicq.errors import CONTROL
+from scenicq.errors import plain_json
 from scenicq.query.execution.csv_cells import quote_cell
 from scenicq.query.execution.result_lines import json_line, json_text
 from scenicq.query.execution.result_origin import ORIGIN
@@ -86,18 +86,18 @@ class _JsonLines(_Lines):
     """One line of JSON a result."""
 
     def __init__(self, text: TextStream) -> None:
-        super().__init__(text, lambda record: _escaped(json_text(record)))
+        super().__init__(text, lambda record: plain_json(json_text(record)))
 
     def write_result(self, result: Result, more: Mapping[str, str]) -> None:
         """Write a result of which nobody has the record."""
-        self._put(_escaped(json_line(result, more)))
+        self._put(plain_json(json_line(result, more)))
 
 
 def _flat(record: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     """A row of plain cells; nested values and truth values become JSON text."""
     cells = {name: record.get(name, {}) for name in names}
     return {
-        name: _escaped(json_text(cell)) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()
+        name: plain_json(json_text(cell)) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()
     }
 
 
@@ -106,11 +106,6 @@ def _name(record: Mapping[str, Any]) -> str | None:
         return None
     name = record["frame"] if "frame" in record else f"{record['recording']}@{record['start_us']}"
     return plain(name).replace("\n", "\\n")
-
-
-def _escaped(text: str) -> str:
-    """JSON in which nothing moves a cursor or turns text round; what it says is the same."""
-    return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 class _Csv:

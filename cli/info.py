@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import click
 
+from scenicq.errors import plain_json
 from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Counts, Manifest
 from scenicq.store.map_fit import MapFit, map_fits, misfits
@@ -149,7 +150,7 @@ def info(dataset: str, *, verify: bool, format_: str) -> None:
         check_dataset(opened)
         verify_computed(opened)
     if format_ == "json":
-        say(opened.manifest.to_json(), nl=False)
+        say(plain_json(opened.manifest.to_json()), nl=False)
     else:
         fits = map_fits(opened)
         show_few(misfits(fits))

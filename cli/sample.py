@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from scenicq.compiler.program import compile_scenario
+from scenicq.errors import plain_json
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
 from scenicq.query.execution.option_texts import read_built_ins
 from scenicq.query.execution.program_files import sibling_loader
@@ -73,4 +74,4 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
         write_sample(labels, network, Path(source.name.strip("<>")).stem, output)
         return
     for label in labels:
-        say(sample_record(label))
+        say(plain_json(sample_record(label)))

@@ -25,6 +25,7 @@ __all__ = [
     "Source",
     "Span",
     "plain",
+    "plain_json",
     "render",
 ]
 
@@ -116,6 +117,11 @@ CONTROL = re.compile(
 def plain(text: str) -> str:
     """A text of somebody else's as it is safe on a terminal: control characters are shown, not obeyed."""
     return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def plain_json(text: str) -> str:
+    """JSON as it is safe on a terminal; what it says is the same."""
+    return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 @dataclass(frozen=True)

@@ -165,3 +165,33 @@ def test_a_table_shows_what_a_name_is():
     text = _written("table")
     assert "\u202e" not in text
     assert len(text.splitlines()) == 2
+
+
+def test_no_command_writes_json_that_moves_a_cursor(run, tmp_path):
+    name = "a\x9b\u202e"
+    source = tmp_path / "source"
+    source.mkdir()
+    (source / "dataset.json").write_text(
+        json.dumps({"name": name, "interchange": 1, "angle": "heading", "classes": "scenic"})
+    )
+    box = {"id": name, "class": "Car", "position": [0.0, 0.0], "heading": 0.0, "length": 4.0, "width": 2.0}
+    label = {
+        "id": name,
+        "recording": name,
+        "timestamp_us": 0,
+        "map": name,
+        "ego": box | {"id": "ego"},
+        "objects": [box],
+    }
+    (source / "labels.jsonl").write_text(json.dumps(label) + "\n")
+    assert run("ingest", source, tmp_path / "d").exit_code == 0
+    program = "ego = new Object at (0, 0), facing 0 deg"
+    for words in (
+        ("info", tmp_path / "d", "--format", "json"),
+        ("match", "-e", program, tmp_path / "d", "--format", "jsonl", "--all"),
+        ("sample", "-e", f"{program}, with name '{name}'", "-n", "1"),
+    ):
+        done = run(*words)
+        assert done.exit_code == 0, done.stderr
+        assert not {"\x9b", "\u202e"} & set(done.stdout), words
+        assert words[0] == "sample" or "\\u009b\\u202e" in done.stdout
