@@ -120,7 +120,8 @@ def _format(name: str | None, file: Path | None) -> str:
 def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
     match form:
         case "json":
-            text = plain_json(json.dumps(evaluation_record(found), ensure_ascii=False, indent=1, allow_nan=False)) + "\n"
+            content = json.dumps(evaluation_record(found), ensure_ascii=False, indent=1, allow_nan=False)
+            text = plain_json(content) + "\n"
         case "csv":
             lines = io.StringIO(newline="")
             rows = csv.DictWriter(lines, COLUMNS, lineterminator="\n")
