@@ -22,6 +22,7 @@ from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import CompareOp, Constant, Feature, Kind, Node, Select, Undefined
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
+from scenicq.syntax.phrases import condition_hint
 
 __all__ = [
     "OBSERVABLE",
@@ -111,6 +112,8 @@ def _need(value: ModelValue, what: str, span: Span | None) -> Exception:
         hints = ("`Range(a, b)` is a random number of an interval; only Scenic 1 spells it `(a, b)`: `--scenic 1`",)
     elif "number" in what and span is not None and (vector := _VELOCITY.search(span.text)):
         hints = (f"`{vector[1]}.speed` is a number",)
+    elif what == "a condition" and span is not None and (hint := condition_hint(span.text.split(None, 1)[0])):
+        hints = (hint,)
     return fail("wrong-type", f"{what} is needed here, not {shown}", span, f"this is {shown}", hints)
 
 

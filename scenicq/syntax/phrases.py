@@ -24,6 +24,8 @@ STANDS, MOVES = "`X.speed < 0.5` asks whether X stands", "`X.speed > 1` asks whe
 TURNS = "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right"
 BIKE_LANES = "`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows"
 _SIDE = "`(distance past X) < 0` asks whether X is ahead of the ego; `ahead of Y by Range(0, 20)` places a new object"
+_LEFT = "`(distance to X) * sin((angle to X) - ego.heading) > 0` asks whether X is left of the ego, `sin` is of `math`"
+_RIGHT = _LEFT.replace("> 0", "< 0").replace("left of", "right of")
 _INSIDE = "`X in R` asks whether the box of X lies in a region, `X.position in R` its centre alone"
 _TOWARD = "`abs((angle from X to Y) - X.heading) < 20 deg` asks whether X faces Y; `facing toward Y` turns a new object"
 _SEES = "`X can see Y` asks whether Y is in view"
@@ -32,8 +34,8 @@ _BEYOND = "`beyond X by Range(2, 30)` places a new object where X hides it from 
 _SAID = {
     "between": "`5 < a < 10` asks whether a number is between two", "near": _DISTANCE, "within": _DISTANCE,
     "close": _DISTANCE, "far": _DISTANCE, "turning": TURNS, "turns": TURNS, "stopped": STANDS, "parked": STANDS,
-    "stationary": STANDS, "standing": STANDS, "ahead": _SIDE, "front": _SIDE, "behind": _SIDE, "left": _SIDE,
-    "right": _SIDE, "on": _INSIDE, "inside": _INSIDE, "onto": _INSIDE, "faces": _TOWARD, "facing": _TOWARD,
+    "stationary": STANDS, "standing": STANDS, "ahead": _SIDE, "front": _SIDE, "behind": _SIDE, "left": _LEFT,
+    "right": _RIGHT, "on": _INSIDE, "inside": _INSIDE, "onto": _INSIDE, "faces": _TOWARD, "facing": _TOWARD,
     "sees": _SEES, "visible": _SEES, "then": _OVER_TIME, "after": _OVER_TIME, "before": _OVER_TIME,
     "overtakes": _OVER_TIME, "passes": _OVER_TIME, "initial": _OVER_TIME, "initially": _OVER_TIME,
     "occludes": _BEYOND, "hides": _BEYOND, "occluded": _BEYOND, "hidden": _BEYOND,

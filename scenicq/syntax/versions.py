@@ -120,11 +120,12 @@ def _mixed(item: ast.Evidence, other: ast.Evidence) -> ScenarioError:
     hints: tuple[str, ...] = ()
     for place in (item, other):
         if place.construct == "an instance without `new`":
+            if hint := _as_condition(place.span):
+                told = "a condition is needed here, not the description of an object"
+                return ScenarioError(Diagnostic("parse-error", told, place.span, "not a condition", hints=(hint,)))
             name = place.span.text
             # classes begin with a capital letter; a region before a specifier lacks a comma
             comma = f"a comma separates specifiers: write `{name}, ...`"
-            hints = (
-                _as_condition(place.span) or (f"Scenic 3 writes `new {name} ...`" if name[:1].isupper() else comma),
-            )
+            hints = (f"Scenic 3 writes `new {name} ...`" if name[:1].isupper() else comma,)
     label = f"this is {_names(item.versions)}"
     return ScenarioError(Diagnostic("mixed-versions", message, item.span, label, (note,), hints))

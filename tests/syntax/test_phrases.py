@@ -21,6 +21,9 @@ HINTS = {
     "require (other is ahead of ego) until (other is behind ego)": "`(distance past X) < 0`",
     "require other is turning left": "`X.angularSpeed > 0.2`",
     "require other is on road": "`X.position in R`",
+    "require other ahead of ego": "`(distance past X) < 0`",
+    "require other left of ego": "sin((angle to X) - ego.heading) > 0`",
+    "require (other right of ego)": "sin((angle to X) - ego.heading) < 0`",
     "require other on crossing": "`X.position in R`",
     "require other facing ego": "`abs((angle from X to Y) - X.heading) < 20 deg`",
     "require other faces ego": "`abs((angle from X to Y) - X.heading) < 20 deg`",
@@ -42,6 +45,7 @@ def told(line):
     with pytest.raises(ScenarioError) as caught:
         parse(Source("p.scenic", f"ego = new Car\nother = new Car\n{line}\n"), None)
     (found,) = caught.value.diagnostics
+    assert found.code != "mixed-versions"
     return " ".join(found.hints)
 
 
