@@ -15,7 +15,6 @@ from typing import cast
 from scenicq.forest.nodes import Constant, Index, Node, PointIn, RegionUnion, Select, Undefined
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import children, postorder, transform
-from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import PolygonSet, Region, union
 
 __all__ = ["rebuilt", "roots_of", "simplify"]
@@ -30,13 +29,15 @@ def roots_of(scenario: Scenario) -> list[Node]:
 
 
 def _merged(regions: list[Region]) -> Region:
-    """The union of regions, as one indexed set where all are sets of polygons of one orientation."""
+    """The union of regions, as one indexed set where all are sets of polygons.
+
+    Headings are expressions of their own by now, so that the set needs no orientation.
+    """
     sets = [region for region in regions if isinstance(region, PolygonSet)]
-    fields: set[VectorField | None] = {region.orientation for region in sets}
-    if len(sets) != len(regions) or len(fields) != 1:
+    if len(sets) != len(regions):
         return union(*regions)
     polygons = tuple(polygon for region in sets for polygon in region.polygons)
-    return PolygonSet(polygons, f"{len(sets)} regions", fields.pop(), tuple(i for region in sets for i in region.ids))
+    return PolygonSet(polygons, f"{len(sets)} regions", ids=tuple(i for region in sets for i in region.ids))
 
 
 def _is_undefined(node: Node) -> bool:

@@ -212,12 +212,12 @@ def test_groups_are_the_connected_components_over_shared_variables(uses):
 
 
 def test_a_pick_from_a_list_becomes_one_region_only_if_nothing_else_depends_on_it():
-    alone = simplify(compiled("ego = new Car on Uniform(*network.lanes)"))
+    alone = simplify(compiled("ego = new Car on Uniform(*network.lanes), facing roadDirection"))
     (point,) = [node for node in leaves(alone.objects[0].properties["position"].value) if isinstance(node, PointIn)]
     assert isinstance(point.region, Constant)
     assert isinstance(point.region.value, PolygonSet)
     assert len(point.region.value.polygons) == len(STREET.lanes)
-    nested = "road = Uniform(*network.roads)\nlane = Uniform(*road.lanes)\nego = new Car on lane"
+    nested = "road = Uniform(*network.roads)\nlane = Uniform(*road.lanes)\nego = new Car on lane, facing roadDirection"
     (point,) = leaves(simplify(compiled(nested)).objects[0].properties["position"].value)
     assert isinstance(point, PointIn)
     assert sorted(point.region.value.ids) == sorted(lane.id for road in STREET.roads for lane in road.lanes)
