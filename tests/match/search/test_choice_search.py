@@ -86,7 +86,8 @@ def test_verdicts_are_those_of_all_combinations_of_many_programs() -> None:
 
 
 def test_two_cars_on_one_random_lane_are_on_one() -> None:
-    text = "a = new Car on lane\nb = new Car on lane\n"
+    # where lanes cross, the direction of either will do
+    text = "a = new Car on lane, facing roadDirection\nb = new Car on lane, facing roadDirection\n"
     lanes = street().lanes
     scenario = compile_scenario(Source("lane.scenic", f"{MODEL}lane = Uniform(*network.lanes)\n{text}"), street())
     matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))

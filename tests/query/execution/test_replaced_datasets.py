@@ -144,7 +144,7 @@ def test_a_copy_closes_no_descriptor_but_its_own(two: tuple[Path, Path], tmp_pat
 
 
 def test_nothing_opens_a_dataset_in_another_process_by_its_address() -> None:
-    """Who opens by address does so for the user; processes get a reference."""
+    """Who opens by address does so for the user, or has just written it; processes get a reference."""
     callers = {
         str(path.relative_to(ROOT))
         for folder in ("scenicq", "cli")
@@ -154,6 +154,7 @@ def test_nothing_opens_a_dataset_in_another_process_by_its_address() -> None:
     assert callers == {
         "cli/datasets.py",
         "cli/index.py",
+        "scenicq/importers/ingest.py",
         "scenicq/notebook/datasets.py",
         "scenicq/query/execution/record_reader.py",
         "scenicq/store/dataset.py",
