@@ -187,7 +187,7 @@ def dataset(tmp_path_factory, trace):
 def verdicts_of(dataset, text: str):
     """What is told of the one start: the number of a last sample, and the verdict."""
     time = IntervalOptions(intervals="all")
-    options = QueryOptions(solver="portable", every=True, match=MatchOptions(timeout_s=1.0), time=time)
+    options = QueryOptions(solver="portable", every=True, match=MatchOptions(timeout_s=4.0), time=time)
     results = Query(dataset, Source("p.scenic", text), options).results()
     return [(each.interval.count - 1, each.verdict) for each in results if each.interval is not None]
 
