@@ -112,7 +112,8 @@ def rotate(vector: Vector, angle: float) -> Vector:
 
 
 def arctan(vector: Vector) -> float:
-    return math.atan2(-vector[0], vector[1])
+    # as Scenic computes it: the null vector has -90 degrees
+    return math.remainder(math.atan2(vector[1], vector[0]) - math.pi / 2, math.tau)
 
 
 def _to_segment(point: Vector, start: Vector, end: Vector) -> float:
