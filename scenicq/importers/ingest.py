@@ -133,16 +133,16 @@ def ingest(
         manifest = writer.finish(
             name=opened.name, importer=importer.name, left_out=report.counts, provenance=provenance
         )
-    return _summary(target_path, importer, manifest, (*_misfits(target_path), *report.diagnostics), reused)
+    return _summary(target_path, importer, manifest, (*_misfits(target_path, manifest), *report.diagnostics), reused)
 
 
-def _misfits(target: Path) -> tuple[Diagnostic, ...]:
+def _misfits(target: Path, manifest: Manifest) -> tuple[Diagnostic, ...]:
     """What does not fit between maps and labels."""
-    dataset = open_dataset(target, check=False)
-    if not dataset.maps:
+    if not any(manifest.maps.values()):
         return ()
     from scenicq.store.map_fit import map_fits, misfits  # noqa: PLC0415 - slow to load, and for maps
 
+    dataset = open_dataset(target, check=False)
     try:
         return misfits(map_fits(dataset))
     finally:
