@@ -21,7 +21,6 @@ from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
 from scenicq.importers.segments import Job, World, fingerprint, maps_digest, write_segments
-from scenicq.store.dataset import open_dataset
 from scenicq.store.manifest import LeftOut, Manifest, is_dataset
 from scenicq.store.segment import SEGMENT_OBJECTS, Segment, read_segments, segments_of
 from scenicq.store.writer import DatasetWriter
@@ -140,6 +139,7 @@ def _misfits(target: Path, manifest: Manifest) -> tuple[Diagnostic, ...]:
     """What does not fit between maps and labels."""
     if not any(manifest.maps.values()):
         return ()
+    from scenicq.store.dataset import open_dataset  # noqa: PLC0415 - slow to load, and for maps
     from scenicq.store.map_fit import map_fits, misfits  # noqa: PLC0415 - slow to load, and for maps
 
     dataset = open_dataset(target, check=False)
