@@ -29,7 +29,6 @@ RECURSIVE = {
 DATASETS = re.compile(r"nuscenes|argoverse|waymo|lyft|kitti|interaction dataset|boston", re.IGNORECASE)
 CORE = ("syntax", "geometry", "forest", "compiler", "smt", "match")
 MOST_LINES = 180
-MOST_LINES_OF_A_FILE = 400
 PROGRAMS = ("importers/opendrive_worker.py", "processes.py", "smt/worker.py")
 
 
@@ -150,11 +149,6 @@ def test_the_core_knows_no_dataset():
     for file in FILES:
         if named(file).startswith(tuple(f"{folder}/" for folder in CORE)):
             assert not DATASETS.search(file.read_text()), named(file)
-
-
-def test_no_file_is_long():
-    found = {named(file): len(file.read_text().splitlines()) for file in FILES}
-    assert not {name: lines for name, lines in found.items() if lines > MOST_LINES_OF_A_FILE}
 
 
 def test_the_matcher_is_a_page():

@@ -2,44 +2,9 @@
 
 from __future__ import annotations
 
-from typing import assert_never, cast
+from typing import cast
 
-from scenicq.forest.nodes import (
-    Arithmetic,
-    Bearing,
-    Compare,
-    Constant,
-    Contains,
-    Coordinate,
-    DirectionAt,
-    DiscAt,
-    DiscreteRange,
-    Distance,
-    Encloses,
-    Feature,
-    Index,
-    Intersects,
-    Kind,
-    Logic,
-    Node,
-    Norm,
-    Normal,
-    PointIn,
-    Range,
-    RectangleAt,
-    RegionDifference,
-    RegionIntersection,
-    RegionUnion,
-    Rotate,
-    Scale,
-    SectorAt,
-    Select,
-    TruncatedNormal,
-    Undefined,
-    Value,
-    VectorOf,
-    VectorSum,
-)
+from scenicq.forest.nodes import Constant, Feature, Kind, Node, Select, Undefined, Value
 from scenicq.geometry.regions import Region
 
 __all__ = ["as_kind", "kind_of", "kind_of_value"]
@@ -76,20 +41,6 @@ def kind_of(node: Node) -> Kind:
     """The kind of value that an expression has."""
     while isinstance(node, Select):
         node = node.options[0]
-    match node:
-        case Constant():
-            return kind_of_value(node.value)
-        case Feature():
-            return node.kind
-        case Range() | Normal() | TruncatedNormal() | DiscreteRange() | Index() | Arithmetic() | Coordinate():
-            return "scalar"
-        case Norm() | Bearing() | Distance() | DirectionAt():
-            return "scalar"
-        case PointIn() | VectorOf() | VectorSum() | Scale() | Rotate():
-            return "vector"
-        case DiscAt() | SectorAt() | RectangleAt() | RegionUnion() | RegionIntersection() | RegionDifference():
-            return "region"
-        case Compare() | Logic() | Contains() | Intersects() | Encloses():
-            return "boolean"
-        case _:
-            assert_never(node)
+    if isinstance(node, Constant):
+        return kind_of_value(node.value)
+    return node.kind if isinstance(node, Feature) else node.value_kind

@@ -3,7 +3,8 @@
 A scenario's features and requirements are expressions over random variables (leaves) and features of other objects
 (query paper, section 2 and figure 4). Nodes are frozen and compared by identity, never by content: one `Range` used
 twice is one random variable, two that look alike are two. Every node knows the place in the program it came from.
-Nothing here computes; passes are functions elsewhere (`walk`, `evaluate`, `condition`, `show`).
+Nothing here computes; passes are functions elsewhere (`walk`, `evaluate`, `condition`, `show`). A class declares its
+children by the types of its fields, in their order, and the kind of its value by its base class.
 
 Values: a scalar is a float (headings in radians, lengths in metres), a vector a pair of floats, a region or a vector
 field a value of `scenicq.geometry`; anything else (a string, None) is only ever compared for equality.
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 from scenicq.errors import Span
 from scenicq.geometry.fields import VectorField
@@ -98,6 +99,26 @@ class _Node:
     span: Span | None = field(default=None, kw_only=True, repr=False)
 
 
+class _Scalar(_Node):
+    __slots__ = ()
+    value_kind: ClassVar[Kind] = "scalar"
+
+
+class _Vector(_Node):
+    __slots__ = ()
+    value_kind: ClassVar[Kind] = "vector"
+
+
+class _Region(_Node):
+    __slots__ = ()
+    value_kind: ClassVar[Kind] = "region"
+
+
+class _Boolean(_Node):
+    __slots__ = ()
+    value_kind: ClassVar[Kind] = "boolean"
+
+
 class Identity:
     """What makes a random variable the same one, however its distribution's parameters are rewritten."""
 
@@ -106,6 +127,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Leaf(_Node):
+    value_kind: ClassVar[Kind] = "scalar"
     identity: Identity = field(default_factory=Identity, kw_only=True, repr=False)
 
 
@@ -189,6 +211,7 @@ class Index(_Leaf):
 class PointIn(_Leaf):
     """A point uniformly at random in a region."""
 
+    value_kind: ClassVar[Kind] = "vector"
     region: Node
 
 
@@ -207,7 +230,7 @@ class Select(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Arithmetic(_Node):
+class Arithmetic(_Scalar):
     """An operation on scalars."""
 
     op: ArithmeticOp
@@ -215,7 +238,7 @@ class Arithmetic(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Coordinate(_Node):
+class Coordinate(_Scalar):
     """The x (axis 0) or y (axis 1) of a vector."""
 
     vector: Node
@@ -223,21 +246,21 @@ class Coordinate(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Norm(_Node):
+class Norm(_Scalar):
     """The length of a vector."""
 
     vector: Node
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bearing(_Node):
+class Bearing(_Scalar):
     """The heading in which a vector points."""
 
     vector: Node
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Distance(_Node):
+class Distance(_Scalar):
     """The distance from a point to a region, 0 inside."""
 
     region: Node
@@ -245,7 +268,7 @@ class Distance(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DirectionAt(_Node):
+class DirectionAt(_Scalar):
     """The heading of a vector field at a point; where the field allows several, any of them."""
 
     field: Node
@@ -256,7 +279,7 @@ class DirectionAt(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VectorOf(_Node):
+class VectorOf(_Vector):
     """A vector from its coordinates."""
 
     x: Node
@@ -264,7 +287,7 @@ class VectorOf(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VectorSum(_Node):
+class VectorSum(_Vector):
     """The sum of two vectors."""
 
     left: Node
@@ -272,7 +295,7 @@ class VectorSum(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scale(_Node):
+class Scale(_Vector):
     """A vector times a scalar."""
 
     vector: Node
@@ -280,7 +303,7 @@ class Scale(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rotate(_Node):
+class Rotate(_Vector):
     """A vector turned counter-clockwise."""
 
     vector: Node
@@ -291,7 +314,7 @@ class Rotate(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DiscAt(_Node):
+class DiscAt(_Region):
     """A disc."""
 
     center: Node
@@ -299,7 +322,7 @@ class DiscAt(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SectorAt(_Node):
+class SectorAt(_Region):
     """A sector of a disc around a heading, of any full angle up to 2 pi."""
 
     center: Node
@@ -309,7 +332,7 @@ class SectorAt(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RectangleAt(_Node):
+class RectangleAt(_Region):
     """A rectangle: its width is across the heading, its length along it."""
 
     center: Node
@@ -319,21 +342,21 @@ class RectangleAt(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RegionUnion(_Node):
+class RegionUnion(_Region):
     """What lies in any of the parts."""
 
     parts: tuple[Node, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RegionIntersection(_Node):
+class RegionIntersection(_Region):
     """What lies in all parts."""
 
     parts: tuple[Node, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RegionDifference(_Node):
+class RegionDifference(_Region):
     """What lies in the base but not in what is removed."""
 
     base: Node
@@ -344,7 +367,7 @@ class RegionDifference(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Compare(_Node):
+class Compare(_Boolean):
     """A comparison."""
 
     op: CompareOp
@@ -353,7 +376,7 @@ class Compare(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Logic(_Node):
+class Logic(_Boolean):
     """A connective over truth values."""
 
     op: LogicOp
@@ -361,7 +384,7 @@ class Logic(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contains(_Node):
+class Contains(_Boolean):
     """Whether a point lies in a region, boundary included."""
 
     region: Node
@@ -369,7 +392,7 @@ class Contains(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Intersects(_Node):
+class Intersects(_Boolean):
     """Whether two regions have a point in common."""
 
     left: Node
@@ -377,7 +400,7 @@ class Intersects(_Node):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Encloses(_Node):
+class Encloses(_Boolean):
     """Whether a region holds all of another (of a box)."""
 
     outer: Node

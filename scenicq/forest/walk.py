@@ -4,44 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from dataclasses import replace
-from typing import assert_never, cast
+from dataclasses import fields, replace
+from operator import attrgetter
+from typing import cast, get_args
 
-from scenicq.forest.nodes import (
-    Arithmetic,
-    Bearing,
-    Compare,
-    Constant,
-    Contains,
-    Coordinate,
-    DirectionAt,
-    DiscAt,
-    DiscreteRange,
-    Distance,
-    Encloses,
-    Feature,
-    Index,
-    Intersects,
-    Leaf,
-    Logic,
-    LogicOp,
-    Node,
-    Norm,
-    Normal,
-    PointIn,
-    Range,
-    RectangleAt,
-    RegionDifference,
-    RegionIntersection,
-    RegionUnion,
-    Rotate,
-    Scale,
-    SectorAt,
-    Select,
-    TruncatedNormal,
-    VectorOf,
-    VectorSum,
-)
+from scenicq.forest.nodes import Constant, Feature, Leaf, Logic, LogicOp, Node, Select
 
 __all__ = [
     "children",
@@ -58,103 +25,52 @@ __all__ = [
 
 def is_leaf(node: Node) -> bool:
     """Whether a node is a random variable."""
-    return isinstance(node, Range | Normal | TruncatedNormal | DiscreteRange | Index | PointIn)
+    return isinstance(node, _LEAF_TYPES)
 
 
 def children(node: Node) -> tuple[Node, ...]:
     """The nodes that a node's value depends on; for a random variable the parameters of its distribution."""
-    match node:
-        case Constant() | Feature() | Index():
-            return ()
-        case Range() | DiscreteRange():
-            return (node.low, node.high)
-        case Normal():
-            return (node.mean, node.deviation)
-        case TruncatedNormal():
-            return (node.mean, node.deviation, node.low, node.high)
-        case PointIn():
-            return (node.region,)
-        case Select():
-            return (node.index, *node.options)
-        case Arithmetic() | Logic():
-            return node.args
-        case Coordinate() | Norm() | Bearing():
-            return (node.vector,)
-        case Distance() | Contains():
-            return (node.region, node.point)
-        case DirectionAt():
-            return (node.field, node.point)
-        case VectorOf():
-            return (node.x, node.y)
-        case VectorSum() | Compare() | Intersects():
-            return (node.left, node.right)
-        case Scale():
-            return (node.vector, node.factor)
-        case Rotate():
-            return (node.vector, node.angle)
-        case DiscAt():
-            return (node.center, node.radius)
-        case SectorAt():
-            return (node.center, node.radius, node.heading, node.angle)
-        case RectangleAt():
-            return (node.center, node.heading, node.width, node.length)
-        case RegionUnion() | RegionIntersection():
-            return node.parts
-        case RegionDifference():
-            return (node.base, node.removed)
-        case Encloses():
-            return (node.outer, node.inner)
-        case _:
-            assert_never(node)
+    return _CHILDREN[type(node)](node)
 
 
 def rebuild(node: Node, parts: tuple[Node, ...]) -> Node:
     """The same node over other children; the very node if none differs."""
     if all(new is old for new, old in zip(parts, children(node), strict=True)):
         return node
-    match node:
-        case Constant() | Feature() | Index():
-            return node
-        case Range() | DiscreteRange():
-            return replace(node, low=parts[0], high=parts[1])
-        case Normal():
-            return replace(node, mean=parts[0], deviation=parts[1])
-        case TruncatedNormal():
-            return replace(node, mean=parts[0], deviation=parts[1], low=parts[2], high=parts[3])
-        case PointIn():
-            return replace(node, region=parts[0])
-        case Select():
-            return replace(node, index=parts[0], options=parts[1:])
-        case Arithmetic() | Logic():
-            return replace(node, args=parts)
-        case Coordinate() | Norm() | Bearing():
-            return replace(node, vector=parts[0])
-        case Distance() | Contains():
-            return replace(node, region=parts[0], point=parts[1])
-        case DirectionAt():
-            return replace(node, field=parts[0], point=parts[1])
-        case VectorOf():
-            return replace(node, x=parts[0], y=parts[1])
-        case VectorSum() | Compare() | Intersects():
-            return replace(node, left=parts[0], right=parts[1])
-        case Scale():
-            return replace(node, vector=parts[0], factor=parts[1])
-        case Rotate():
-            return replace(node, vector=parts[0], angle=parts[1])
-        case DiscAt():
-            return replace(node, center=parts[0], radius=parts[1])
-        case SectorAt():
-            return replace(node, center=parts[0], radius=parts[1], heading=parts[2], angle=parts[3])
-        case RectangleAt():
-            return replace(node, center=parts[0], heading=parts[1], width=parts[2], length=parts[3])
-        case RegionUnion() | RegionIntersection():
-            return replace(node, parts=parts)
-        case RegionDifference():
-            return replace(node, base=parts[0], removed=parts[1])
-        case Encloses():
-            return replace(node, outer=parts[0], inner=parts[1])
-        case _:
-            assert_never(node)
+    single, several = _FIELDS[type(node)]
+    changed: dict[str, object] = dict(zip(single, parts, strict=False))
+    if several is not None:
+        changed[several] = parts[len(single) :]
+    return replace(node, **changed)
+
+
+def _fields(kind: type) -> tuple[tuple[str, ...], str | None]:
+    """The fields of a class of nodes that are one node each, and the one that is a tuple of them, which comes last."""
+    named = [(each.name, str(each.type)) for each in fields(kind) if "Node" in str(each.type)]
+    single = tuple(name for name, type_ in named if type_ == "Node")
+    several = [name for name, type_ in named if type_ == "tuple[Node, ...]"]
+    if named[len(single) :] != [(name, "tuple[Node, ...]") for name in several[:1]]:
+        raise TypeError(f"{kind.__name__}: children are fields `Node`, then at most one `tuple[Node, ...]`")
+    return single, several[0] if several else None
+
+
+def _reader(kind: type) -> Callable[[Node], tuple[Node, ...]]:
+    """What gives the children of the nodes of a class."""
+    single, several = _FIELDS[kind]
+    if several is not None:
+        first = [attrgetter(name) for name in single]
+        rest = attrgetter(several)
+        return (lambda node: (*[get(node) for get in first], *rest(node))) if first else rest
+    if len(single) == 1:
+        only = attrgetter(single[0])
+        return lambda node: (only(node),)
+    return attrgetter(*single) if single else lambda _node: ()
+
+
+_NODE_TYPES: tuple[type[Node], ...] = get_args(Node)
+_LEAF_TYPES: tuple[type[Leaf], ...] = get_args(Leaf)
+_FIELDS = {kind: _fields(kind) for kind in _NODE_TYPES}
+_CHILDREN = {kind: _reader(kind) for kind in _NODE_TYPES}
 
 
 def postorder(roots: Iterable[Node], *, beyond: Container[int] = ()) -> Iterator[Node]:
