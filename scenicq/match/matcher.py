@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from scenicq.budget import TimeIsUp, limited
 from scenicq.forest.scenario import Scenario
+from scenicq.match.correspondences import correspondences
 from scenicq.match.decide.solver_step import ask
 from scenicq.match.explanation import Finding
 from scenicq.match.options import Exhausted, MatchOptions
@@ -96,9 +97,9 @@ class Matcher:
         found = (finding.verdict for finding in self.findings(label, among=among))
         return (verdict for verdict in found if isinstance(verdict, Match))
 
-    def findings(self, label: Label, *, among: Candidates | None = None) -> Iterator[Finding]:
-        """The matches, then what is undecided, also whether there are more; without either what `examine` gives."""
-        found, time_for_all = self._findings((label, among), MapLookups()), limited(self.options.timeout_s)
+    def findings(self, label: Label, *, among: Candidates | None = None, every_open: bool = False) -> Iterator[Finding]:
+        """The matches, then what is undecided, each or (also whether there are more) one; else what `examine` gives."""
+        found, time_for_all = self._findings((label, among), every_open=every_open), limited(self.options.timeout_s)
         while True:
             with time_for_all:
                 if (finding := next(found, None)) is None:
@@ -108,7 +109,7 @@ class Matcher:
     def examine(self, label: Label, given: Mapping[str, str] | None = None) -> Finding:
         """Decide one label and keep what the verdict rests on; arguments as of `match`."""
         with limited(self.options.timeout_s):
-            return next(self._findings((label, None), MapLookups(), None, given))
+            return next(self._findings((label, None), given=given))
 
     def relaxed(self, options: MatchOptions) -> Matcher:
         """The same matcher with options that differ in tolerance and patience only; the analysis is shared.
@@ -143,37 +144,35 @@ class Matcher:
     def _findings(
         self,
         asked: Asked,
-        lookups: MapLookups,
+        lookups: MapLookups | None = None,
         reporter: Reporter | None = None,
         given: Mapping[str, str] | None = None,
+        *,
+        every_open: bool = False,
     ) -> Iterator[Finding]:
         """Matches and what else is undecided, or else the one verdict that there is (algorithm 1)."""
-        (label, among), matched, rest = asked, 0, list[tuple[int, Finding]]()
+        (label, among), told, rest = asked, 0, list[tuple[int, Finding]]()
         for ego in egos(self.scenario, label, self.options):
             roles = find_candidates(self.scenario, label, ego, self.options, given or {}, among)
             if isinstance(roles, Cause):
                 rest.append((0, Finding(self._verdicts.excluded(label, ego, roles))))
                 continue
-            search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups)
+            search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups or MapLookups())
             ended: Ended | None = None
             try:
-                for signature, candidates in roles.signatures(self.plans.relevant):
-                    plan = self.plans.plan(signature)
-                    for solution in search.solutions(plan, candidates, self.plans.always_twins):
-                        matched += 1
-                        if matched > self.options.correspondences:
-                            raise Exhausted
-                        satisfied = tuple(outcome for _, outcome in solution.outcomes)
-                        match = self._verdicts.match(label, solution)
-                        yield Finding(match, search, plan, solution.assignment, satisfied)
+                for finding in correspondences(label, search, self.plans, self._verdicts, every_open=every_open):
+                    told += 1
+                    if told > self.options.correspondences:
+                        raise Exhausted
+                    yield finding
             except (Exhausted, TimeIsUp) as error:
                 ended = "timeout" if isinstance(error, TimeIsUp) else "budget"
-                ended = "correspondences" if matched > self.options.correspondences else ended
+                ended = "correspondences" if told > self.options.correspondences else ended
             weight, verdict = self._verdicts.without_match(label, search, ended)
             rest.append((weight, Finding(verdict, search)))
             if ended == "correspondences":
                 break
-        if not matched:
+        if not told:
             # an unknown outweighs every no; among equals, what came furthest
             yield max(rest, key=lambda each: each[0], default=(0, Finding(self._verdicts.without_ego())))[1]
         else:

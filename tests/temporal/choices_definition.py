@@ -1,8 +1,9 @@
 """Choices over time straight from their definition: every outcome, every binding, every pair of samples.
 
 A program is drawn as data, of which the text is one reading and the plain functions here the other. All random
-variables have finitely many values that make a difference: outcomes of choices, and numbers half a unit apart. What is
-not observed of a condition at a sample may be either; of few such places every completion is tried.
+variables have finitely many values that make a difference: outcomes of choices, and numbers a quarter apart. What is
+not observed of a condition at a sample may be either; of few such places every completion is tried. That is more than
+what the speeds and places that are missing can make of all conditions together: `jointly` tries values of these.
 """
 
 from __future__ import annotations
@@ -11,15 +12,21 @@ import itertools
 import math
 import random
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from interval_definition import GAP_S, MONITORS, Formula, conditions, holds, monitored, text_of
 
 from scenicq.store.labels import Label, LabelObject, Recording
 
-MOST_GAPS = 6
+MOST_GAPS = 8
 COMPLETIONS = 12
+MOST_TOGETHER = 4000
+SPEEDS = [n / 8 for n in range(120)]
+ALONG = [n / 8 for n in range(-104, 105)]
+_DRAW = random.Random(0)
+PLANE = [(x / 2, y / 2) for x in range(-18, 19, 2) for y in range(-18, 19, 2)]
+PLANE += [(_DRAW.uniform(-9, 9), _DRAW.uniform(-9, 9)) for _ in range(300)]
 Values = Mapping[str, float]
 """The value of each random variable."""
 
@@ -85,17 +92,27 @@ class Situation:
     trace: Trace
     binding: dict[str, str]
     values: Values
+    speeds: Mapping[str, float] = field(default_factory=dict[str, float])
+    places: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
     def seen(self, role: str, k: int) -> Seen | None:
-        return self.trace[k].seen.get(self.binding[role])
+        """What is seen of a role, or taken to be there."""
+        here = self.trace[k].seen.get(self.binding[role])
+        return Seen(*self.places[role], None, None) if here is None and role in self.places else here
+
+    def speed(self, role: str, k: int) -> float | None:
+        """The speed of a role, or what it is taken to be."""
+        found = speed(self.trace, self.binding[role], k)
+        return self.speeds.get(role) if found is None else found
 
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """An atom: its text, and its value at a sample, None where it is not observed."""
+    """An atom: its text, its value at a sample, None where it is not observed, and whether it reads two coordinates."""
 
     text: str
     value: Callable[[Situation, int], bool | None]
+    plane: bool = False
 
 
 @dataclass(frozen=True)
@@ -186,7 +203,7 @@ def random_condition(draw: random.Random, roles: list[str], choices: list[Choice
             case "speed":
                 return Condition(
                     f"({role}.speed <= {abs(number)})",
-                    lambda s, k: None if (v := speed(s.trace, s.binding[role], k)) is None else v <= abs(number),
+                    lambda s, k: None if (v := s.speed(role, k)) is None else v <= abs(number),
                 )
             case _:
                 other = draw.choice([each for each in ["ego", *roles] if each != role])
@@ -195,7 +212,7 @@ def random_condition(draw: random.Random, roles: list[str], choices: list[Choice
                     p, q = s.seen(role, k), s.seen(other, k)
                     return None if p is None or q is None else math.hypot(p.x - q.x, p.y - q.y) < abs(number) + 1
 
-                return Condition(f"((distance from {role} to {other}) < {abs(number) + 1})", near)
+                return Condition(f"((distance from {role} to {other}) < {abs(number) + 1})", near, plane=True)
     choice = draw.choice(choices)
     name = choice.name
     if choice.regions:
@@ -204,7 +221,7 @@ def random_condition(draw: random.Random, roles: list[str], choices: list[Choice
             x, y, r = choice.regions[int(choice.value(s.values))]
             return None if (p := s.seen(role, k)) is None else math.hypot(p.x - x, p.y - y) <= r
 
-        return Condition(f"({role}.position in {name})", inside)
+        return Condition(f"({role}.position in {name})", inside, plane=True)
     if choice.objects:
 
         def of_option(s: Situation, k: int) -> bool | None:
@@ -223,7 +240,7 @@ def random_condition(draw: random.Random, roles: list[str], choices: list[Choice
         case _:
             return Condition(
                 f"({role}.speed > {name})",
-                lambda s, k: None if (v := speed(s.trace, s.binding[role], k)) is None else v > choice.value(s.values),
+                lambda s, k: None if (v := s.speed(role, k)) is None else v > choice.value(s.values),
             )
 
 
@@ -303,8 +320,12 @@ class Program:
         if len(self.roles) < 2 or self.faces is not None:
             return True
 
+        used = {choice.name for choice in self.used()}
+        # a name that nothing reads says nothing
+        lines = [line for line in self.text().splitlines() if not re.match(r"[A-Z]\d ?=", line) or line[:2] in used]
+
         def said(names: Mapping[str, str]) -> list[str]:
-            text = "".join(names.get(word, word) for word in re.split(r"\b", self.text()))
+            text = "".join(names.get(word, word) for word in re.split(r"\b", "\n".join(lines)))
             text = re.sub(r"from (\w+) to (\w+)", lambda m: "from {} to {}".format(*sorted(m.groups())), text)
             return sorted(re.sub(r"M\d", "M", text).splitlines())
 
@@ -330,7 +351,7 @@ def random_program(draw: random.Random) -> Program:
         if atoms and draw.random() < 0.25:
             # the same again, of the other role where there is one
             again = draw.choice(atoms)
-            atoms.append(Condition(again.text, again.value))
+            atoms.append(replace(again))
         else:
             atoms.append(random_condition(draw, roles, choices))
         return atoms[-1]
@@ -357,10 +378,12 @@ def alike(program: Program) -> Program:
         text = "".join(swap.get(word, word) for word in re.split(r"\b", condition.text))
 
         def value(s: Situation, k: int) -> bool | None:
-            turned = {swap.get(role, role): track for role, track in s.binding.items()}
-            return condition.value(replace(s, binding=turned), k)
+            binding, speeds, places = (
+                {swap.get(role, role): each for role, each in of.items()} for of in (s.binding, s.speeds, s.places)
+            )
+            return condition.value(replace(s, binding=binding, speeds=speeds, places=places), k)
 
-        return Condition(text, value)
+        return replace(condition, text=text, value=value)
 
     def turned(formula: Formula) -> Formula:
         if formula[0] == "atom":
@@ -459,33 +482,82 @@ class Expected:
     exact: bool = True
 
 
-def expected(program: Program, trace: Trace, binding: dict[str, str], i: int) -> Expected:
-    """What is right of a start."""
+def expected(program: Program, trace: Trace, binding: dict[str, str], i: int, *, jointly: bool = False) -> Expected:
+    """What is right of a start.
+
+    Args:
+        program: The program.
+        trace: The recording.
+        binding: The track of each role.
+        i: The start.
+        jointly: Whether conditions that read the same missing speed or place hang together.
+    """
     last, right = life_end(trace, binding, i), Expected()
     if last < 0:
         return right
     facing = trace[i].seen[binding["a"]].heading if program.faces is not None else None
-    atoms = every_atom(program)
+    atoms = list({each.text: each for each in every_atom(program)}.values())
     for values in program.assignments():
         if program.faces is not None and facing is not None and program.faces.value(values) != facing:
             continue
         situation = Situation(trace, binding, values)
-        known = {(id(each), k): each.value(situation, k) for each in atoms for k in range(i, last + 1)}
-        gaps = [key for key, value in known.items() if value is None]
-        some: Iterator[tuple[bool, ...]] = itertools.product((False, True), repeat=len(gaps))
-        if len(gaps) > MOST_GAPS:
+        known = {(each.text, k): each.value(situation, k) for each in atoms for k in range(i, last + 1)}
+        parts = [[{(each, k): False}, {(each, k): True}] for (each, k), value in known.items() if value is None]
+        if jointly:
+            parts = [part for k in range(i, last + 1) for part in ways(situation, atoms, k, right)]
+        some: Iterator[Iterable[Mapping[Place, bool]]] = itertools.product(*parts)
+        if math.prod(map(len, parts)) > (MOST_TOGETHER if jointly else 1 << MOST_GAPS):
             right.exact = False
-            draw = random.Random(len(gaps))
-            some = (tuple(draw.random() < 0.5 for _ in gaps) for _ in range(COMPLETIONS))
+            draw = random.Random(len(parts))
+            some = ([draw.choice(part) for part in parts] for _ in range(COMPLETIONS))
         common = set(range(i, last + 1))
         for completion in some:
-            whole = {**known, **dict(zip(gaps, completion, strict=True))}
-            ends = ends_in(program, trace, lambda c, k, whole=whole: bool(whole[id(c), k]), i, last)
+            whole = dict(known)
+            for part in completion:
+                whole.update(part)
+            ends = ends_in(program, trace, lambda c, k, whole=whole: bool(whole[c.text, k]), i, last)
             common &= ends
             right.possible = right.possible or bool(ends)
         right.common |= common
         right.sure |= {max(common)} if common else set()
     return right
+
+
+Place = tuple[str, int]
+"""A condition by its text, and a sample."""
+
+
+def ways(situation: Situation, atoms: list[Condition], k: int, right: Expected) -> Iterator[list[dict[Place, bool]]]:
+    """What speeds and places that are missing at a sample can make of the conditions that read them, apart."""
+    open_ones = [each for each in atoms if each.value(situation, k) is None]
+    roles = list(situation.binding)
+    absent = [role for role in roles if situation.seen(role, k) is None]
+    for role in roles:
+        guessed = [replace(situation, speeds={role: each}) for each in SPEEDS]
+        yield vectors([each for each in open_ones if each.value(guessed[0], k) is not None], guessed, k)
+    here = [
+        each
+        for each in open_ones
+        if each.value(replace(situation, places=dict.fromkeys(absent, (0, 0))), k) is not None
+    ]
+    if len(absent) > 1 and any(each.plane for each in here):
+        right.exact = False
+        draw = random.Random(k)
+        guessed = [replace(situation, places={role: draw.choice(PLANE) for role in absent}) for _ in range(1500)]
+        yield vectors(here, guessed, k)
+        return
+    for role in absent:
+        own = [each for each in here if each.value(replace(situation, places={role: (0, 0)}), k) is not None]
+        plane = any(each.plane for each in own)
+        right.exact = right.exact and not plane
+        pool = PLANE if plane else [(x, 0.0) for x in ALONG]
+        yield vectors(own, [replace(situation, places={role: each}) for each in pool], k)
+
+
+def vectors(atoms: list[Condition], guessed: list[Situation], k: int) -> list[dict[Place, bool]]:
+    """The different values of conditions together."""
+    found = {tuple(bool(each.value(guess, k)) for each in atoms) for guess in guessed} if atoms else {()}
+    return [{(each.text, k): value for each, value in zip(atoms, values, strict=True)} for values in sorted(found)]
 
 
 def every_atom(program: Program) -> list[Condition]:

@@ -80,7 +80,7 @@ class LabelSearch:
         reporter: Watches the search.
         lookups: What is known of the map.
         failure: What excluded the correspondence that came furthest.
-        undecided: What kept a correspondence that was not excluded from being a match.
+        undecided: What kept a correspondence that was not excluded from being a match, where one is enough.
     """
 
     scenario: Scenario
@@ -92,6 +92,10 @@ class LabelSearch:
     failure: Failure | None = None
     undecided: Failure | None = None
     _open: bool = field(default=False, repr=False)
+    _asked: list[tuple[MatchPlan, Mapping[int, tuple[int, ...]], Mapping[int, int]]] = field(
+        default_factory=list["tuple[MatchPlan, Mapping[int, tuple[int, ...]], Mapping[int, int]]"], repr=False
+    )
+    _left: dict[MatchPlan, list[Failure]] = field(default_factory=dict["MatchPlan", "list[Failure]"], repr=False)
     _orders: set[frozenset[tuple[int, int]]] = field(default_factory=set[frozenset[tuple[int, int]]], repr=False)
     _decisions: GroupCache = field(init=False, repr=False)
 
@@ -102,7 +106,7 @@ class LabelSearch:
     def solutions(
         self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]], twins: Mapping[int, int]
     ) -> Iterator[Solution]:
-        """Every correspondence that matches, interchangeable objects in one order; what is left open is noted.
+        """Every correspondence that matches, interchangeable objects in one order.
 
         Args:
             plan: The scenario's groups for what is observed of the candidates.
@@ -112,13 +116,31 @@ class LabelSearch:
         Raises:
             Exhausted: The search takes more steps than it may.
         """
+        self._asked.append((plan, candidates, twins))
         monolithic = self.options.method == "monolithic"
         for solution in self._monolithic(plan, candidates) if monolithic else self._modular(plan, candidates):
-            # objects of which a label tells more or less come in another order in another signature
-            order = in_one_order(solution.assignment, twins)
-            if order not in self._orders:
-                self._orders.add(order)
+            if self._is_new(solution.assignment, twins):
                 yield solution
+
+    def open_ones(self) -> Iterator[tuple[MatchPlan, Failure]]:
+        """Every correspondence that nothing excludes but something keeps from being a match, of what was asked for.
+
+        All matches come before. Errors are those of `solutions`.
+        """
+        for plan, candidates, twins in self._asked if self._open else ():
+            monolithic = self.options.method == "monolithic"
+            for failure in self._left.get(plan, ()) if monolithic else self._modular_open(plan, candidates):
+                if self._is_new(failure.assignment, twins):
+                    yield plan, failure
+
+    def _is_new(self, assignment: Mapping[int, int], twins: Mapping[int, int]) -> bool:
+        """Whether a correspondence is told for the first time, in whatever order interchangeable objects are."""
+        # objects of which a label tells more or less come in another order in another signature
+        order = in_one_order(assignment, twins)
+        if order in self._orders:
+            return False
+        self._orders.add(order)
+        return True
 
     # --- deciding groups
 
@@ -155,25 +177,30 @@ class LabelSearch:
     # --- the query paper's algorithm 1
 
     def _modular(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
+        judged = self._slots(plan, candidates)
+        if judged is not None and judged[1] is not None:
+            ego = {self.scenario.ego: self.problem.ego}
+            for assignment in self._satisfying(plan, _without(judged[0], judged[1]), ego):
+                yield self._solution(plan, assignment)
+
+    def _modular_open(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Failure]:
+        judged = self._slots(plan, candidates)
+        if judged is not None:
+            ego = {self.scenario.ego: self.problem.ego}
+            for assignment in self._search(plan, judged[0], ego, accept_unknown=True):
+                if (failure := self._first_open(plan, assignment)) is not None:
+                    yield failure
+
+    def _slots(
+        self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]
+    ) -> tuple[list[Slot], set[tuple[int, int]] | None] | None:
+        """Objects with their candidates and which are undecided, None where the ego is; None where nobody is left."""
         ego = {self.scenario.ego: self.problem.ego}
         answers = [self._judge(group, ego, 1) for group in plan.ego_only]
         if Consistency.NO in answers:
-            return
-        wanted = {index: numbers for index, numbers in candidates.items() if index != self.scenario.ego}
-        judged = self._filter(plan, wanted, ego)
-        if judged is None:
-            return
-        slots, undecided = judged
-        found = False
-        if Consistency.UNKNOWN not in answers:
-            for assignment in self._satisfying(plan, _without(slots, undecided), ego):
-                found = True
-                yield self._solution(plan, assignment)
-        if self._open and not found and self.undecided is None:
-            # nothing matches; if some correspondence fails nowhere either, it may match
-            open_one = next(self._search(plan, slots, ego, accept_unknown=True), None)
-            if open_one is not None:
-                self.undecided = self._first_open(plan, open_one)
+            return None
+        judged = self._filter(plan, {i: numbers for i, numbers in candidates.items() if i != self.scenario.ego}, ego)
+        return (judged[0], None) if judged is not None and Consistency.UNKNOWN in answers else judged
 
     def _filter(
         self, plan: MatchPlan, wanted: Mapping[int, tuple[int, ...]], ego: Mapping[int, int]
@@ -336,8 +363,12 @@ class LabelSearch:
             failure = Failure(1, group, outcome, assignment)
             if isinstance(outcome, Refuted):
                 self._fail(failure)
-            elif self.undecided is None:
-                self.undecided = failure
+                continue
+            self._open = True
+            mine = self._left.setdefault(plan, [])
+            # a caller takes no more of them
+            if len(mine) <= self.options.correspondences:
+                mine.append(failure)
 
     def _together(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Outcome:
         if not plan.groups:
@@ -360,8 +391,6 @@ def _all_of(group: Group) -> tuple[Constraint, ...]:
 
 def _without(slots: list[Slot], undecided: set[tuple[int, int]]) -> list[Slot]:
     """The slots without undecided candidates."""
-    if not undecided:
-        return slots
     return [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in undecided)) for s in slots]
 
 

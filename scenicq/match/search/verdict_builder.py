@@ -72,14 +72,7 @@ class VerdictBuilder:
         """
         ego, failure = {self.scenario.ego: search.problem.ego}, search.failure
         if search.undecided is not None:
-            found = search.undecided
-            reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
-            assignment = ego | dict(found.assignment)
-            cause = self._cause(found)
-            if reason == UNOBSERVED:
-                seen = {index: search.problem.seen[number] for index, number in assignment.items()}
-                cause = replace(cause, detail=unobserved_motion(self.scenario, seen, found.constraint))
-            return _UNDECIDED, Unknown(reason, cause, self.names(label, assignment))
+            return _UNDECIDED, self.open(label, search, search.undecided)
         if ended is not None:
             most = {
                 "budget": f"{self.options.budget:,} steps",
@@ -93,6 +86,16 @@ class VerdictBuilder:
                 label, search.problem.ego, Cause("correspondence", "no distinct label objects for all objects")
             )
         return failure.depth, NoMatch(self._cause(failure), self.names(label, ego | dict(failure.assignment)))
+
+    def open(self, label: Label, search: LabelSearch, found: Failure) -> Unknown:
+        """The verdict of a correspondence that a search leaves open."""
+        reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
+        assignment = {self.scenario.ego: search.problem.ego} | dict(found.assignment)
+        cause = self._cause(found)
+        if reason == UNOBSERVED:
+            seen = {index: search.problem.seen[number] for index, number in assignment.items()}
+            cause = replace(cause, detail=unobserved_motion(self.scenario, seen, found.constraint))
+        return Unknown(reason, cause, self.names(label, assignment))
 
     def excluded(self, label: Label, ego: int, cause: Cause) -> NoMatch:
         """What excludes a label before any object but the ego has a candidate."""

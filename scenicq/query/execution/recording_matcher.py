@@ -213,14 +213,13 @@ class RecordingMatcher:
             found.failed.update(starts.failed)
         decided: list[DecidedStart] = []
         undecided: dict[int, Unknown] = {}
-        known_starts: Counter[int] = Counter()
+        known_starts: dict[int, Counter[str]] = {}
         read = asked.read(labels + block.first_label) if len(labels) else iter(())
         for at, candidate, members, among, known in self._asked(block, labels, candidates, sure, read):
             matcher = search.rest if known else search.matcher
             label = candidate.label
             recording = int(block.recording_of[at])
-            findings = few_findings(matcher, label, known_starts[recording], among=among)
-            known_starts[recording] += sum(isinstance(each.verdict, Match) for each in findings)
+            findings = few_findings(matcher, label, known_starts.setdefault(recording, Counter()), among=among)
             for each in findings:
                 if isinstance(each.verdict, NoMatch):
                     found.failed[each.verdict.cause.what] += 1

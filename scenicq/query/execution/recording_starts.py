@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ from scenicq.temporal.stretches import StartTable
 __all__ = ["DecidedStart", "few_findings", "label_of", "start_table", "starts_of"]
 
 _MOST_STARTS = 10_000
-"""Starts that the matcher may find in one recording: with all their tracks they are held until it is decided."""
+"""Starts that the matcher may find in one recording, sure ones and open ones: they are held until it is decided."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +43,26 @@ class DecidedStart:
     correspondence: Mapping[str, str]
 
 
-def few_findings(matcher: Matcher, label: Label, starts: int, *, among: Candidates | None = None) -> list[Finding]:
+def few_findings(
+    matcher: Matcher, label: Label, starts: Counter[str], *, among: Candidates | None = None
+) -> list[Finding]:
     """What the matcher finds in a label; unknown where the recording has more starts than can be held.
 
     Args:
         matcher: The matcher.
         label: The label.
-        starts: Those that its recording has already.
+        starts: How many its recording has already that match, and that are open; those of the label are added.
         among: What is known of who may play whom.
     """
-    room = max(_MOST_STARTS - starts, 0)
-    findings = list(itertools.islice(matcher.findings(label, among=among), room + 1))
-    if len(findings) > room and isinstance(findings[room].verdict, Match):
-        cause = Cause("correspondence search", f"more than {_MOST_STARTS:,} starts in the recording")
-        findings[room] = Finding(Unknown("budget", cause))
+    findings: list[Finding] = []
+    for finding in matcher.findings(label, among=among, every_open=True):
+        if finding.plan is not None:
+            kind = "match" if isinstance(finding.verdict, Match) else "open"
+            if starts[kind] >= _MOST_STARTS:
+                cause = Cause("correspondence search", f"more than {_MOST_STARTS:,} starts in the recording")
+                return [*findings, Finding(Unknown("budget", cause))]
+            starts[kind] += 1
+        findings.append(finding)
     return findings
 
 
@@ -78,22 +84,15 @@ def starts_of(
         verdict = finding.verdict
         if isinstance(verdict, NoMatch):
             continue
-        chosen: dict[int, int] = {}
-        if isinstance(verdict, Match) and finding.search is not None and finding.plan is not None:
-            numbers = {**finding.assignment, scenario.ego: finding.search.problem.ego}
-            chosen = {index: members[number] for index, number in numbers.items()}
-            for twins in classes_of_twins(finding.plan.twins):
-                ordered = sorted([chosen[index] for index in twins], key=block.key)
-                chosen.update(zip(sorted(twins), ordered, strict=True))
-        else:
-            numbers_by_id = {each.id: number for number, each in enumerate(label.objects, 1)} | {"ego": 0}
-            names = {owner.name: owner.index for owner in scenario.objects}
-            whole = verdict.correspondence
-            if len(whole) < len(scenario.objects):
-                if isinstance(verdict, Unknown):
-                    yield verdict
-                continue
-            chosen = {names[name]: members[numbers_by_id[id_]] for name, id_ in whole.items()}
+        if finding.search is None or finding.plan is None:
+            if isinstance(verdict, Unknown):
+                yield verdict
+            continue
+        numbers = {**finding.assignment, scenario.ego: finding.search.problem.ego}
+        chosen = {index: members[number] for index, number in numbers.items()}
+        for twins in classes_of_twins(finding.plan.twins):
+            ordered = sorted([chosen[index] for index in twins], key=block.key)
+            chosen.update(zip(sorted(twins), ordered, strict=True))
         yield DecidedStart(chosen, verdict, label, verdict.correspondence)
 
 

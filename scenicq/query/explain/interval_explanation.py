@@ -175,6 +175,7 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
     examples: dict[str, str] = {}
     with TrackBlock(query.dataset, part, [(first, end)]) as block:
         starts: list[_Start] = []
+        known: Counter[str] = Counter()
         for sample, label in enumerate(labels):
             if time_us is not None and label.timestamp_us != time_us:
                 continue
@@ -185,7 +186,7 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
             causes: list[str] = []
             before = len(starts)
             for outcome, matcher in enumerate(matchers):
-                findings = few_findings(matcher, label, len(starts))
+                findings = few_findings(matcher, label, known)
                 found = starts_of(scenario, block, label, members, findings)
                 starts += [(each, outcome) for each in found if isinstance(each, DecidedStart)]
                 causes += [each.verdict.cause.what for each in findings if not isinstance(each.verdict, Match)]
