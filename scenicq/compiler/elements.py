@@ -24,10 +24,14 @@ from scenicq.geometry.elements import (
     Lane,
     LaneGroup,
     LaneSection,
+    LongElement,
     Maneuver,
     MissingElementError,
     NetworkElement,
     Road,
+    RoadSection,
+    Shoulder,
+    Sidewalk,
     Signal,
 )
 from scenicq.geometry.fields import VectorField
@@ -44,7 +48,26 @@ MANEUVER_TYPES = Module("ManeuverType", {name: name for name in ("STRAIGHT", "LE
 
 _TURN = math.radians(20)
 """Change of direction from which on a way through an intersection is a turn."""
-_HIDDEN = frozenset({"polygon", "properties", "region", "left_edge", "right_edge"})
+_ATTRIBUTES: dict[type, frozenset[str]] = {
+    NetworkElement: frozenset("id name orientation uid".split()),
+    LongElement: frozenset("_predecessor _successor centerline predecessor successor".split()),
+    LaneSection: frozenset(
+        "_fasterLane _laneToLeft _laneToRight _slowerLane adjacentLanes fasterLane group isForward lane laneToLeft "
+        "laneToRight openDriveID road slowerLane".split()
+    ),
+    Lane: frozenset("adjacentLanes group isForward maneuvers predecessors road sections successors".split()),
+    LaneGroup: frozenset("_opposite lanes opposite road".split()),
+    Road: frozenset(
+        "backwardLanes forwardLanes intersection is1Way laneGroups lanes sections signals".split(),
+    ),
+    RoadSection: frozenset("backwardLanes forwardLanes lanes lanesByOpenDriveID road".split()),
+    Intersection: frozenset("incomingLanes is3Way is4Way lanes maneuvers outgoingLanes roads signals".split()),
+    Sidewalk: frozenset({"road"}),
+    Shoulder: frozenset({"road"}),
+    Maneuver: frozenset("connectingLane endLane intersection startLane".split()),
+    Signal: frozenset("country isTrafficLight openDriveID type uid".split()),
+}
+"""What a program may read as it stands, for each kind; what else a class has is no part of the language."""
 _NETWORK = frozenset(
     "lanes laneSections laneGroups roads connectingRoads allRoads intersections crossings sidewalks shoulders "
     "laneRegion roadRegion intersectionRegion crossingRegion sidewalkRegion shoulderRegion drivableRegion "
@@ -57,16 +80,17 @@ def names_of(value: Network | NetworkElement | Maneuver | Signal) -> set[str]:
     """The attributes that a value may have."""
     if isinstance(value, Network):
         return set(_NETWORK | LOOKUPS.keys() | METHODS | {"findPointIn"}) | names_worked_out(value)
-    own = {name for name in dir(value) if not name.startswith("__")} - _HIDDEN
+    own = {name for kind, names in _ATTRIBUTES.items() if isinstance(value, kind) for name in names}
     if isinstance(value, Signal):
         return own
-    return own | (_MANEUVER if isinstance(value, Maneuver) else METHODS | names_worked_out(value))
+    if isinstance(value, Maneuver):
+        return own | _MANEUVER
+    return own | names_worked_out(value) | (METHODS if value.orientation is not None else set())
 
 
 def is_of_elements(name: str) -> bool:
     """Whether elements of some kind have an attribute; those without one of their own only have what others have."""
-    kinds = (Lane, LaneSection, LaneGroup, Road, Intersection)
-    own = any(hasattr(kind, name) or name in kind.__annotations__ for kind in kinds) and name not in _HIDDEN
+    own = any(name in names for kind, names in _ATTRIBUTES.items() if issubclass(kind, NetworkElement))
     return own or name in METHODS or is_worked_out(name)
 
 
@@ -110,15 +134,13 @@ def of_element(run: Runner, value: NetworkElement | Maneuver | Signal, name: str
         method = method_of(run, value, name)
         if method is not None:
             return method
-    if name in _HIDDEN or not (hasattr(type(value), name) or name in getattr(value, "__dict__", ())):
+    if not any(isinstance(value, kind) and name in names for kind, names in _ATTRIBUTES.items()):
         return MISSING
     try:
         found: Any = getattr(value, name)
     except MissingElementError as error:
         hints = (f"`_{name}` is None there: leave such elements out with a condition",)
         raise fail("map-lacks", f"the map says that {error}", span, "not in this map", hints) from None
-    if callable(found):
-        return MISSING
     if found is None and name == "centerline":
         raise fail("map-lacks", f"the map gives no centreline for {value.name}", span, "not in this map")  # type: ignore[union-attr]
     return build.constant(found, span) if isinstance(found, Region | VectorField) else found
