@@ -10,7 +10,7 @@ LINTED := scenicq cli tests sample_data
 FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/search/test_backtracking.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check test test-all test-oldest test-newest golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames oracle-time mutate browser dreal clean
+.PHONY: help setup demo lint check test test-all test-oldest test-newest golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames oracle-time mutate browser dreal clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
@@ -29,11 +29,13 @@ demo: $(READY) ## Ingest the sample data into demo/ and find two crossing cars i
 	$(BIN)/scenicq ingest sample_data/crossroads demo/crossroads --force
 	$(BIN)/scenicq match sample_data/scenarios/02_crossing_cars.scenic demo/crossroads --format table --summary
 
-check: $(READY) ## Format, lint, types, layers and the fastest tests: under two minutes
+lint: $(READY) ## Format, lint, types and layers
 	$(BIN)/ruff format --check $(LINTED)
 	$(BIN)/ruff check $(LINTED)
 	$(BIN)/pyright --warnings
 	$(BIN)/lint-imports --no-cache
+
+check: lint ## What lint does, and the fastest tests: under two minutes
 	$(PYTEST) -n $(WORKERS) -m 'not slow' $(FASTEST)
 
 test: $(READY) ## All tests but the slow ones
