@@ -22,7 +22,7 @@ from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail,
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.compute import fold
-from scenicq.forest.nodes import Feature, Index, Node, PointIn, RegionDifference, Select
+from scenicq.forest.nodes import Constant, Feature, Index, Node, PointIn, RegionDifference, Select
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 
@@ -219,8 +219,12 @@ def _beyond(
         return _position(span, position)
     # Scenic 3's manual says the origin's orientation, Scenic 3.1 itself takes the map's axes: either is a match
     axes, inherited = build.constant(0.0), _inherited(origin, around, span)
-    either = axes if inherited is None else Select(Index((1.0, 1.0), span=span), (axes, inherited), span=span)
-    return _position(span, position, either)
+    return _position(span, position, axes if inherited is None else _either(axes, inherited, span))
+
+
+def _either(one: ModelValue, other: ModelValue, span: Span) -> Node:
+    """A heading that may be either of two, where Scenic and its manual or the papers differ."""
+    return Select(Index((1.0, 1.0), span=span), (to_heading(one, span), to_heading(other, span)), span=span)
 
 
 def _following(span: Span, field: ModelValue, end: Instance) -> BoundSpecifier:
@@ -258,13 +262,21 @@ def _facing_point(span: Span, target: ModelValue, *, away: bool) -> BoundSpecifi
     return _specifier(span, "heading", evaluate, target, needs="position")
 
 
-def _apparently(span: Span, heading: ModelValue, origin: ModelValue) -> BoundSpecifier:
+def _apparently(span: Span, heading: ModelValue, origin: ModelValue, version: int) -> BoundSpecifier:
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         own = to_vector(property_node(instance, "position", span), span)
         line = build.vector_difference(own, to_vector(origin, span), span)
-        return {"heading": build.add(to_heading(_known(heading, instance), span), build.bearing(line, span), span)}
+        seen = build.add(to_heading(_known(heading, instance), span), build.bearing(line, span), span)
+        if version < 3:
+            return {"heading": seen}
+        # the papers and Scenic 3's manual mean the line of sight alone, Scenic 3.1 adds to it: either is a match
+        parent = to_heading(instance.properties["parentOrientation"], span)
+        added = build.add(parent, seen, span)
+        plain = isinstance(parent, Constant) and parent.value == 0.0
+        return {"heading": seen if plain else _either(seen, added, span)}
 
-    return _specifier(span, "heading", evaluate, heading, needs="position")
+    needs = "position" if version < 3 else "position parentOrientation"
+    return _specifier(span, "heading", evaluate, heading, needs=needs)
 
 
 def bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> BoundSpecifier:
@@ -381,7 +393,7 @@ def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Boun
         case ast.FacingAwayFromSpecifier():
             return _facing_point(span, evaluate(node.target), away=True)
         case ast.ApparentlyFacingSpecifier():
-            return _apparently(span, evaluate(node.heading), origin(node.origin))
+            return _apparently(span, evaluate(node.heading), origin(node.origin), around.version)
         case ast.WithSpecifier():
             raise AssertionError("bound elsewhere")
         case ast.UsingSpecifier():

@@ -84,11 +84,26 @@ class Spot:
 
 @dataclass(frozen=True)
 class Made:
-    """An instance of the program, with what must be true of it."""
+    """An instance of the program, with what must be true of it.
+
+    Attributes:
+        name: Its name.
+        spot: Where it is.
+        heading: Its heading, given the numbers and its position; None where versions and manuals differ.
+        added: Whether the heading may also be added to that of the spot.
+    """
 
     name: str
     spot: Spot
     heading: Callable[[Numbers, Vector], float] | None
+    added: bool = False
+
+    def headings(self, values: Numbers, here: Vector) -> list[float]:
+        """The headings that are right; none where versions and manuals differ."""
+        if self.heading is None:
+            return []
+        own = self.heading(values, here)
+        return [own, own + self.spot.heading(values, here)] if self.added and self.spot.heading else [own]
 
 
 PARTS = {
@@ -494,7 +509,7 @@ class Composer:
 
         options: dict[str, Callable[[], object]] = {"facing H": plain}
         if not spot.turned:
-            options |= {"facing V": toward, "apparently facing": apparently}
+            options |= {"facing V": toward} | ({} if spot.vague else {"apparently facing": apparently})
         if spot.on_line:
             options |= {"facing H relative to F": relative, "facing F": of_field}
         return self._pick("heading specifier", options)  # type: ignore[return-value]
@@ -506,11 +521,12 @@ class Composer:
         if self.rng.random() < 0.5:
             text, heading = self.facing(spot)
             words.append(text)
+        added = words[-1].startswith("apparently")
         if is_object:
             words += [f"with width {size[0]}", f"with length {size[1]}"]
         self.lines.append(f"{name} = new {'Object' if is_object else 'OrientedPoint'} {', '.join(words)}")
         self.lines += [f"param {name}_{part} = {name}.{part.replace('_', '.')}" for part in PARAMS]
-        self.made.append(Made(name, spot, heading))
+        self.made.append(Made(name, spot, heading, added))
         self.known.append(
             Oriented(
                 name, lambda values: (values[f"{name}_position_x"], values[f"{name}_position_y"]),
