@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.query.execution.partitions import fingerprint, gather, is_done, partitions, write_partition
-from scenicq.query.execution.record_reader import note_question
+from scenicq.query.execution.partitions import gather, is_done, partitions, write_partition
+from scenicq.query.execution.record_reader import name_question, note_question
 from scenicq.query.execution.result_origin import ORIGIN, name_origin
 from scenicq.query.execution.results import Funnel, record
 from scenicq.query.execution.run import Query
@@ -52,7 +52,7 @@ def _whole(query: Query, shard: Shard, bar: ProgressBar) -> Iterator[dict[str, A
 def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> Funnel:
     """Match one shard into a folder, unless it is there already; what it found is counted."""
     number, count = shard
-    question = fingerprint(query.dataset, query.source.text, query.options)
+    question = name_question(query)
     pieces = partitions(query.dataset, count)
     if number > len(pieces):
         return Funnel()  # fewer recordings than shards: nothing is left for this one

@@ -10,7 +10,7 @@ Nothing here reads files, starts processes or reaches Python's own objects.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, cast
 
 from scenicq.compiler import operators
@@ -105,7 +105,7 @@ def _power(span: Span, base: ModelValue, exponent: ModelValue) -> ModelValue:
     return plain_binary("**", base, exponent, span)
 
 
-def mathematics() -> Mapping[str, ModelValue]:
+def mathematics() -> dict[str, ModelValue]:
     """The names of the module `math`, over known and random numbers alike."""
     names: dict[str, Any] = {name: Builtin(name, _scalar_function(*pair)) for name, pair in _OPS.items()}
     names["fabs"] = Builtin("fabs", _scalar_function(ArithmeticOp.ABS, cast("Callable[..., float]", abs)))

@@ -112,9 +112,10 @@ class Environment:
         own: Names that a function binds somewhere: unset before, whatever is around.
         comprehension: Whether it is that of a comprehension, whose `:=` binds outside.
         library: Whether this is a library's rather than the user's text.
+        package: The package of the file that this belongs to; empty in a file that is in none.
     """
 
-    __slots__ = ("comprehension", "library", "names", "own", "parent", "shared")
+    __slots__ = ("comprehension", "library", "names", "own", "package", "parent", "shared")
 
     def __init__(
         self,
@@ -125,14 +126,16 @@ class Environment:
         user: bool = False,
         own: frozenset[str] = frozenset(),
         comprehension: bool = False,
+        package: str | None = None,
     ) -> None:
-        """Take the names and the enclosing environment; inside a library's, it is a library's unless the user's."""
+        """Take the names and the enclosing environment, which says of what file this is unless it is told otherwise."""
         self.names = names
         self.parent = parent
         self.shared: dict[str, Environment] = {}
         self.own = own
         self.comprehension = comprehension
         self.library = not user and (library or (parent is not None and parent.library))
+        self.package: str = package if package is not None else parent.package if parent is not None else ""
 
     @property
     def is_module(self) -> bool:

@@ -1,88 +1,168 @@
-"""Import statements: which names they bring in."""
+"""The modules that a program sees over one map, and the statements that import them.
+
+Names are resolved as Python resolves them: a folder is a package, whose `__init__.scenic` is run first, leading dots
+go up from the package of the file that has them, and a module that is still being read is there with what it has.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from difflib import get_close_matches
-from typing import TypeAlias
 
+from scenicq.compiler.builtins import language_names
 from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
-from scenicq.compiler.values import Module, fail
-from scenicq.errors import Span
+from scenicq.compiler.imported_files import ImportedFiles, Loader, absolute, packages
+from scenicq.compiler.interpreter import Interpreter
+from scenicq.compiler.models import is_dynamic, is_package, libraries_of, library_text, network_names, plain_module
+from scenicq.compiler.roots import root_classes
+from scenicq.compiler.sequences import sequence_functions
+from scenicq.compiler.values import Builtin, ModelValue, Module, fail
+from scenicq.errors import Diagnostic, Note, ScenarioError, Span
+from scenicq.geometry.network import Network
 from scenicq.syntax import ast
-from scenicq.syntax.walk import walk
 
-__all__ = ["Load", "import_into", "named_modules"]
-
-Load: TypeAlias = Callable[[str, int, Span], Module]
-"""Resolves a module: its dotted name, the number of leading dots, the place."""
+__all__ = ["Modules"]
 
 
-def named_modules(module: ast.Program) -> Iterator[tuple[str, int]]:
-    """The modules that a program names, each with the number of leading dots."""
-    for node in walk(*module.body):
+class Modules:
+    """The names and modules that a program sees, over one map.
+
+    Attributes:
+        interpreter: Runs the program and what it imports.
+        base: The names of the language.
+    """
+
+    def __init__(self, network: Network, version: int, initial: bool, loader: Loader | None) -> None:
+        """Take the map, the version of Scenic, whether dynamic parts are ignored, and what reads files."""
+        self.interpreter = Interpreter(version, initial, self._import, network)
+        names = language_names() | sequence_functions(self.interpreter) | root_classes(version)
+        self.base = Environment(names)
+        self._network = network
+        self._files = ImportedFiles(loader, version)
+        self._modules: dict[str, Module] = {}
+        self._unfinished: set[str] = set()
+
+    def load(self, name: str, span: Span) -> Module:
+        """The module of a dotted name, after the packages that it lies in.
+
+        Raises:
+            ScenarioError: unknown-model; what is wrong in the module.
+        """
+        if is_dynamic(name):
+            self.interpreter.dynamic(f"import of {name}", span)
+            return Module(name, {}, dynamic=True)
+        for each in packages(name):
+            if each not in self._modules:
+                module = self._run_file(each, span) or self._model(each) or self._package(each)
+                self._modules[each] = module = module or plain_module(each if each == name else name, span)
+                package, _, last = each.rpartition(".")
+                if package:
+                    self._modules[package].names[last] = module
+        return self._modules[name]
+
+    def is_model_named(self, program: ast.Program) -> bool:
+        """Whether a program, or a file that it imports, names a world model; Python's own modules are none."""
+        return any(file is None and bool(libraries_of(name)) for name, file in self._files.reach(program))
+
+    def _import(self, node: ast.Import | ast.ImportFrom | ast.Model, scope: Environment) -> None:
+        """Run an `import`, `from ... import` or `model` statement; `scope` takes the names.
+
+        Raises:
+            ScenarioError: unknown-model, unknown-name.
+        """
         match node:
             case ast.Model():
-                yield node.name, 0
+                scope.names.update(_public(self.load(node.name, node.name_span)))
             case ast.Import():
-                yield from ((alias.path, 0) for alias in node.aliases)
+                for alias in node.aliases:
+                    self._import_module(alias, scope)
             case ast.ImportFrom():
-                yield node.module, node.level
-            case _:
-                pass
+                self._import_from(node, scope)
 
-
-def import_into(node: ast.Import | ast.ImportFrom | ast.Model, scope: Environment, load: Load, version: int) -> None:
-    """Run an `import`, `from ... import` or `model` statement.
-
-    Args:
-        node: The statement.
-        scope: Takes the names.
-        load: Resolves a module by its dotted name, the number of leading dots and the place.
-        version: The version of Scenic.
-
-    Raises:
-        ScenarioError: unknown-model, unknown-name.
-    """
-    match node:
-        case ast.Model():
-            scope.names.update(load(node.name, 0, node.name_span).names)
-        case ast.Import():
-            for alias in node.aliases:
-                _import_module(alias, scope, load, version)
-        case ast.ImportFrom():
-            module = load(node.module, node.level, node.span)
-            for alias in node.aliases:
-                if alias.path == "*":
-                    scope.names.update(module.names)
-                elif module.dynamic or alias.path in module.names:
-                    scope.set(alias.name or alias.path, module.names.get(alias.path))
-                else:
-                    close = get_close_matches(alias.path, sorted(module.names), 1, 0.75)
-                    raise fail("unknown-name", f"`{node.module}` has no `{alias.path}`", alias.span, "not found",
-                               tuple(f"it has `{name}`" for name in close))  # fmt: skip
-
-
-def _import_module(alias: ast.ImportAlias, scope: Environment, load: Load, version: int) -> None:
-    module = load(alias.path, 0, alias.span)
-    if alias.name or "." not in alias.path:
-        scope.set(alias.name or alias.path, module)
-        if version == 1 and not alias.name and module.name in FIRST_LIBRARIES:
+    def _import_module(self, alias: ast.ImportAlias, scope: Environment) -> None:
+        module = self.load(alias.path, alias.span)
+        if alias.name:
+            scope.set(alias.name, module)
+            return
+        first = alias.path.partition(".")[0]
+        scope.set(first, self._modules.get(first, module))
+        if self.interpreter.version == 1 and module.name in FIRST_LIBRARIES:
             # the 2019 paper's `import gtaLib` gives the names themselves
             scope.names.update(module.names)
-        return
-    first, *rest = alias.path.split(".")
-    for part in reversed(rest):
-        module = Module(alias.path, {part: module})
-    held = scope.names.get(first)
-    merged = _merged(held, module) if isinstance(held, Module) else module
-    scope.set(first, merged)
+
+    def _import_from(self, node: ast.ImportFrom, scope: Environment) -> None:
+        name = absolute(node.module, node.level, scope.package)
+        if name is None:
+            raise fail("unknown-model", "these dots lead out of the package of this file", node.span, "no package here",
+                       ("a file beside the program is imported by its name, without a dot",))  # fmt: skip
+        module = self.load(name, node.span)
+        for alias in node.aliases:
+            if alias.path == "*":
+                scope.names.update(_public(module))
+            elif module.dynamic:
+                scope.set(alias.name or alias.path, None)
+            else:
+                scope.set(alias.name or alias.path, self._member(module, alias))
+
+    def _member(self, module: Module, alias: ast.ImportAlias) -> ModelValue:
+        """What `from module import member` gives: a name of the module, else a module in its package."""
+        if alias.path in module.names:
+            return module.names[alias.path]
+        inner = f"{module.name}.{alias.path}"
+        if inner in self._modules or self._is_there(inner):
+            return self.load(inner, alias.span)
+        if module.name in self._unfinished:
+            raise fail("unknown-name", f"`{module.name}` has no `{alias.path}` yet: it is imported in a circle",
+                       alias.span, "not found",
+                       (f"`import {module.name}` takes its names when they are used",))  # fmt: skip
+        close = get_close_matches(alias.path, sorted(module.names), 1, 0.75)
+        raise fail("unknown-name", f"`{module.name}` has no `{alias.path}`", alias.span, "not found",
+                   tuple(f"it has `{name}`" for name in close))  # fmt: skip
+
+    def _is_there(self, name: str) -> bool:
+        return is_dynamic(name) or is_package(name) or bool(libraries_of(name)) or self._files.find(name) is not None
+
+    def _model(self, name: str) -> Module | None:
+        files = libraries_of(name)
+        if not files:
+            return None
+        records = {"_record": Builtin("_record", _record), "_module": Builtin("_module", _module)}
+        scope = Environment(network_names(self._network, files[-1]) | records, self.base, library=True)
+        for file in files:
+            self.interpreter.run(library_text(file).body, scope)
+        return Module(name, {key: value for key, value in scope.names.items() if not key.startswith("_")})
+
+    def _package(self, name: str) -> Module | None:
+        """A package without an `__init__`, which has no names but those of its modules."""
+        return Module(name, {}) if is_package(name) or self._files.is_folder(name) else None
+
+    def _run_file(self, name: str, span: Span) -> Module | None:
+        try:
+            file = self._files.find(name)
+            if file is None:
+                return None
+            self.interpreter.budget.step(span, len(file.program.source.text))
+            scope = Environment({}, self.base, package=file.package)
+            module = self._modules[name] = Module(name, scope.names)
+            self._unfinished.add(name)
+            self.interpreter.run(file.program.body, scope)
+        except ScenarioError as error:
+            first = error.diagnostics[0]
+            note = Note(span, "imported here")
+            raise ScenarioError(
+                Diagnostic(first.code, first.message, first.span, first.label, (*first.notes, note), first.hints)
+            ) from None
+        self._unfinished.discard(name)
+        return module
 
 
-def _merged(one: Module, other: Module) -> Module:
-    """A package that holds the modules of both."""
-    names = dict(one.names)
-    for name, value in other.names.items():
-        held = names.get(name)
-        names[name] = _merged(held, value) if isinstance(held, Module) and isinstance(value, Module) else value
-    return Module(one.name, names)
+def _public(module: Module) -> dict[str, ModelValue]:
+    """The names that `from module import *` takes."""
+    return {name: value for name, value in module.names.items() if not name.startswith("_")}
+
+
+def _record(_: Span, name: str, width: float, length: float) -> Module:
+    return Module(name, {"name": name, "width": width, "length": length, "height": length})
+
+
+def _module(_: Span, name: str, names: dict[str, ModelValue], call: ModelValue = None) -> Module:
+    return Module(name, names, call=call)

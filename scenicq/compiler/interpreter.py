@@ -23,7 +23,6 @@ from scenicq.compiler.element_lookups import Lookups
 from scenicq.compiler.environment import Budget, Course, Environment
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.expressions import evaluate
-from scenicq.compiler.imports import import_into
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import decided
 from scenicq.compiler.logic import condition
@@ -41,7 +40,6 @@ from scenicq.compiler.values import (
     Function,
     Instance,
     ModelValue,
-    Module,
     PropertyDefinition,
     ScenicClass,
     describe,
@@ -82,14 +80,14 @@ class Interpreter:
     Attributes:
         version: The version of Scenic.
         initial: Whether dynamic parts are ignored rather than refused.
-        load: Resolves an import or model: its dotted name and place to a module.
+        imports: Runs an import or model statement; the environment takes the names.
         network: The road network.
         timed: Takes what is said about time; None for a program that is matched at one instant.
     """
 
     version: int
     initial: bool
-    load: Callable[[str, int, Span], Module]
+    imports: Callable[[ast.Import | ast.ImportFrom | ast.Model, Environment], None]
     network: Network
     budget: Budget = field(default_factory=Budget)
     objects: list[Instance] = field(default_factory=list[Instance])
@@ -287,7 +285,7 @@ class Interpreter:
             case ast.ClassDef():
                 scope.set(node.name, define_class(self, node, scope))
             case ast.Import() | ast.ImportFrom() | ast.Model():
-                import_into(node, scope, self.load, self.version)
+                self.imports(node, scope)
             case ast.Param():
                 for item in node.items:
                     self.params[item.name] = (evaluate(self, item.value, scope), item.span, scope.library)

@@ -37,6 +37,7 @@ from scenicq.syntax.parser import parse
 __all__ = [
     "default_library",
     "is_dynamic",
+    "is_package",
     "libraries_of",
     "library_text",
     "library_texts",
@@ -61,6 +62,11 @@ _LIBRARIES: dict[str, tuple[str, ...]] = {
     "mars": ("mars",),
 }
 _NO_MAP = frozenset({"mars", "webots"})
+_ROADS = "scenic.domains.driving.roads"
+_MAPS = frozenset({
+    "scenic.simulators.gta.map", "scenic.simulators.carla.map", "scenic.simulators.webots.road.world",
+})  # fmt: skip
+_WITHOUT_CLASSES = (_ROADS, *_MAPS)
 _IN_SPACE = frozenset({"trimesh", "scenic.core.shapes"})
 """Modules that are about shapes in space."""
 _DYNAMIC = frozenset({"actions", "behaviors", "monitors", "simulator", "simulators", "controllers", "sensors"})
@@ -104,6 +110,11 @@ def is_dynamic(name: str) -> bool:
     return name.startswith("scenic.") and name.rsplit(".", 1)[-1] in _DYNAMIC
 
 
+def is_package(name: str) -> bool:
+    """Whether modules that are known here lie in a package of this name."""
+    return any(known.startswith(f"{name}.") for known in (*_LIBRARIES, *_WITHOUT_CLASSES))
+
+
 def network_names(network: Network, library: str) -> dict[str, ModelValue]:
     """The names that a model gives to the parts of the map."""
     if library in _NO_MAP:
@@ -138,13 +149,11 @@ def plain_module(name: str, span: Span) -> Module:
     match name:
         case "math":
             return Module("math", mathematics())
-        case "scenic.domains.driving.roads":
-            return Module(name, _ROAD_TYPES)
-        case "scenic.simulators.gta.map" | "scenic.simulators.carla.map" | "scenic.simulators.webots.road.world":
+        case _ if name == _ROADS:
+            return Module(name, dict(_ROAD_TYPES))
+        case _ if name in _MAPS:
             # the map comes from the dataset
             return Module(name, {each: Builtin(each, _ignored) for each in _MAP_FILES})
-        case "scenic":
-            return Module(name, {})
         case _ if name in _IN_SPACE:
             raise fail("unsupported-construct", f"`{name}` is not supported: labels are matched in 2D", span,
                        "shapes in space", ("give objects a `width` and a `length` instead of a shape",))  # fmt: skip
@@ -158,7 +167,7 @@ def plain_module(name: str, span: Span) -> Module:
                        (*nearest,
                         "known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "
                         "and `math`",
-                        "a scenario never imports Python code: write what it needs in Scenic"))  # fmt: skip
+                        "a scenario imports Scenic files of its own folder, never Python code"))  # fmt: skip
 
 
 def library_texts() -> tuple[ast.Program, ...]:

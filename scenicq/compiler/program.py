@@ -8,33 +8,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from pathlib import PurePosixPath
 from typing import TypeVar, cast
 
 from scenicq.budget import TimeIsUp, limited
 from scenicq.compiler import operators
 from scenicq.compiler.absent import check_directions
 from scenicq.compiler.arithmetic import no_number
-from scenicq.compiler.builtins import language_names
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.deviations import is_zero
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.imports import named_modules
+from scenicq.compiler.imported_files import Loader
+from scenicq.compiler.imports import Modules
 from scenicq.compiler.interpreter import Interpreter
-from scenicq.compiler.models import (
-    default_library,
-    is_dynamic,
-    libraries_of,
-    library_text,
-    network_names,
-    plain_module,
-)
-from scenicq.compiler.roots import root_classes
-from scenicq.compiler.sequences import sequence_functions
+from scenicq.compiler.models import default_library
 from scenicq.compiler.temporal import Behaviors, TimedStatements
-from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, fail, is_node
+from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.compiler.version_detection import decide_version
-from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
+from scenicq.errors import Diagnostic, ScenarioError, Source, Span
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import Constant, Encloses, Intersects, Node, Undefined
 from scenicq.forest.scenario import BuiltIn, Property, Requirement, Scenario, ScenarioObject
@@ -49,9 +39,6 @@ __all__ = ["Loader", "compile_scenario"]
 
 MOST_SECONDS = 60.0
 """Processor seconds that evaluating a program may take; what it does has its price in steps, but maps differ."""
-
-Loader = Callable[[str], Source | None]
-"""Gives the text of a file beside the program, by its name relative to the program's folder; None if there is none."""
 
 
 def compile_scenario(
@@ -100,12 +87,12 @@ def _compiled(
 ) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
-    world = _World(network, chosen, initial, loader)
+    world = Modules(network, chosen, initial, loader)
     run = world.interpreter
     run.timed = timed
     try:
-        library = None if world.is_named_in(module) else model or _left_out(module, chosen)
-        names = {} if library is None else dict(world.load(library, 0, _start(source)).names)
+        library = None if world.is_model_named(module) else model or _left_out(module, chosen)
+        names = {} if library is None else dict(world.load(library, _start(source)).names)
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
         return _scenario(
@@ -153,86 +140,6 @@ def _on_map(error: ScenarioError, network: Network) -> ScenarioError:
 
 
 _Result = TypeVar("_Result")
-
-
-class _World:
-    """The names and modules that a program sees, over one map."""
-
-    def __init__(self, network: Network, version: int, initial: bool, loader: Loader | None) -> None:
-        self.network = network
-        self.loader = loader
-        self.interpreter = Interpreter(version, initial, self.load, network)
-        names = language_names() | sequence_functions(self.interpreter) | root_classes(version)
-        self.base = Environment(names)
-        self.modules: dict[str, Module] = {}
-        self.loading: list[str] = []
-
-    def load(self, name: str, level: int, span: Span) -> Module:
-        """The module of an import or `model` statement."""
-        if is_dynamic(name):
-            self.interpreter.dynamic(f"import of {name}", span)
-            return Module(name, {}, dynamic=True)
-        if name not in self.modules:
-            self.modules[name] = self._file(name, level, span) or self._model(name) or plain_module(name, span)
-        return self.modules[name]
-
-    def is_named_in(self, module: ast.Program) -> bool:
-        """Whether a program, or a file that it imports, names a world model; Python's own modules are none."""
-        todo, seen = [*named_modules(module)], set[str]()
-        while todo:
-            name, level = todo.pop()
-            if name in seen:
-                continue
-            seen.add(name)
-            source = self._source(name, level)
-            if source is not None:
-                todo += named_modules(parse(source, self.interpreter.version))
-            elif libraries_of(name):
-                return True
-        return False
-
-    def _model(self, name: str) -> Module | None:
-        files = libraries_of(name)
-        if not files:
-            return None
-        records = {"_record": Builtin("_record", _record), "_module": Builtin("_module", _module)}
-        scope = Environment(network_names(self.network, files[-1]) | records, self.base, library=True)
-        for file in files:
-            self.interpreter.run(library_text(file).body, scope)
-        return Module(name, {key: value for key, value in scope.names.items() if not key.startswith("_")})
-
-    def _source(self, name: str, level: int) -> Source | None:
-        path = str(PurePosixPath(*name.split("."))) + ".scenic"
-        return self.loader(path) if self.loader and level <= 1 else None
-
-    def _file(self, name: str, level: int, span: Span) -> Module | None:
-        source = self._source(name, level)
-        if source is None:
-            return None
-        if name in self.loading:
-            raise fail("unsupported-construct", f"`{name}` imports itself", span, "a circle of imports")
-        self.interpreter.budget.step(span, len(source.text))
-        self.loading.append(name)
-        try:
-            scope = Environment({}, self.base)
-            self.interpreter.run(parse(source, self.interpreter.version).body, scope)
-        except ScenarioError as error:
-            first = error.diagnostics[0]
-            note = Note(span, "imported here")
-            raise ScenarioError(
-                Diagnostic(first.code, first.message, first.span, first.label, (*first.notes, note), first.hints)
-            ) from None
-        finally:
-            self.loading.pop()
-        return Module(name, scope.names)
-
-
-def _record(_: Span, name: str, width: float, length: float) -> Module:
-    return Module(name, {"name": name, "width": width, "length": length, "height": length})
-
-
-def _module(_: Span, name: str, names: dict[str, ModelValue], call: ModelValue = None) -> Module:
-    return Module(name, names, call=call)
 
 
 def _no_ego(run: Interpreter, module: ast.Program, version: int) -> ScenarioError:

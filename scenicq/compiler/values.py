@@ -221,7 +221,7 @@ class Module:
     """
 
     name: str
-    names: Mapping[str, ModelValue]
+    names: dict[str, ModelValue]
     dynamic: bool = False
     call: ModelValue = None
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from scenicq.errors import DataError, Diagnostic, Source
+from scenicq.compiler.imported_files import ImportedFiles
+from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
+from scenicq.syntax.parser import parse
 
-__all__ = ["read_program", "sibling_loader"]
+__all__ = ["program_text", "read_program", "sibling_loader"]
 
 
 def read_program(path: str | Path) -> Source:
@@ -36,8 +38,30 @@ def sibling_loader(path: Path) -> Callable[[str], Source | None]:
 
     def load(name: str) -> Source | None:
         file = (folder / name).resolve()
-        if not file.is_relative_to(folder) or not file.is_file():
+        if not file.is_relative_to(folder):
             return None
-        return read_program(file)
+        if name.endswith("/"):
+            return Source(str(file), "") if file.is_dir() else None
+        return read_program(file) if file.is_file() else None
 
     return load
+
+
+def program_text(source: Source, path: Path, version: int | None) -> str:
+    """The text of a program and of all files that it imports: where one of them differs, the program is another.
+
+    Args:
+        source: The program.
+        path: Its file.
+        version: The version of Scenic, if it is known.
+    """
+    files = ImportedFiles(sibling_loader(path), version)
+    texts: dict[str, str] = {}
+    try:
+        for name, file in files.reach(parse(source, version)):
+            if file is not None:
+                texts[name] = file.program.source.text
+    except ScenarioError:
+        # it has no results; whoever compiles it says why
+        pass
+    return "\n".join([source.text, *(f"{name}: {text}" for name, text in sorted(texts.items()))])

@@ -14,13 +14,14 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.partitions import fingerprint
+from scenicq.query.execution.program_files import program_text
 from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.dataset import open_dataset
 from scenicq.temporal.interval_options import IntervalOptions
 
-__all__ = ["note_question", "noted_question", "read_record"]
+__all__ = ["name_question", "note_question", "noted_question", "read_record"]
 
 
 def read_record(record: Mapping[str, Any], source: Source) -> Result:
@@ -60,13 +61,19 @@ def _span(place: str, source: Source) -> Span | None:
     return Span(source, start, min(start + 1, len(source.text)))
 
 
+def name_question(query: Query) -> str:
+    """The name of what a query asks: another dataset, program, imported file or option makes it another."""
+    text = program_text(query.source, query.file or Path(query.source.name), query.options.version)
+    return fingerprint(query.dataset, text, query.options)
+
+
 def note_question(folder: Path, query: Query) -> None:
     """Write beside the pieces of a query what it asks.
 
     Raises:
         DataError: target-unwritable.
     """
-    question = fingerprint(query.dataset, query.source.text, query.options)
+    question = name_question(query)
     file = _file(folder, question)
     if file.exists():
         return
@@ -89,7 +96,7 @@ def noted_question(folder: Path, question: str) -> Query:
 
     Args:
         folder: Where the pieces are.
-        question: Its `fingerprint`.
+        question: Its name.
 
     Raises:
         DataError: file-missing or file-invalid; store-missing, store-damaged where the dataset is not what it was.
@@ -104,11 +111,11 @@ def noted_question(folder: Path, question: str) -> Query:
         raise DataError(Diagnostic("file-missing", f"{file} cannot be read", hints=(hint,))) from None
     except (ValueError, TypeError, KeyError, AttributeError):
         raise DataError(Diagnostic("file-invalid", f"{file} does not say what was asked")) from None
-    dataset = open_dataset(address)
-    if fingerprint(dataset, source.text, options) != question:
-        message = f"the pieces in {folder} are of another version of {address}"
+    query = Query(open_dataset(address), source, options, file=Path(path))
+    if name_question(query) != question:
+        message = f"the pieces in {folder} are of another version of {address} or of what {path} imports"
         raise DataError(Diagnostic("store-damaged", message, hints=("match again",)))
-    return Query(dataset, source, options, file=Path(path))
+    return query
 
 
 def _file(folder: Path, question: str) -> Path:

@@ -10,8 +10,8 @@ from pathlib import Path
 from scenicq.errors import Source
 from scenicq.match.verdict import Match
 from scenicq.processes import Lost, Workers, as_many_as_pay
-from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
-from scenicq.query.execution.record_reader import read_record
+from scenicq.query.execution.partitions import Partition, gather, is_done, partitions, write_partition
+from scenicq.query.execution.record_reader import name_question, read_record
 from scenicq.query.execution.results import Funnel, Result, record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import DatasetReference
@@ -60,7 +60,7 @@ class Question:
         """The question of a query, for processes that have one thread of work each."""
         return cls(
             dataset=query.dataset.reference,
-            fingerprint=fingerprint(query.dataset, query.source.text, query.options),
+            fingerprint=name_question(query),
             source=query.source,
             file=(query.file or Path(query.source.name)).resolve(),
             options=replace(query.options, jobs=1),
@@ -136,7 +136,7 @@ def kept(engine: Engine, folder: Path) -> Engine:
     """
 
     def run(query: Query, pieces: Iterable[Partition], progress: Progress) -> Generator[tuple[Partition, Done]]:
-        question = fingerprint(query.dataset, query.source.text, query.options)
+        question = name_question(query)
         every = tuple(pieces)
         missing = {piece.number for piece in every if not is_done(folder, question, piece.number, piece.count)}
         for piece in every:

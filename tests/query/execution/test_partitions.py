@@ -15,6 +15,7 @@ from scenicq.query.execution.partitions import Partition, fingerprint, gather, i
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.results import record
 from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.query.execution.shards import kept, run_here
 from scenicq.store.dataset import Dataset, open_dataset
 
 ROOT = Path(__file__).parents[3]
@@ -111,3 +112,20 @@ def test_a_failed_piece_leaves_nothing_behind(dataset, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         write_partition(tmp_path, "question", piece, broken(), query.funnel)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_pieces_of_a_program_whose_imports_have_changed_are_made_anew(dataset, tmp_path):
+    """The program itself stays as it is: what `far` means is said in a file of a package, in a function even."""
+    program, helper = tmp_path / "program.scenic", tmp_path / "places" / "far.scenic"
+    helper.parent.mkdir()
+    function = "def far():\n    from places import far\n    return far.far\n"
+    program.write_text(f"model scenic.domains.driving.model\n{function}ego = new Car\nrequire ego.position.x < far()\n")
+    found: dict[int, set[str]] = {}
+    for far in (-10_000, 10_000):
+        helper.write_text(f"far = {far}\n")
+        query = Query(dataset, read_program(program), OPTIONS)
+        pieces = partitions(dataset, 2)
+        done = kept(run_here, tmp_path / "pieces")(query, pieces, lambda _: None)
+        found[far] = {result.frame for _, (results, _) in done for result in results}
+    assert not found[-10_000]
+    assert len(found[10_000]) > 3
