@@ -5,11 +5,13 @@ Subcommands are imported when they are called, so that `--help` and `--version` 
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import errno
 import gc
 import os
 import sys
+from collections.abc import Generator
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -105,41 +107,73 @@ class Commands(click.Group):
             raise click.UsageError(f"No such command '{name}'.{hint}", ctx)
         return super().resolve_command(ctx, args)
 
+    def make_context(self, *given: Any, **more: Any) -> click.Context:
+        """Read the command line; `--help` and `--version` write there and then."""
+        with _worded_end():
+            return super().make_context(*given, **more)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a subcommand; whatever it raises becomes a message and an exit code."""
         if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
             ctx.color = False
-        try:
+        with _worded_end():
             result = super().invoke(ctx)
             sys.stdout.flush()
-        except (click.ClickException, click.exceptions.Exit, click.Abort):
-            raise
-        except ScenicqError as error:
-            if INTERRUPTS.noticed:
-                _interrupted(ctx)
-            show(error.diagnostics)
-            ctx.exit(ERROR)
-        except KeyboardInterrupt:
-            _interrupted(ctx)
-        except BrokenPipeError:
-            ctx.exit(0)  # the reader has what it wanted
-        except Exception as error:
-            if INTERRUPTS.noticed:
-                _interrupted(ctx)
-            if _is_of_output(error):
-                raise
-            if (refused := refused_by_system(error)) is not None:
-                show([Diagnostic("resources-exhausted", refused)])
-                ctx.exit(ERROR)
-            # our own mistake, whatever it is
-            click.echo(f"internal error: this is a mistake in scenicq; please report it with {_written()}", err=True)
-            ctx.exit(ERROR)
         return result
+
+
+@contextlib.contextmanager
+def _worded_end() -> Generator[None]:
+    """Makes a message and an exit code of whatever is raised in the block.
+
+    Raises:
+        Exit: The code of click's.
+        OSError: Standard output takes no more.
+    """
+    try:
+        yield
+    except (click.ClickException, click.exceptions.Exit, click.Abort):
+        raise
+    except ScenicqError as error:
+        if INTERRUPTS.noticed:
+            _interrupted()
+        show(error.diagnostics)
+        raise click.exceptions.Exit(ERROR) from None
+    except KeyboardInterrupt:
+        _interrupted()
+    except BrokenPipeError:
+        raise click.exceptions.Exit(0) from None  # the reader has what it wanted
+    except Exception as error:
+        if INTERRUPTS.noticed:
+            _interrupted()
+        if _is_of_output(error):
+            raise
+        if (refused := refused_by_system(error)) is not None:
+            show([Diagnostic("resources-exhausted", refused)])
+            raise click.exceptions.Exit(ERROR) from None
+        # our own mistake, whatever it is
+        click.echo(f"internal error: this is a mistake in scenicq; please report it with {_written()}", err=True)
+        raise click.exceptions.Exit(ERROR) from None
 
 
 def _is_of_output(error: Exception) -> bool:
     """Whether standard output takes no more. Other files are looked after where they are written."""
-    return isinstance(error, OSError) and error.filename is None and error.errno in _NO_ROOM
+    if not isinstance(error, OSError) or error.filename is not None:
+        return False
+    if error.errno == errno.EBADF:
+        return not _takes_data(sys.stdout.fileno())
+    if error.errno == errno.EAGAIN:
+        return not os.get_blocking(sys.stdout.fileno())
+    return error.errno in _NO_ROOM
+
+
+def _takes_data(descriptor: int) -> bool:
+    """Whether the caller has opened standard output for writing."""
+    try:
+        os.write(descriptor, b"")
+    except OSError:
+        return False
+    return True
 
 
 def _let_go_of_output() -> None:
@@ -150,12 +184,12 @@ def _let_go_of_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _interrupted(ctx: click.Context) -> NoReturn:
+def _interrupted() -> NoReturn:
     INTERRUPTS.done()
     click.echo("interrupted", err=True)
     if INTERRUPTS.advice:
         click.echo(INTERRUPTS.advice, err=True)
-    ctx.exit(INTERRUPTED)
+    raise click.exceptions.Exit(INTERRUPTED)
 
 
 def _written() -> str:

@@ -8,9 +8,13 @@ writes to descriptor 1, here or in a process that is started from here, goes whe
 
 from __future__ import annotations
 
+import io
 import os
 import sys
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 __all__ = ["main"]
 
@@ -48,8 +52,19 @@ def _fill_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
-    if sys.stderr is None:  # pyright: ignore[reportUnnecessaryComparison] - the caller closed it
-        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
+    encoding = "utf-8" if sys.stderr is None else sys.stderr.encoding  # pyright: ignore[reportUnnecessaryComparison] - the caller closed it
+    messages = io.BufferedWriter(_Messages(2, "w", closefd=False))
+    sys.stderr = sys.__stderr__ = io.TextIOWrapper(messages, encoding, "backslashreplace", line_buffering=True)
+
+
+class _Messages(io.FileIO):
+    """Standard error: where it takes nothing, nobody reads messages, and the command does its work all the same."""
+
+    def write(self, b: ReadableBuffer, /) -> int:
+        try:
+            return super().write(b)
+        except OSError:
+            return memoryview(b).nbytes
 
 
 def _set_results_apart() -> TextIO:

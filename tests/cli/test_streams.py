@@ -6,12 +6,17 @@ The oracle is the same command where no library prints: its bytes are compared.
 from __future__ import annotations
 
 import ast
+import contextlib
+import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from scenicq_cli import main
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 
@@ -172,6 +177,135 @@ def test_every_command_prints_its_results_alone(command, program, crossroads, no
         assert second[:2] == first[:2], what
         assert second[0] in (0, 1), (what, second)
     assert (folders[0] / "out.jsonl").read_bytes() == (folders[1] / "out.jsonl").read_bytes()
+
+
+ALL_COMMANDS = {
+    **COMMANDS,
+    "no command": "",
+    "version": "--version",
+    "help of all": "--help",
+    "match nothing": "match PROGRAM DATASET --limit 1 --where heading>100 --format ids",
+    "wrong": "match nothing.scenic DATASET",
+    "index": "index made --force",
+    "doctor": "doctor",
+    "evaluate": "evaluate out.jsonl DATASET --predictions predictions.jsonl",
+}
+STREAMS = {
+    "stdout": ("closed", "full", "for reading", "without a reader", "stuck"),
+    "stderr": ("closed", "full", "for reading", "without a reader", "stuck"),
+    "stdin": ("closed", "for writing"),
+}
+ODD = [(name, kind) for name, kinds in STREAMS.items() for kind in kinds]
+
+
+def odd_stream(kind, folder):
+    """A descriptor of a stream that is not as it should be; None for one that is closed."""
+    match kind:
+        case "full":
+            return os.open("/dev/full", os.O_WRONLY)
+        case "for reading":
+            (folder / "odd").write_bytes(b"")
+            return os.open(folder / "odd", os.O_RDONLY)
+        case "for writing":
+            return os.open(folder / "odd", os.O_WRONLY | os.O_CREAT)
+        case "without a reader":
+            reader, writer = os.pipe()
+            os.close(reader)
+            return writer
+        case "stuck":
+            _, writer = os.pipe()
+            os.set_blocking(writer, False)
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    os.write(writer, b"." * 4096)
+            return writer
+        case _:
+            return None
+
+
+def outcome_with(stream, kind, words, folder):
+    """Exit code, standard output and messages of a command one of whose streams is odd."""
+    odd = odd_stream(kind, folder.parent)
+    number = {"stdin": 0, "stdout": 1, "stderr": 2}[stream]
+    streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    if odd is None:
+        words = ["sh", "-c", f'exec "$@" {number}>&-', "sh", *words]
+    else:
+        streams[stream] = odd
+    done = subprocess.run(list(map(str, words)), **streams, cwd=folder, timeout=280, check=False)
+    if odd is not None:
+        os.close(odd)
+    return done.returncode, done.stdout, None if done.stderr is None else done.stderr.decode()
+
+
+def cases():
+    """Each command with each odd stream; a few of them, each command and stream among them, are not slow."""
+    found = []
+    for number, what in enumerate(ALL_COMMANDS):
+        for place, (stream, kind) in enumerate(ODD):
+            marks = [] if place == number % len(ODD) else [pytest.mark.slow]
+            found.append(pytest.param(what, stream, kind, marks=marks))
+    return found
+
+
+def contents(folder):
+    return sorted(str(each.relative_to(folder)) for each in folder.rglob("*"))
+
+
+@pytest.fixture(scope="module")
+def usual(command, program, crossroads, tmp_path_factory):
+    """What makes the folder that a command is run in, and what it does there with streams as they should be."""
+    start = tmp_path_factory.mktemp("start")
+    named = {"PROGRAM": program, "DATASET": crossroads, "SOURCE": SAMPLES / "crossroads"}
+
+    def words(what):
+        return [command, *(named.get(word, word) for word in ALL_COMMANDS[what].split())]
+
+    for what in ("match a file", "shard"):
+        assert outcome(words(what), cwd=start)[0] == 0
+    shutil.copytree(crossroads, start / "made")
+    frames = sorted({json.loads(line)["frame"] for line in (start / "out.jsonl").read_text().splitlines()})
+    box = {"class": "Car", "x": 0.0, "y": 0.0, "width": 2.0, "length": 4.0, "heading": 0.0, "score": 0.5}
+    lines = (json.dumps({"frame": frame, **box}) + "\n" for frame in frames)
+    (start / "predictions.jsonl").write_text("".join(lines))
+    known = {}
+
+    def run(what):
+        if what not in known:
+            folder = start.with_name(f"usual-{len(known)}")
+            shutil.copytree(start, folder)
+            known[what] = (*outcome(words(what), cwd=folder), contents(folder))
+        return known[what]
+
+    return start, words, run
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(("what", "stream", "kind"), cases())
+def test_an_odd_stream_is_told_or_makes_no_difference(what, stream, kind, usual, tmp_path):
+    start, words, run = usual
+    code, data, told, files = run(what)
+    folder = tmp_path / "folder"
+    shutil.copytree(start, folder)
+    ended, given, said = outcome_with(stream, kind, words(what), folder)
+    assert contents(folder) == files
+    assert "Traceback" not in (said or "")
+    if stream != "stdout" or not data or kind == "closed":
+        assert ended == code
+    elif kind == "without a reader":
+        assert (ended, said) in [(0, told), (0, "")]
+    else:
+        assert ended == 2
+        assert "error[target-unwritable]: standard output cannot be written" in said
+    if stream == "stderr":
+        assert given == data
+    elif stream == "stdin":
+        assert (given, said) == (data, told)
+
+
+def test_every_command_is_among_those_with_odd_streams():
+    assert {line.split()[0] for line in ALL_COMMANDS.values() if line} >= set(main.COMMANDS)
 
 
 def test_commands_write_to_standard_output_in_one_way():
