@@ -13,7 +13,17 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry import shapes
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["LINES", "REFERENCES", "MapFeature", "ProblemSink", "dangling", "farthest", "names", "read_geojson"]
+__all__ = [
+    "LINES",
+    "REFERENCES",
+    "MapFeature",
+    "ProblemSink",
+    "dangling",
+    "farthest",
+    "load_geojson",
+    "names",
+    "read_geojson",
+]
 
 ProblemSink = Callable[[str, str], None]
 """Takes the id of a feature ("" if it has none) and what is wrong with it."""
@@ -98,17 +108,20 @@ def dangling(features: Iterable[MapFeature]) -> list[tuple[str, str]]:
     return found
 
 
-def read_geojson(source: str | Path | Mapping[str, Any], on_problem: ProblemSink) -> tuple[MapFeature, ...]:
+def read_geojson(
+    source: str | Path | Mapping[str, Any], on_problem: ProblemSink, *, name: str = "the map"
+) -> tuple[MapFeature, ...]:
     """Read the map features of an interchange GeoJSON file.
 
     Args:
         source: The file, or what `json` made of it.
+        name: What the map is called in messages, where no file says it.
         on_problem: Called for each unsound feature, which is left out, and for each dangling reference, which is kept.
 
     Raises:
         DataError: `file-missing` or `file-invalid`: there is no feature collection at all.
     """
-    where, document = ("the map", source) if isinstance(source, Mapping) else (str(source), _load(Path(source)))
+    where, document = (name, source) if isinstance(source, Mapping) else (str(source), load_geojson(Path(source)))
     collection = _object(document).get("features")
     if not isinstance(collection, list):
         raise DataError(Diagnostic("file-invalid", f"{where}: not a GeoJSON feature collection"))
@@ -147,9 +160,14 @@ class _UnsoundError(Exception):
         self.id = identifier
 
 
-def _load(path: Path) -> Any:
+def load_geojson(path: Path) -> Mapping[str, Any]:
+    """The object of a file; an empty one where it is none.
+
+    Raises:
+        DataError: `file-missing` or `file-invalid`.
+    """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return _object(json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError as error:
         raise DataError(Diagnostic("file-missing", f"{path}: no such file")) from error
     except (OSError, ValueError, RecursionError) as error:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from scenicq.importers.folders import first_files, readable
 from scenicq.importers.layouts import ARGOVERSE2_FILES, argoverse2_logs
 from scenicq.importers.motion import Rigid, quaternion, velocities
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject, OutOfPlane
 
@@ -39,6 +40,7 @@ _AXLE_TO_CENTRE_M = 1.42
 
 _REACH_US, _LONGEST_STEP_US = 250_000, 550_000
 _BOXES, _POSES = ARGOVERSE2_FILES
+_FOLDERS = ("calibration", "map", "sensors")
 _FRAMES = 156
 _EGO_CLASS = "EGO_VEHICLE"
 _SIZE = ("width_m", "length_m", "height_m")
@@ -124,7 +126,9 @@ class _Log:
         self._report = report
         self._boxes: defaultdict[int, list[_Box]] = defaultdict(list)
         self._tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
-        rows = read_feather(log / _BOXES, _BOX, {"num_interior_pts": "integer"})
+        self._known = specification("argoverse2")
+        self._known.count_files(_files(log), report)
+        rows = read_feather(log / _BOXES, _BOX, {"num_interior_pts": "integer"}, count=self._count(_BOXES))
         self._poses = self._read_poses({time for time in rows["timestamp_ns"] if time is not None})
         for number in range(len(rows["timestamp_ns"])):
             try:
@@ -138,7 +142,7 @@ class _Log:
         parts = [] if archive is None else archive.stem.split("____")[1:]
         params: dict[str, str | float | bool] = {"location": parts[0].partition("_")[0]} if parts else {}
         images = self._images()
-        views = views_of(self._log, times, images, self._tell)
+        views = views_of(self._log, times, images, self._report)
         places = [self._poses[time].place((_AXLE_TO_CENTRE_M, 0.0, 0.0)) for time in times]
         centres = [(time // 1000, x, y) for time, (x, y, _) in zip(times, places, strict=True)]
         ego_moves = _moves(centres)
@@ -180,7 +184,7 @@ class _Log:
         )
 
     def _read_poses(self, wanted: set[int]) -> dict[int, Rigid]:
-        rows = read_feather(self._log / _POSES, {"timestamp_ns": "integer", **POSE})
+        rows = read_feather(self._log / _POSES, {"timestamp_ns": "integer", **POSE}, count=self._count(_POSES))
         poses: dict[int, Rigid] = {}
         for number, time in enumerate(rows["timestamp_ns"]):
             if time in wanted and time not in poses:
@@ -219,8 +223,8 @@ class _Log:
             found[camera.name] = sorted((int(stem), name) for stem, name in stems if stem.isascii() and stem.isdigit())
         return found
 
-    def _tell(self, problem: str) -> None:
-        self._report.left_out("camera", "record-invalid", f"{self._log.name}/{problem}")
+    def _count(self, table: str) -> Callable[[Sequence[str], int], object]:
+        return lambda names, rows: self._known.count_columns(table, names, self._report, rows)
 
     def _sensors(self, time: int, cameras: Mapping[str, list[tuple[int, str]]]) -> dict[str, str]:
         # A folder that is the log itself has no name of its own here.
@@ -230,6 +234,15 @@ class _Log:
             if images:
                 sensors[camera] = f"{start}sensors/cameras/{camera}/{nearest(images, time)[1]}"
         return {readable(channel): readable(path) for channel, path in sorted(sensors.items())}
+
+
+def _files(log: Path) -> Iterator[str]:
+    """What is in a log's folders, as far as names tell kinds apart."""
+    for entry in log.iterdir():
+        if entry.name in _FOLDERS:
+            yield from (f"{entry.name}/{each.name}" for each in entry.iterdir())
+        else:
+            yield entry.name
 
 
 def _moves(places: Sequence[tuple[int, float, float]]) -> list[tuple[float, float] | None]:

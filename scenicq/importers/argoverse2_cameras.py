@@ -15,6 +15,8 @@ from scenicq.importers.columnar import read_feather
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.folders import readable
 from scenicq.importers.layouts import ARGOVERSE2_FILES
+from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 
 __all__ = ["POSE", "Images", "calibration_of", "check_pose", "nearest", "views_of"]
 
@@ -30,19 +32,21 @@ _REALS, _SIZE = ("fx_px", "fy_px", "cx_px", "cy_px"), ("width_px", "height_px")
 _SEEN = {"sensor_name": "text", **dict.fromkeys(_REALS, "real"), **dict.fromkeys(_SIZE, "integer")}
 
 
-def views_of(
-    log: Path, times: Sequence[int], images: Images, tell: Callable[[str], None]
-) -> dict[int, dict[str, Camera]]:
+def views_of(log: Path, times: Sequence[int], images: Images, report: Report) -> dict[int, dict[str, Camera]]:
     """The cameras whose image is there, for each of some times.
 
     Args:
         log: Folder of the log.
         times: Nanoseconds.
         images: Of each camera; the nearest in time counts.
-        tell: Takes what is unsound; a calibration that cannot be read counts as none.
+        report: Takes what is unsound; a calibration that cannot be read counts as none.
     """
+
+    def tell(problem: str) -> None:
+        report.left_out("camera", "record-invalid", f"{log.name}/{problem}")
+
     views: dict[int, dict[str, Camera]] = {time: {} for time in times}
-    mounts = _mounts(calibration_of(log), tell) if any(images.values()) else {}
+    mounts = _mounts(calibration_of(log), tell, report) if any(images.values()) else {}
     near = {
         (time, name): nearest(shots, time)[0]
         for name, shots in images.items()
@@ -87,13 +91,15 @@ def _read_pose(row: Mapping[str, Any]) -> Pose:
     return pose_of((row["qw"], row["qx"], row["qy"], row["qz"]), (row["tx_m"], row["ty_m"], row["tz_m"]))
 
 
-def _mounts(files: Sequence[Path], tell: Callable[[str], None]) -> dict[str, tuple[Mount, tuple[int, int]]]:
+def _mounts(
+    files: Sequence[Path], tell: Callable[[str], None], report: Report
+) -> dict[str, tuple[Mount, tuple[int, int]]]:
     """How each camera is mounted and sees, and the size of its images; `files` as `calibration_of` gives them."""
     if not files:
         return {}
     try:
-        seen = _by_sensor(read_feather(files[0], _SEEN))
-        mounted = _by_sensor(read_feather(files[1], {"sensor_name": "text", **POSE}))
+        seen = _by_sensor(_read(files[0], _SEEN, report))
+        mounted = _by_sensor(_read(files[1], {"sensor_name": "text", **POSE}, report))
     except DataError as error:
         tell(f"calibration: {'; '.join(each.message for each in error.diagnostics)}")
         return {}
@@ -110,6 +116,17 @@ def _mounts(files: Sequence[Path], tell: Callable[[str], None]) -> dict[str, tup
     return found
 
 
+def _read(file: Path, columns: Mapping[str, str], report: Report) -> dict[str, Any]:
+    """Columns of a file of the calibration; what is not read is counted."""
+    table = f"calibration/{file.name}"
+    known = specification("argoverse2")
+    return read_feather(file, columns, count=lambda names, rows: known.count_columns(table, names, report, rows))
+
+
+def _count_nothing(names: Sequence[str], rows: int) -> None:
+    """What the table of poses has is counted where the poses of boxes are read."""
+
+
 def _by_sensor(rows: Mapping[str, list[Any]]) -> dict[str, dict[str, Any]]:
     names = rows["sensor_name"]
     return {name: {key: values[row] for key, values in rows.items()} for row, name in enumerate(names) if name}
@@ -119,7 +136,7 @@ def _vehicles(log: Path, wanted: set[int]) -> dict[int, Pose]:
     """Poses of the ego at the times of images; those that are missing or unsound are left out."""
     if not wanted:
         return {}
-    rows = read_feather(log / ARGOVERSE2_FILES[1], {"timestamp_ns": "integer", **POSE})
+    rows = read_feather(log / ARGOVERSE2_FILES[1], {"timestamp_ns": "integer", **POSE}, count=_count_nothing)
     found: dict[int, Pose] = {}
     for number, time in enumerate(rows["timestamp_ns"]):
         if time in wanted:

@@ -20,6 +20,7 @@ from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import argoverse2_scenarios
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
@@ -30,7 +31,8 @@ _STEP_US = 100_000
 _STEPS = 110
 _REALS = ("position_x", "position_y", "heading", "velocity_x", "velocity_y")
 _COLUMNS = {"track_id": "text", "object_type": "text", "timestep": "integer", **dict.fromkeys(_REALS, "real")}
-_OPTIONAL = {"city": "text", "object_category": "integer", "focal_track_id": "text"}
+_OPTIONAL = {"city": "text"}
+_TABLE = "scenario_*.parquet"
 
 
 class Argoverse2Forecasting:
@@ -74,7 +76,11 @@ def _name(file: Path) -> str:
 
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
-    rows = read_parquet(file, _COLUMNS, _OPTIONAL)
+    known = specification("argoverse2-forecasting")
+    known.count_files((each.name for each in file.parent.iterdir()), report)
+    rows = read_parquet(
+        file, _COLUMNS, _OPTIONAL, count=lambda names, rows: known.count_columns(_TABLE, names, report, rows)
+    )
     steps: dict[int, list[LabelObject]] = {}
     for number in range(len(rows["track_id"])):
         try:

@@ -19,18 +19,21 @@ from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, sound_area
+from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 
 __all__ = ["read_archive"]
 
 _LARGEST_BYTES = 256 << 20
 
 
-def read_archive(path: Path, on_problem: ProblemSink) -> tuple[MapFeature, ...]:
+def read_archive(path: Path, on_problem: ProblemSink, report: Report) -> tuple[MapFeature, ...]:
     """Read a map.
 
     Args:
         path: The archive of a log or of a forecasting scenario.
         on_problem: Called with the id of an element and what is wrong with it.
+        report: Takes counts of what is not read.
 
     Raises:
         DataError: `file-missing` or `file-invalid`.
@@ -39,6 +42,7 @@ def read_archive(path: Path, on_problem: ProblemSink) -> tuple[MapFeature, ...]:
         if path.stat().st_size > _LARGEST_BYTES:
             raise InvalidError("larger than a map is")
         content = fields.record(fields.parse_json(path.read_bytes()), "the map")
+        specification("argoverse2-map").count_json(content, report)
         lanes = list(_each(content, "lane_segments", _lane, on_problem))
         areas = [
             *_each(content, "pedestrian_crossings", _crossing, on_problem),

@@ -16,6 +16,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import InvalidError, check_characters, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.columns import RecordingColumns, columns_of, second_of_track
 from scenicq.store.labels import Label, LabelObject, Recording
@@ -322,12 +323,14 @@ def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapF
     """
     if not files:
         return {}
-    from scenicq.geometry.features import dangling, read_geojson  # noqa: PLC0415 - slow to load, and for maps
+    from scenicq.geometry.features import dangling, load_geojson, read_geojson  # noqa: PLC0415 - slow to load, and for maps
 
     maps: dict[str, tuple[MapFeature, ...]] = {}
     for name in sorted(files):
         problems: list[tuple[str, str]] = []
-        features = read_geojson(files[name], _collector(problems))
+        document = load_geojson(files[name])
+        features = read_geojson(document, _collector(problems), name=str(files[name]))
+        specification("geojson").count_json(document, report)
         references = set(dangling(features)) if problems else set[tuple[str, str]]()
         for problem in problems:
             message = f"{files[name].name}: element `{problem[0]}`: {problem[1]}"

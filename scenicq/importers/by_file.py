@@ -148,7 +148,7 @@ def map_sink(file: str, report: Report) -> ProblemSink:
 def take_map(
     name: str,
     file: Path,
-    read: Callable[[Path, ProblemSink], tuple[MapFeature, ...]],
+    read: Callable[[Path, ProblemSink, Report], tuple[MapFeature, ...]],
     maps: dict[str, tuple[MapFeature, ...]],
     report: Report,
 ) -> None:
@@ -157,14 +157,14 @@ def take_map(
     Args:
         name: Of the map.
         file: Where it lies.
-        read: Reads it.
+        read: Reads it; what is unsound goes to the sink, counts of what is not read to the report.
         maps: Takes it.
         report: Takes what is unsound.
     """
     if (name := readable(name)) in maps:
         return
     try:
-        maps[name] = read(file, map_sink(file.name, report))
+        maps[name] = read(file, map_sink(file.name, report), report)
     except DataError as error:
         for diagnostic in error.diagnostics:
             report.left_out("map", diagnostic.code, diagnostic.message)

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +20,23 @@ from scenicq.store.unpacked import Bound, check_claims, decoded_bytes, feather_b
 
 __all__ = ["read_feather", "read_parquet"]
 
+Count = Callable[[Sequence[str], int], object]
+"""Takes the names of all columns of a table, and how many rows it has."""
+
 _TEXTS = ("string", "large_string", "string_view")
 _TYPES: dict[str, Any] = {"integer": pa.int64(), "real": pa.float64(), "text": pa.string()}
 
 
-def read_feather(path: Path, columns: Mapping[str, str], optional: Mapping[str, str] | None = None) -> dict[str, Any]:
+def read_feather(
+    path: Path, columns: Mapping[str, str], optional: Mapping[str, str] | None = None, *, count: Count
+) -> dict[str, Any]:
     """Columns of a feather file as lists.
 
     Args:
         path: The file.
         columns: "integer", "real" or "text" for each column that it must have.
         optional: The same for columns that it may have.
+        count: Counts what is not read.
 
     Raises:
         DataError: `file-missing`, or `file-invalid` where it is none, is cut off or has other columns.
@@ -38,10 +44,15 @@ def read_feather(path: Path, columns: Mapping[str, str], optional: Mapping[str, 
     with _told(path, "a feather file"):
         bound = Bound(path)
         schema, batches = feather_batches(path.read_bytes(), bound)
-        return _columns(path, pa.Table.from_batches(batches, schema), columns, optional or {}, bound)
+        table = pa.Table.from_batches(batches, schema)
+        found = _columns(path, table, columns, optional or {}, bound)
+        count(table.schema.names, table.num_rows)
+        return found
 
 
-def read_parquet(path: Path, columns: Mapping[str, str], optional: Mapping[str, str] | None = None) -> dict[str, Any]:
+def read_parquet(
+    path: Path, columns: Mapping[str, str], optional: Mapping[str, str] | None = None, *, count: Count
+) -> dict[str, Any]:
     """Columns of a Parquet file as lists; see `read_feather`.
 
     Raises:
@@ -53,7 +64,9 @@ def read_parquet(path: Path, columns: Mapping[str, str], optional: Mapping[str, 
         check_claims(file, bound, there)
         texts = [name for name in text_columns(file) if name in there]
     with _told(path, "a Parquet file"), pq.ParquetFile(path, read_dictionary=texts) as file:
-        return _columns(path, file.read(columns=there), columns, optional or {}, bound)
+        found = _columns(path, file.read(columns=there), columns, optional or {}, bound)
+        count(file.schema_arrow.names, file.metadata.num_rows)
+        return found
 
 
 class _told:  # noqa: N801 - reads as a statement

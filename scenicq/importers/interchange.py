@@ -5,6 +5,8 @@
   that there is no ego, or that a heading is not known. Objects may have `z`, `pitch` and `roll`; a sensor is a path, or
   an object with `path` and what `cameras.CAMERA_KEYS` lists;
 - `maps/NAME.geojson`: metres of the map's frame.
+
+What is not read is counted (`specifications/interchange.json`, `specifications/geojson.json`).
 """
 
 from __future__ import annotations
@@ -37,6 +39,7 @@ from scenicq.importers.grouped_lines import GroupedLines, group_lines
 from scenicq.importers.interchange_columns import read_columns
 from scenicq.importers.layouts import is_interchange
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy, taxonomy_names
 from scenicq.store.columns import OUT_OF_PLANE, RecordingColumns
 from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
@@ -74,6 +77,7 @@ class Interchange:
             ValueError: Labels are packed, and `options` has no scratch folder.
         """
         header = _header(path)
+        specification("interchange").count_rows((header,), report, "dataset.json")
         angle = header.get("angle")
         if angle not in ("heading", "yaw"):
             raise _invalid(path, '`angle` must be "heading" or "yaw"')
@@ -118,14 +122,46 @@ class LineReader:
         for name in self.lines.runs:
             lines = list(self.lines.read(name))
             columns = None
-            if self.columnar:
-                columns = read_columns([text for text, _ in lines], name, self.classes, yaw=self.yaw)
+            contents = [content for text, _ in lines if (content := _parsed(text)) is not None]
+            _count(contents, "yaw" if self.yaw else "heading", report)
+            if self.columnar and len(contents) == len(lines):
+                columns = read_columns(contents, name, self.classes, yaw=self.yaw)
             if columns is not None and labels.accept(columns):
                 yield columns
                 continue
             reader = _LabelReader(ClassNames(self.classes, report), turn, report)
             if (recording := labels.recording(name, list(reader.labels(lines, name)))) is not None:
                 yield recording
+
+
+def _parsed(text: bytes) -> dict[str, Any] | None:
+    """The object of a line; None where there is none, as is told when the line is read."""
+    try:
+        content = fields.parse_json(text)
+    except InvalidError:
+        return None
+    return cast("dict[str, Any]", content) if isinstance(content, dict) else None
+
+
+def _count(lines: Sequence[dict[str, Any]], angle: str, report: Report) -> None:
+    """Count what is not read of some lines; the angle that `dataset.json` does not name is such."""
+    known = specification("interchange")
+    known.count_rows(lines, report, "labels")
+    other = "yaw" if angle == "heading" else "heading"
+    for line in lines:
+        members: dict[str, list[Any]] = {"ego": [line.get("ego")], "objects": _list(line.get("objects"))}
+        for name, entries in members.items():
+            rows = [cast("dict[str, Any]", entry) for entry in entries if isinstance(entry, dict)]
+            known.count_rows(rows, report, f"labels/{name}")
+            report.not_read(f"labels/{name}/{other}", sum(other in row for row in rows))
+        if isinstance(sensors := line.get("sensors"), dict):
+            cameras = [cast("dict[str, Any]", each) for each in cast("dict[str, Any]", sensors).values()
+                       if isinstance(each, dict)]  # fmt: skip
+            known.count_rows(cameras, report, "labels/sensors/*")
+
+
+def _list(value: object) -> list[Any]:
+    return cast("list[Any]", value) if isinstance(value, list) else []
 
 
 class _LabelReader:

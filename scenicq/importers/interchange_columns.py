@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
 from scenicq.importers.cameras import camera_of
-from scenicq.importers.fields import InvalidError, parse_json
+from scenicq.importers.fields import InvalidError
 from scenicq.importers.sound_columns import UNUSUAL, are, column, demand, vectors
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
 from scenicq.store.wkb import FARTHEST_M
@@ -28,12 +28,12 @@ _SCALARS = frozenset((str, bool, int, float))
 
 
 def read_columns(
-    lines: Sequence[bytes], recording: str, classes: Mapping[str, str], *, yaw: bool
+    lines: Sequence[object], recording: str, classes: Mapping[str, str], *, yaw: bool
 ) -> RecordingColumns | None:
     """The columns of a recording.
 
     Args:
-        lines: JSON, one label each.
+        lines: What JSON says, one label each.
         recording: Its name.
         classes: Class of the tree for each class name.
         yaw: Whether angles are counted from +x.
@@ -42,7 +42,7 @@ def read_columns(
         None if anything is not as it should be.
     """
     try:
-        return _columns([_label(parse_json(line), recording) for line in lines], recording, classes, yaw=yaw)
+        return _columns([_label(line, recording) for line in lines], recording, classes, yaw=yaw)
     except (InvalidError, *UNUSUAL):
         return None
 

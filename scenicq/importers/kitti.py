@@ -2,13 +2,15 @@
 
 Conventions of the source: boxes lie in the frame of the rectified camera (x right, y down, z ahead; `rotation_y` turns
 about y), at 10 Hz. The map frame is east and north of the first pose of the inertial unit; there is no map. The ego is
-where that unit is; it has no size. Without `oxts` the ego stays at the origin, and nothing has a velocity.
+where that unit is; it has no size. Without `oxts` the ego stays at the origin, and nothing has a velocity. What is not
+read is counted (`specifications/kitti.json`).
 """
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
@@ -18,16 +20,28 @@ from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import kitti_files
 from scenicq.importers.motion import Rigid, euler, matrix, velocities
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
 __all__ = ["Kitti"]
 
 _MAP = "none"
+_LABELS = "label_02"
 _STEP_US = 100_000
 _REACH_US, _LONGEST_STEP_US = 250_000, 550_000
 _MATRICES = (("R_rect", "R0_rect"), ("Tr_velo_cam", "Tr_velo_to_cam"), ("Tr_imu_velo", "Tr_imu_to_velo"))
 """The rectified camera, the scanner in the camera, the inertial unit in the scanner: both spellings are in use."""
+
+_LABEL = (
+    "frame", "track_id", "type", "truncated", "occluded", "alpha", *["bbox"] * 4, *["dimensions"] * 3,
+    *["location"] * 3, "rotation_y", "score",
+)  # fmt: skip
+_OXTS = (
+    "lat", "lon", "alt", "roll", "pitch", "yaw", *["velocity"] * 5, *["acceleration"] * 6, *["turn_rate"] * 6,
+    *["accuracy"] * 2, *["status"] * 5,
+)  # fmt: skip
+"""What the columns of the files say."""
 
 _EARTH_M = 6378137.0
 _LARGEST_BYTES = 256 << 20
@@ -79,13 +93,14 @@ def _place(file: Path, root: Path, map_name: str) -> RecordingFiles:
 
 def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
+    specification("kitti").count_files((each.name for each in file.parent.parent.iterdir()), report)
     extra = {path.parent.name: path for path in place.files[1:]}
     camera = _FORWARD_CAMERA
     if "calib" in extra:
-        camera = _camera(extra["calib"])
+        camera = _camera(extra["calib"], report)
     else:
         report.kept("recording", "file-missing", f"{file.name}: no `calib`; the camera looks ahead from the ego")
-    poses = _poses(extra["oxts"]) if "oxts" in extra else None
+    poses = _poses(extra["oxts"], report) if "oxts" in extra else None
     if poses is None:
         report.kept("recording", "file-missing", f"{file.name}: no `oxts`; the ego stays at the origin")
     by_frame: defaultdict[int, list[LabelObject]] = defaultdict(list)
@@ -96,7 +111,9 @@ def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -
             if frame < 0 or frame > 1_000_000:
                 raise InvalidError("the frame is not a number")
             if len(row) > 2 and row[2] == "DontCare":
+                report.not_read(f"{_LABELS}/DontCare")
                 continue
+            _count_columns(_LABELS, _LABEL, len(row), report)
             if poses is not None and frame >= len(poses):
                 raise InvalidError(f"frame {frame} has no pose")
             ego = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
@@ -104,6 +121,12 @@ def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -
         except InvalidError as error:
             report.left_out("object", "record-invalid", f"{where}: {error}")
     return _labels(place, by_frame, poses)
+
+
+def _count_columns(table: str, names: Sequence[str], count: int, report: Report) -> None:
+    """Count what is not read of a row of some columns; columns that the specification does not name have a number."""
+    there = (*dict.fromkeys(names[:count]), *(f"column {number + 1}" for number in range(len(names), count)))
+    specification("kitti").count_columns(table, there, report)
 
 
 def _labels(
@@ -171,13 +194,17 @@ def _object(row: list[str], camera: Rigid, classes: ClassNames) -> LabelObject:
     )
 
 
-def _camera(file: Path) -> Rigid:
+def _camera(file: Path, report: Report) -> Rigid:
     """The rectified camera, seen from the inertial unit."""
+    spellings = {other: names[0] for names in _MATRICES for other in names}
     found: dict[str, list[float]] = {}
     try:
         for row in _rows(file):
-            if row and len(row) in (10, 13):
-                found[row[0].rstrip(":")] = _numbers(row[1:])
+            name = row[0].rstrip(":") if row else ""
+            if len(row) in (10, 13):
+                found[name] = _numbers(row[1:])
+            if name:
+                specification("kitti").count(f"calib/{spellings.get(name, name)}", report)
         steps = [_rows_of(next(found[name] for name in names if name in found)) for names in _MATRICES]
         rectified, velodyne, unit = (matrix(step) for step in steps)
         return rectified.then(velodyne).then(unit).inverse()
@@ -196,7 +223,7 @@ def _rows_of(values: list[float]) -> list[list[float]]:
     ]
 
 
-def _poses(file: Path) -> list[Rigid]:
+def _poses(file: Path, report: Report) -> list[Rigid]:
     """Poses of the inertial unit by frame, metres east and north of the first."""
     found: list[Rigid] = []
     first: tuple[float, float] | None = None
@@ -208,6 +235,7 @@ def _poses(file: Path) -> list[Rigid]:
                 raise InvalidError("the latitude is out of range")
         except (InvalidError, ValueError) as error:
             raise DataError(Diagnostic("file-invalid", f"{file}:{number}: no sound pose: {error}")) from error
+        _count_columns("oxts", _OXTS, len(row), report)
         if first is None:
             scale = math.cos(math.radians(latitude))
         east = scale * _EARTH_M * math.radians(longitude)

@@ -2,7 +2,8 @@
 
 Nodes have latitude and longitude, which a UTM projection about the origin (0, 0) takes to metres, as the tools of the
 INTERACTION dataset do. The lines of a lanelet may run against it: its direction is the one in which the left line lies
-left. Neighbours share a line, successors start at the points where a lanelet ends.
+left. Neighbours share a line, successors start at the points where a lanelet ends. What is not read is counted
+(`specifications/lanelet2.json`).
 """
 
 from __future__ import annotations
@@ -19,11 +20,14 @@ from shapely.geometry import Polygon
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.lane_graph import BoundedLane, lane_features, sound_area
+from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.importers.xml_tree import attribute, read_xml
 
 __all__ = ["read_lanelets", "utm"]
 
 _AREAS = {"crosswalk": "crossing", "walkway": "sidewalk", "shared_walkway": "sidewalk", "stairs": "stairs"}
+_SIDES = ("left", "right")
 _MERIDIAN_DEG = 3.0
 """Central meridian of the zone that holds longitude 0."""
 
@@ -40,17 +44,19 @@ class _Lanelet:
     tags: Mapping[str, str]
 
 
-def read_lanelets(path: Path, on_problem: ProblemSink) -> tuple[MapFeature, ...]:
+def read_lanelets(path: Path, on_problem: ProblemSink, report: Report) -> tuple[MapFeature, ...]:
     """Read a map.
 
     Args:
         path: The `.osm` file.
         on_problem: Called with the id of a lanelet and what is wrong with it.
+        report: Takes counts of what is not read.
 
     Raises:
         DataError: `file-missing` or `file-invalid`.
     """
     root = read_xml(path)
+    _count(root, report)
     places = _places(root, on_problem)
     ways = {way.get("id", ""): tuple(nd.get("ref", "") for nd in way.iter("nd")) for way in root.iter("way")}
     lanes: list[_Lanelet] = []
@@ -75,6 +81,34 @@ def read_lanelets(path: Path, on_problem: ProblemSink) -> tuple[MapFeature, ...]
         except (InvalidError, ValueError) as error:
             on_problem(name, str(error))
     return (*lane_features(_linked(lanes, places), on_problem), *areas)
+
+
+def _count(root: Element, report: Report) -> None:
+    """Count what is left out: the format says kinds in tags and roles, not in names of elements."""
+    known = specification("lanelet2")
+    lanelets = [each for each in root.iter("relation") if _tags(each).get("type") == "lanelet"]
+    sides = {member.get("ref") for each in lanelets for member in each.iter("member") if member.get("role") in _SIDES}
+    for name in root.attrib:
+        known.count(f"@{name}", report)
+    for element in root:
+        path = element.tag
+        tags = _tags(element)
+        if path == "relation":
+            path = f"relation/{tags.get('type', 'of no type')}"
+        elif path == "way" and element.get("id") not in sides:
+            path = f"way_of_no_lanelet/{tags.get('type', 'of no type')}"
+        if not known.count(path, report):
+            continue
+        inner = [f"@{name}" for name in element.attrib]
+        inner += [
+            f"tag/{child.get('k')}"
+            if child.tag == "tag"
+            else f"member/{child.get('role')}"
+            if child.tag == "member"
+            else child.tag
+            for child in element
+        ]
+        known.count_columns(path, inner, report)
 
 
 def utm(latitude: float, longitude: float) -> _Place:
@@ -136,7 +170,7 @@ def _lanelet(
     sides: dict[str, tuple[str, ...]] = {}
     for member in relation.findall("member"):
         role = member.get("role", "")
-        if role in ("left", "right") and member.get("type") == "way":
+        if role in _SIDES and member.get("type") == "way":
             nodes = tuple(node for node in ways.get(member.get("ref", ""), ()) if node in places)
             if role in sides:
                 raise InvalidError(f"its {role} side has several lines")

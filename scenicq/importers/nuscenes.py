@@ -7,6 +7,7 @@ of the ego is that of the middle of its rear axle. The ego's box and velocities 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from scenicq.importers.layouts import is_nuscenes, nuscenes_folders
 from scenicq.importers.nuscenes_scenes import AXLE_TO_CENTRE_M, EGO_SIZE_M, LONGEST_STEP_US, POSE_CHANNEL, SceneReader
 from scenicq.importers.nuscenes_tables import Tables
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy
 
 if TYPE_CHECKING:
@@ -57,6 +59,7 @@ class NuScenes:
         missing = [name for name in _TABLES.split() if not (folder / f"{name}.json").is_file()]
         if missing:
             raise DataError([Diagnostic("file-missing", f"{folder / name}.json is not there") for name in missing])
+        specification("nuscenes").count_files(_files(path, folder), report)
         tables = Tables(folder, report)
         maps = _maps(folder.parent, tables.locations, options, report)
         classes = {**taxonomy("nuscenes"), **options.class_map}
@@ -79,6 +82,15 @@ class NuScenes:
         )
 
 
+def _files(path: Path, folder: Path) -> Iterator[str]:
+    """Tables, and what is beside their folder, where that is part of the source."""
+    yield from (each.name for each in folder.iterdir())
+    if path.resolve() != folder.resolve():
+        maps = path / "maps"
+        yield from (f"maps/{each.name}" for each in (maps.iterdir() if maps.is_dir() else ()))
+        yield from (each.name for each in path.iterdir() if each != maps and not each.name.startswith("v1.0-"))
+
+
 def _maps(dataroot: Path, locations: list[str], options: Options, report: Report) -> dict[str, tuple[MapFeature, ...]]:
     maps = read_maps(options.maps, report)
     for location in locations:
@@ -90,5 +102,5 @@ def _maps(dataroot: Path, locations: list[str], options: Options, report: Report
         def tell(element: str, problem: str, file: str = expansion.name) -> None:
             report.left_out("map element", "map-invalid", f"{file}: element `{element}`: {problem}")
 
-        maps[location] = read_expansion(expansion, tell, left_hand=location.startswith(_LEFT_HAND))
+        maps[location] = read_expansion(expansion, tell, report, left_hand=location.startswith(_LEFT_HAND))
     return maps

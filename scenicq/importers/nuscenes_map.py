@@ -1,7 +1,8 @@
 """Map expansion of nuScenes (`maps/expansion/LOCATION.json`, version 1.3) as map features.
 
 Areas are polygons of nodes; the driving direction of a lane is not in its polygon but in `arcline_path_3`, a chain of
-arcs and straight pieces. `connectivity` says which lanes follow which.
+arcs and straight pieces. `connectivity` says which lanes follow which. What is not read is counted
+(`specifications/nuscenes-map.json`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.nuscenes_roads import link_roads
+from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 
 __all__ = ["arcline_points", "read_expansion"]
 
@@ -38,12 +41,15 @@ _KINDS = {
 """Layers with the kinds of the elements that they become; `road_segment` becomes `road` or `intersection`."""
 
 
-def read_expansion(path: Path, on_problem: ProblemSink, *, left_hand: bool = False) -> tuple[MapFeature, ...]:
+def read_expansion(
+    path: Path, on_problem: ProblemSink, report: Report, *, left_hand: bool = False
+) -> tuple[MapFeature, ...]:
     """Read a map.
 
     Args:
         path: The file of a location.
         on_problem: Called with the token of an element that is left out and the reason.
+        report: Takes counts of what is not read.
         left_hand: Whether traffic keeps to the left there, which the file does not say.
 
     Raises:
@@ -51,6 +57,7 @@ def read_expansion(path: Path, on_problem: ProblemSink, *, left_hand: bool = Fal
     """
     try:
         content = fields.record(fields.parse_json(path.read_bytes()), "the map")
+        specification("nuscenes-map").count_json(content, report)
         expansion = _Expansion(content, on_problem)
         return tuple(link_roads(list(expansion.features()), expansion.segments(), left_hand=left_hand))
     except OSError as error:

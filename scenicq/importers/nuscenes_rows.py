@@ -1,13 +1,14 @@
 """Rows of the tables of nuScenes that are large, as msgspec decodes them where all of a block are sound.
 
-They hold what is used. Rows that msgspec refuses are for `json`, and for what tells what is wrong with them.
+They hold what is used, and `Raw` in place of what means nothing here. Rows that msgspec refuses, as it does where a
+field is not one of these, are for `json`, and for what tells what is wrong with them or is not read.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, NotRequired, TypeAlias, TypedDict
+from typing import Annotated, Any, TypeAlias
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Raw, Struct
 from msgspec.json import Decoder
 
 __all__ = ["ANNOTATIONS", "EGO_POSES", "SENSOR_FILES", "Annotation", "EgoPose", "SensorFile"]
@@ -17,7 +18,10 @@ _Length: TypeAlias = Annotated[float, Meta(gt=0)]
 _Count: TypeAlias = Annotated[int, Meta(ge=1 - 2**63, le=2**63 - 1)]
 
 
-class Annotation(Struct, gc=False, frozen=True):
+_NOTHING = Raw(b"null")
+
+
+class Annotation(Struct, gc=False, frozen=True, forbid_unknown_fields=True):
     """A row of `sample_annotation`.
 
     Attributes:
@@ -39,10 +43,22 @@ class Annotation(Struct, gc=False, frozen=True):
     visibility_token: str | None = None
     num_lidar_pts: _Count | None = None
     num_radar_pts: _Count | None = None
+    next: Raw = _NOTHING
+    prev: Raw = _NOTHING
 
 
-class SensorFile(TypedDict):
-    """What is used of a row of `sample_data`."""
+class _Row(Struct, forbid_unknown_fields=True):
+    """A row that is read like a record of `json`."""
+
+    def get(self, key: str) -> Any:
+        """The value of a field."""
+        return getattr(self, key)
+
+    __getitem__ = get
+
+
+class SensorFile(_Row):
+    """A row of `sample_data`."""
 
     token: _Text
     sample_token: _Text
@@ -50,16 +66,21 @@ class SensorFile(TypedDict):
     calibrated_sensor_token: _Text
     filename: _Text
     is_key_frame: bool
-    width: NotRequired[_Count | None]
-    height: NotRequired[_Count | None]
+    width: _Count | None = None
+    height: _Count | None = None
+    fileformat: Raw = _NOTHING
+    timestamp: Raw = _NOTHING
+    next: Raw = _NOTHING
+    prev: Raw = _NOTHING
 
 
-class EgoPose(TypedDict):
-    """What is used of a row of `ego_pose`."""
+class EgoPose(_Row):
+    """A row of `ego_pose`."""
 
     token: _Text
     translation: Annotated[list[float], Meta(min_length=3, max_length=3)]
     rotation: Annotated[list[float], Meta(min_length=4, max_length=4)]
+    timestamp: Raw = _NOTHING
 
 
 ANNOTATIONS = Decoder(list[Annotation])

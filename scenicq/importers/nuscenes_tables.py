@@ -1,4 +1,7 @@
-"""The tables of nuScenes, joined; what is unsound is reported and left out."""
+"""The tables of nuScenes, joined; what is unsound is reported and left out.
+
+What is not read is counted (`specifications/nuscenes.json`).
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,7 @@ from scenicq.importers.nuscenes_boxes import Box, Boxes, BoxReader, found, joine
 from scenicq.importers.nuscenes_rows import ANNOTATIONS, EGO_POSES, SENSOR_FILES
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 
 __all__ = ["Tables"]
 
@@ -172,8 +176,12 @@ class Tables:
                 mounted[token] = _Mounted(of, self._try("camera", place, lambda row=row: _mount(row), name))
         pose_of: dict[str, str] = {}
         images: defaultdict[str, list[_Image]] = defaultdict(list)
+        sweeps = strays = 0
         for token, row, place in self._rows("sample_data", "sensor file", SENSOR_FILES):
-            if row.get("is_key_frame") is not True or str(row.get("sample_token")) not in self.samples:
+            is_sweep = row.get("is_key_frame") is not True
+            if is_sweep or str(row.get("sample_token")) not in self.samples:
+                sweeps += is_sweep
+                strays += not is_sweep
                 continue
 
             def add(row: Record = row) -> None:
@@ -187,6 +195,8 @@ class Tables:
                     images[fields.text(row, "ego_pose_token")].append(_Image(sample, sensor, width, height))
 
             self._try("sensor file", place, add, f"sample_data `{token}`")
+        self._report.not_read("sample_data/sweeps", sweeps)
+        self._report.not_read("sample_data of samples that are not there", strays)
         wanted = {*pose_of.values(), *images}
         poses: dict[str, tuple[float, float, float, float]] = {}
         for token, row, place in self._rows("ego_pose", "ego pose", EGO_POSES):
@@ -267,16 +277,19 @@ class Tables:
     ) -> Iterator[tuple[str, Record, _Place]]:
         # only where a character is named by its number can there be half of one
         escapes = decoded is None and "\\u" in block.text
+        known = specification("nuscenes")
         for number, element in enumerate(block.elements if decoded is None else decoded):
             place = _Place(file, block, number)
             try:
-                row = fields.record(element, "it")
+                row = element if decoded is not None else fields.record(element, "it")
                 if escapes:
                     fields.check_characters(row)
                 token = fields.text(row, "token")
             except InvalidError as error:
                 self._report.left_out(what, "record-invalid", f"{place}: {error}")
             else:
+                if decoded is None:
+                    known.count_rows((row,), self._report, file.removesuffix(".json"))
                 yield token, row, place
 
     def _try(self, what: str, place: _Place, make: Callable[[], Any], name: str = "") -> Any:

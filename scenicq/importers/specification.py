@@ -2,8 +2,9 @@
 
 A file of `specifications/` gives for each path `read`, `left out` or `meaningless`, perhaps with a note after a colon.
 A path names the fields from the root down, with `*` for keys that the source makes up; members of a list have the path
-of the list. What is read without a path below it is read as a whole; ``as `PATH` `` in a note says that the fields are
-those of another path. What is left out, and what no specification lists, is counted where it occurs.
+of the list, fields of protocol buffers end in their number, and `files/` begins patterns of files and folders. What is
+read without a path below it is read as a whole; ``as `PATH` `` in a note says that the fields are those of another
+path. What is left out, and what no specification lists, is counted where it occurs. `README.md` shows the lists.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
+from fnmatch import fnmatchcase
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, cast
 from xml.etree.ElementTree import Element
 
@@ -24,6 +26,9 @@ __all__ = ["LEFT_OUT", "MEANINGLESS", "READ", "SPECIFICATIONS", "Specification",
 READ, LEFT_OUT, MEANINGLESS = "read", "left out", "meaningless"
 SPECIFICATIONS = Path(__file__).with_name("specifications")
 _ALIAS = re.compile("as `([^`]+)`")
+_FILES = "files/"
+_NOTHING: tuple[object, ...] = (None, "", [], {})
+"""What says nothing of a field."""
 
 
 class Specification:
@@ -36,8 +41,10 @@ class Specification:
     def __init__(self, entries: Mapping[str, str]) -> None:
         """Take the entries as a file of `specifications/` has them."""
         self.entries: dict[str, tuple[str, str]] = {}
-        self._by_number: dict[str, str] = {}
+        self._by_number: dict[str, dict[int, str]] = {}
         self._below: dict[str, str] = {}
+        self._silent: dict[str, frozenset[str]] = {}
+        self._silent_numbers: dict[str, frozenset[int]] = {}
         for path, text in entries.items():
             status, _, note = text.partition(": ")
             self.entries[path] = status, note
@@ -67,6 +74,35 @@ class Specification:
         for column in columns:
             self.count(f"{table}/{column}" if table else column, report, rows)
 
+    def count_rows(self, rows: Iterable[Mapping[str, Any]], report: Report, at: str) -> None:
+        """Count the fields of records that are left out, those of records within them not.
+
+        Args:
+            rows: The records; what is null or empty in them says nothing.
+            report: Takes the counts.
+            at: Their path.
+        """
+        silent = self._without_count(at)
+        for row in rows:
+            if not silent.issuperset(row):
+                for key in row:
+                    if key not in silent and row[key] not in _NOTHING:
+                        self.count(self._child(at, key), report, _members(row[key]))
+
+    def count_files(self, names: Iterable[str], report: Report) -> None:
+        """Count files and folders that are left out.
+
+        Args:
+            names: Of each, from the root of the source.
+            report: Takes the counts.
+        """
+        patterns = [path.removeprefix(_FILES) for path in self.entries if path.startswith(_FILES)]
+        for name in names:
+            path = PurePosixPath(name)
+            unlisted = str(path.with_name(f"*{path.suffix}")) if path.suffix else name
+            pattern = next((pattern for pattern in patterns if fnmatchcase(name, pattern)), unlisted)
+            self.count(f"{_FILES}{pattern}", report)
+
     def count_json(self, value: object, report: Report, at: str = "") -> None:
         """Count what is left out of a JSON value.
 
@@ -81,12 +117,11 @@ class Specification:
             if isinstance(value, list):
                 waiting += [(path, each) for each in cast("list[object]", value) if isinstance(each, dict | list)]
             elif isinstance(value, dict):
+                silent = self._without_count(path)
                 for key, member in cast("dict[str, Any]", value).items():
-                    if member in (None, "", [], {}):
+                    if key in silent or member in _NOTHING:
                         continue
-                    child = f"{path}/{key}" if path else key
-                    if child not in self.entries and (free := f"{path}/*" if path else "*") in self.entries:
-                        child = free
+                    child = self._child(path, key)
                     if self.count(child, report, _members(member)) and (below := self._below.get(child)):
                         waiting.append((below, member))
 
@@ -108,24 +143,34 @@ class Specification:
                 if self.count(inner, report) and (below := self._below.get(inner)):
                     waiting.append((below, child))
 
-    def count_message(self, message: Message, report: Report, at: str) -> None:
+    def count_message(self, message: Message, report: Report, at: str = "") -> None:
         """Count the fields of a message of protocol buffers that are left out, those of messages within it not.
 
         Args:
             message: The message.
             report: Takes the counts.
-            at: Its path, which ends where the numbers of its fields begin.
+            at: Its path.
         """
-        for number, values in message.items():
-            self.count(self._named(at, number), report, len(values))
+        if at not in self._by_number:
+            named = {path.rpartition(":")[2]: path for path in self.entries if path.rpartition("/")[0] == at}
+            self._by_number[at] = {int(number): path for number, path in named.items() if number.isdigit()}
+            known = self._by_number[at].items()
+            self._silent_numbers[at] = frozenset(number for number, path in known if self.fate(path) != LEFT_OUT)
+        if not self._silent_numbers[at].issuperset(message):
+            for number, values in message.items():
+                self.count(self._by_number[at].get(number, self._child(at, str(number))), report, len(values))
 
-    def _named(self, at: str, number: int) -> str:
-        """The path of a field by its number: paths of such formats name fields as in `map_features:8`."""
-        if not self._by_number:
-            for path in self.entries:
-                above, _, field = path.rpartition("/")
-                self._by_number[f"{above}/{field.rpartition(':')[2]}"] = path
-        return self._by_number.get(f"{at}/{number}", f"{at}/{number}")
+    def _child(self, at: str, key: str) -> str:
+        """The path of a field."""
+        child, free = (f"{at}/{key}", f"{at}/*") if at else (key, "*")
+        return free if child not in self.entries and free in self.entries else child
+
+    def _without_count(self, at: str) -> frozenset[str]:
+        """Names of the fields of a path with which there is nothing to do."""
+        if at not in self._silent:
+            children = [path for path in self.entries if path.rpartition("/")[0] == at and path not in self._below]
+            self._silent[at] = frozenset(path.rpartition("/")[2] for path in children if self.fate(path) != LEFT_OUT)
+        return self._silent[at]
 
 
 def _members(value: object) -> int:

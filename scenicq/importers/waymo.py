@@ -1,7 +1,8 @@
 """Waymo Open Motion: `Scenario` messages in TFRecord files, read without TensorFlow.
 
 Conventions of the source: metres in a frame of each scenario, positions of box centres, headings counter-clockwise from
-+x, 10 Hz. The ego is the track `sdc_track_index`. Steps at which a track is not valid are zeros: no object there.
++x, 10 Hz. The ego is the track `sdc_track_index`. Steps at which a track is not valid are zeros: no object there. What
+is not read is counted (`specifications/waymo.json`).
 """
 
 from __future__ import annotations
@@ -20,16 +21,20 @@ from scenicq.importers.layouts import waymo_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.protobuf import Message, parse, signed
 from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 from scenicq.importers.tfrecord import read_record, records
 from scenicq.importers.waymo_map import LANE_WIDTH_M, scenario_features
 from scenicq.store.classes import taxonomy
-from scenicq.store.labels import Label, LabelObject
+from scenicq.store.labels import Label, LabelObject, OutOfPlane
 
 __all__ = ["Waymo"]
 
 _KINDS = {1: "vehicle", 2: "pedestrian", 3: "cyclist", 4: "other"}
-_REALS = {"x": 2, "y": 3, "length": 5, "width": 6, "height": 7, "heading": 8, "vx": 9, "vy": 10}
+_REALS = {"x": 2, "y": 3, "z": 4, "length": 5, "width": 6, "height": 7, "heading": 8, "vx": 9, "vy": 10}
 _TIMESTAMPS, _TRACKS, _ID, _EGO, _MAP = 1, 2, 5, 6, 8
+_AT_TRACK, _AT_STATE = "tracks:2", "tracks:2/states:3"
+"""Where their fields stand in the list of the specification."""
+
 _FRAMES = 91
 _OBJECT_BYTES = 80
 
@@ -95,7 +100,8 @@ def _list_scenarios(
         weight = len(content) // _OBJECT_BYTES
         places[name] = RecordingFiles(name, (file,), root, name, (str(offset),), weight, digest)
         if name not in maps:
-            maps[name] = scenario_features(scenario.get(_MAP, []), map_sink(f"{file.name}: scenario {name}", report))
+            sink = map_sink(f"{file.name}: scenario {name}", report)
+            maps[name] = scenario_features(scenario.get(_MAP, []), sink, report)
 
 
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
@@ -110,6 +116,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
     except InvalidError as error:
         report.left_out("recording", "record-invalid", f"{where}: {error}")
         return []
+    specification("waymo").count_message(scenario, report)
     members: list[dict[int, LabelObject]] = []
     for number, value in enumerate(tracks):
         try:
@@ -132,6 +139,8 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
 
 
 def _track(track: Message, is_ego: bool, classes: ClassNames, report: Report, where: str) -> dict[int, LabelObject]:
+    known = specification("waymo")
+    known.count_message(track, report, _AT_TRACK)
     kind = signed(track.get(2, [0])[0])
     name = str(signed(track.get(1, [0])[0]))
     source_class = _KINDS.get(kind, "unset")
@@ -141,6 +150,7 @@ def _track(track: Message, is_ego: bool, classes: ClassNames, report: Report, wh
             if not isinstance(value, memoryview):
                 raise InvalidError("it is not a message")
             state = parse(value)
+            known.count_message(state, report, _AT_STATE)
             if state.get(11, [0])[0] != 1:
                 continue
             at = {key: _real(state.get(number, [0.0])[0]) for key, number in _REALS.items()}
@@ -166,6 +176,7 @@ def _object(name: str, source_class: str, is_ego: bool, at: Mapping[str, float],
         height=at["height"],
         velocity=(at["vx"], at["vy"]),
         track=name,
+        out_of_plane=OutOfPlane(at["z"], None, None),
     )
 
 

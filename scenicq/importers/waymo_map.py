@@ -19,6 +19,8 @@ from scenicq.importers.fields import InvalidError
 from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, lengths_along, sound_area
 from scenicq.importers.lane_parts import Beside, cut_lanes
 from scenicq.importers.protobuf import Message, Value, integers, parse, signed
+from scenicq.importers.report import Report
+from scenicq.importers.specification import specification
 
 __all__ = ["LANE_WIDTH_M", "scenario_features"]
 
@@ -27,6 +29,12 @@ _BIKE_LANE_WIDTH_M = 1.8
 _BIKE_LANE = 3
 _LANE_KINDS = {1: "freeway", 2: "surface_street", 3: "bike_lane"}
 _AREAS = {8: "crossing", 9: "speed_bump", 10: "driveway"}
+_NAMES = {"crossing": "crosswalk"}
+"""What the source calls a kind of area, where that is another word."""
+
+_AT, _AT_LANE = "map_features:8", "map_features:8/lane:3"
+"""Where their fields stand in the list of the specification."""
+
 _TOLERANCE_M = 0.02
 _SHORTEST_PART_M = 0.75
 """The lines of the source have a point every half metre, and neighbours begin and end at points."""
@@ -43,12 +51,13 @@ class _Neighbour(NamedTuple):
     its_end: int
 
 
-def scenario_features(messages: Sequence[Value], on_problem: ProblemSink) -> tuple[MapFeature, ...]:
+def scenario_features(messages: Sequence[Value], on_problem: ProblemSink, report: Report) -> tuple[MapFeature, ...]:
     """The features of the field `map_features`.
 
     Args:
         messages: Its values.
         on_problem: Called with the id of a feature and what is wrong with it.
+        report: Takes counts of what is not read.
     """
     lanes: dict[str, BoundedLane] = {}
     lines: dict[str, Points] = {}
@@ -57,19 +66,21 @@ def scenario_features(messages: Sequence[Value], on_problem: ProblemSink) -> tup
     for value in messages:
         name = ""
         try:
-            feature = _message(value)
+            feature = _message(value, report, _AT)
             name = str(signed(feature.get(1, [0])[0]))
             if name in lanes or name in others:
                 raise InvalidError("the id is used twice")
             if 3 in feature:
-                lane = _message(feature[3][0])
-                line = _points(lane.get(8, []), 2)
-                neighbours[name] = list(_neighbours(lane))
-                lanes[name], lines[name] = _lane(name, lane, line), line
+                lane = _message(feature[3][0], report, _AT_LANE)
+                line = _points(lane.get(8, []), 2, report, f"{_AT_LANE}/polyline:8")
+                neighbours[name] = list(_neighbours(lane, report))
+                lanes[name], lines[name] = _lane(name, lane, line, neighbours[name]), line
                 continue
             for number, kind in _AREAS.items():
                 if number in feature:
-                    points = _points(_message(feature[number][0]).get(1, []), 3)
+                    at = f"{_AT}/{_NAMES.get(kind, kind)}:{number}"
+                    area = _message(feature[number][0], report, at)
+                    points = _points(area.get(1, []), 3, report, f"{at}/polygon:1")
                     others[name] = MapFeature(name, kind, sound_area(Polygon(points)))
         except (InvalidError, ValueError) as error:
             on_problem(name, str(error))
@@ -104,7 +115,7 @@ def _cut(
     return [replace(lane, parts=parts[name]) for name, lane in lanes.items()]
 
 
-def _lane(name: str, lane: Message, line: Points) -> BoundedLane:
+def _lane(name: str, lane: Message, line: Points, neighbours: Sequence[_Neighbour]) -> BoundedLane:
     kind = signed(lane.get(2, [0])[0])
     width = _BIKE_LANE_WIDTH_M if kind == _BIKE_LANE else LANE_WIDTH_M
     line = _simplified(line)
@@ -113,8 +124,8 @@ def _lane(name: str, lane: Message, line: Points) -> BoundedLane:
         id=name,
         left=left,
         right=right,
-        beside_left=next((each.lane for each in _neighbours(lane) if each.is_left), None),
-        beside_right=next((each.lane for each in _neighbours(lane) if not each.is_left), None),
+        beside_left=next((each.lane for each in neighbours if each.is_left), None),
+        beside_right=next((each.lane for each in neighbours if not each.is_left), None),
         predecessors=tuple(str(other) for other in integers(lane.get(9, []))),
         successors=tuple(str(other) for other in integers(lane.get(10, []))),
         in_intersection=signed(lane.get(3, [0])[0]) == 1,
@@ -122,25 +133,28 @@ def _lane(name: str, lane: Message, line: Points) -> BoundedLane:
     )
 
 
-def _neighbours(lane: Message) -> Iterator[_Neighbour]:
-    for number, is_left in ((11, True), (12, False)):
+def _neighbours(lane: Message, report: Report) -> Iterator[_Neighbour]:
+    for number, side in ((11, "left"), (12, "right")):
         for value in lane.get(number, []):
-            found = _message(value)
+            found = _message(value, report, f"{_AT_LANE}/{side}_neighbors:{number}")
             places = [signed(found.get(field, [0])[0]) for field in (2, 3, 4, 5)]
             if 1 in found:
-                yield _Neighbour(str(signed(found[1][0])), is_left, *places)
+                yield _Neighbour(str(signed(found[1][0])), side == "left", *places)
 
 
-def _message(value: Value) -> Message:
+def _message(value: Value, report: Report, at: str) -> Message:
+    """A message, whose fields that are not read are counted."""
     if not isinstance(value, memoryview):
         raise InvalidError("a field is not a message")
-    return parse(value)
+    message = parse(value)
+    specification("waymo").count_message(message, report, at)
+    return message
 
 
-def _points(values: Sequence[Value], least: int) -> Points:
+def _points(values: Sequence[Value], least: int, report: Report, at: str) -> Points:
     points: list[tuple[float, float]] = []
     for value in values:
-        point = _message(value)
+        point = _message(value, report, at)
         x, y = point.get(1, [0.0])[0], point.get(2, [0.0])[0]
         if not isinstance(x, float) or not isinstance(y, float) or not (abs(x) < 1e7 and abs(y) < 1e7):
             raise InvalidError("a point is not finite")

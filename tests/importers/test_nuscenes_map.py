@@ -16,6 +16,7 @@ from scenicq.geometry.network import Network
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.ingest import ingest
 from scenicq.importers.nuscenes_map import arcline_points, read_expansion
+from scenicq.importers.report import Report
 from scenicq.store.dataset import open_dataset
 
 TINY = Path(__file__).parents[2] / "sample_data" / "nuscenes_tiny" / "maps" / "expansion" / "tiny-town.json"
@@ -60,7 +61,7 @@ def test_unsound_paths(path: list[dict[str, object]]) -> None:
 
 def test_tiny_town() -> None:
     problems: list[tuple[str, str]] = []
-    features = read_expansion(TINY, lambda id, problem: problems.append((id, problem)))
+    features = read_expansion(TINY, lambda id, problem: problems.append((id, problem)), Report())
     assert problems == []
     kinds = sorted(feature.kind for feature in features)
     assert kinds == sorted(
@@ -86,7 +87,7 @@ def test_dangling_tokens_are_told_and_left_out(tmp_path: Path) -> None:
     file = tmp_path / "town.json"
     file.write_text(json.dumps(content))
     problems: dict[str, str] = {}
-    features = read_expansion(file, problems.__setitem__)
+    features = read_expansion(file, problems.__setitem__, Report())
     assert problems["lost"] == "polygon `nowhere` is not there"
     assert problems[content["lane"][0]["token"]] == "the lane has no path, so no direction"
     assert len(problems) == 3
@@ -158,7 +159,7 @@ def street(tmp_path: Path) -> Path:
 def test_neighbours_groups_and_roads(tmp_path: Path) -> None:
     problems: list[object] = []
     file = street(tmp_path)
-    network = Network("street", read_expansion(file, lambda *problem: problems.append(problem)))
+    network = Network("street", read_expansion(file, lambda *problem: problems.append(problem), Report()))
     assert not problems
     assert network.problems == ()
     east, south, west = (network.laneSectionAt(50, y) for y in (-1.75, -5.25, 1.75))
@@ -190,7 +191,7 @@ def test_forks_are_not_beside_each_other(tmp_path: Path) -> None:
     town["lane"].append({**town["lane"][0], "token": "fork"})
     town["arcline_path_3"]["fork"] = town["arcline_path_3"][town["lane"][0]["token"]]
     file.write_text(json.dumps(town))
-    features = {feature.id: feature for feature in read_expansion(file, lambda *_: None)}
+    features = {feature.id: feature for feature in read_expansion(file, lambda *_: None, Report())}
     assert features["fork"].properties["right"] == "south"
     assert town["lane"][0]["token"] not in (features["fork"].properties["left"], features["fork"].properties["right"])
 

@@ -190,7 +190,9 @@ class TestNeighbours:
             lane(2, 0, 100, 3.5, (12, 1, 0, 99, 0, 99)),
             lane(3, 100, 200, 3.5, (12, 1, 0, 100, 100, 200)),
         ]
-        features = scenario_features([memoryview(each) for each in messages], lambda _, problem: pytest.fail(problem))
+        features = scenario_features(
+            [memoryview(each) for each in messages], lambda _, problem: pytest.fail(problem), Report()
+        )
         network = Network("m", features)
         for x, name in ((20.0, "2"), (80.0, "2"), (120.0, "3"), (180.0, "3")):
             section = network.laneSectionAt(x, 0.0)

@@ -1,0 +1,136 @@
+"""What the lists of specifications say of each field is so: read, left out and counted, or meaningless.
+
+The oracle takes one field after the other out of a source that has them all, and looks at what comes in.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from full_sources import FORMATS, LISTS, Document, drop, entries, fill
+
+from scenicq.errors import DataError
+from scenicq.importers.base import Options
+from scenicq.importers.label_rows import labels_of
+from scenicq.importers.registry import importers
+from scenicq.importers.report import Report
+from scenicq.store.columns import RecordingColumns
+
+INSTEAD = {"crs": {"properties": {"name": "EPSG:4326"}}}
+"""What tells something only by its value."""
+
+UNASKED = {"interchange": {"labels/ego/yaw", "labels/objects/yaw"}}
+"""What is left out because of what another field says."""
+
+CASES = [(format_, name) for format_, source in FORMATS.items() for name in source.lists]
+
+
+def full(format_: str) -> Document:
+    document = FORMATS[format_].document()
+    for name in FORMATS[format_].lists:
+        fill(document, name)
+    return document
+
+
+def take_in(format_: str, document: Document, folder: Path) -> tuple[str, Mapping[str, int]]:
+    """All that comes of a source but counts of what is not read, as text, and those."""
+    folder /= "s"
+    folder.mkdir(parents=True)
+    document = copy.deepcopy(document)
+    FORMATS[format_].write(document, folder)
+    report = Report()
+    try:
+        source = importers()[format_].read(folder, Options(scratch=folder), report)
+        maps = [
+            (name, feature, feature.shape.wkt, feature.properties)
+            for name in source.maps
+            for feature in source.maps[name]
+        ]
+        recordings = [
+            labels_of(each) if isinstance(each, RecordingColumns) else each.labels for each in source.recordings(report)
+        ]
+        told = str((maps, recordings, source.name, source.facts))
+    except DataError as error:
+        told = str(error)
+    counts = {entry.name: entry.count for entry in report.counts if entry.code == "not-read"}
+    others = [entry for entry in report.counts if entry.code != "not-read"]
+    return f"{told} {others}".replace(str(folder), ""), counts
+
+
+@pytest.mark.parametrize(("format_", "name"), CASES)
+def test_what_is_left_out_is_counted_and_nothing_else(format_: str, name: str, tmp_path: Path) -> None:
+    _, counts = take_in(format_, full(format_), tmp_path / "s")
+    listed = {
+        path for each in FORMATS[format_].lists for path, fate in entries(each).items() if fate.startswith("left")
+    }
+    listed |= UNASKED.get(format_, set())
+    found = {path.partition("/")[0] if path.startswith("way_of_no_lanelet") else path for path in counts}
+    assert found == listed
+
+
+@pytest.mark.parametrize(("format_", "name"), CASES)
+def test_each_field_is_what_the_list_says(format_: str, name: str, tmp_path: Path) -> None:
+    listed = entries(name)
+    document = full(format_)
+    whole, counts = take_in(format_, document, tmp_path / "whole")
+    wrong: list[str] = []
+    for number, (path, fate) in enumerate(listed.items()):
+        inner = [other for at, other in listed.items() if at.startswith(f"{path}/")]
+        if inner and not any(other.startswith("read") for other in inner):
+            continue
+        changed = copy.deepcopy(document)
+        if path in UNASKED.get(format_, ()):
+            changed["interchange"]["dataset.json"]["angle"] = "yaw"
+        if path in INSTEAD:
+            changed[name][path] = INSTEAD[path]
+        elif not drop(changed, name, path):
+            wrong.append(f"{path}: is not in the source")
+            continue
+        found, left = take_in(format_, changed, tmp_path / str(number))
+        if fate.startswith("read") == (found == whole):
+            wrong.append(f"{path}: {fate}, but dropping it changes {'nothing' if found == whole else 'what comes in'}")
+        if fate.startswith("left") and path.partition("/")[0] not in getattr(FORMATS[format_], "positional", ()):
+            lost = {key for key in counts if key not in left}
+            if not any(key == path or key.startswith(f"{path}/") for key in lost):
+                wrong.append(f"{path}: it is counted although it is not there")
+        if fate.startswith("mean") and left != counts:
+            wrong.append(f"{path}: {fate}, but counted: {counts.items() ^ left.items()}")
+    assert not wrong, "\n".join(wrong)
+
+
+def page() -> str:
+    """The lists as tables: a row for each element, with its fields by what becomes of them."""
+    text = PAGE_BEGIN
+    for file in sorted(LISTS.glob("*.json")):
+        rows: dict[str, dict[str, list[str]]] = {}
+        for path, fate in entries(file.stem).items():
+            owner, _, name = path.rpartition("/")
+            kind, _, note = fate.partition(": ")
+            cell = f"`{name}` ({note})" if note else f"`{name}`"
+            rows.setdefault(owner, {}).setdefault(kind, []).append(cell.replace("|", "\\|"))
+        text += f"\n## {file.stem}\n\n| where | {' | '.join(FATES.values())} |\n|---|---|---|---|\n"
+        for owner, cells in rows.items():
+            shown = " | ".join(", ".join(cells.get(kind, ())) for kind in FATES)
+            text += f"| {f'`{owner}`' if owner else ''} | {shown} |\n"
+    return text
+
+
+FATES = {"read": "read", "left out": "left out and counted", "meaningless": "means nothing here"}
+PAGE_BEGIN = """# What is read of each format
+
+Every field and every kind of element that the specification of a format lists, as `specifications/*.json` have it
+(`make golden` writes this page from them; `tests/importers/test_specifications.py` takes each field out of a source
+that has them all, and looks at what comes in). What no list has is counted, too: `scenicq ingest` tells all counts.
+A path names the fields from the root down; `*` stands for keys that the source makes up, a number after a colon is a
+field's of protocol buffers, `files/` begins names of files and folders.
+"""
+
+
+def test_the_page_shows_the_lists(request: pytest.FixtureRequest) -> None:
+    readme = LISTS.parent / "README.md"
+    if request.config.getoption("--update-golden"):
+        readme.write_text(page(), encoding="utf-8")
+    assert readme.read_text(encoding="utf-8") == page(), "`make golden` writes it again"
