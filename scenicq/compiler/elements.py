@@ -79,7 +79,8 @@ _MANEUVER = frozenset({"type", "conflictingManeuvers", "reverseManeuvers"})
 def names_of(value: Network | NetworkElement | Maneuver | Signal) -> set[str]:
     """The attributes that a value may have."""
     if isinstance(value, Network):
-        return set(_NETWORK | LOOKUPS.keys() | METHODS | {"findPointIn"}) | names_worked_out(value)
+        own = _NETWORK | LOOKUPS.keys() | METHODS | value.otherRegions.keys()
+        return {"findPointIn", *own, *names_worked_out(value)}
     own = {name for kind, names in _ATTRIBUTES.items() if isinstance(value, kind) for name in names}
     if isinstance(value, Signal):
         return own
@@ -113,8 +114,13 @@ def of_network(run: Runner, network: Network, name: str, span: Span) -> ModelVal
     worked = worked_out(run, network, name, span)
     if worked is not None:
         return worked[0]
+    if name in network.otherRegions:
+        return build.constant(network.otherRegions[name], span)
     if name not in _NETWORK:
-        return MISSING
+        if (kind := name.removesuffix("Region")) in ("", name):
+            return MISSING
+        hints = tuple(f"it has `network.{each}`" for each in sorted(network.otherRegions))
+        raise fail("map-lacks", f"the map has no elements of the kind `{kind}`", span, "not in this map", hints)
     found = getattr(network, name)
     return build.constant(found, span) if name.endswith("Region") or name == "roadDirection" else found
 

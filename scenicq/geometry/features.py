@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ from scenicq.geometry import shapes
 from scenicq.geometry.shapes import Shape
 
 __all__ = [
+    "KNOWN_KINDS",
     "LINES",
     "REFERENCES",
     "MapFeature",
@@ -23,6 +25,7 @@ __all__ = [
     "load_geojson",
     "names",
     "read_geojson",
+    "region_name",
 ]
 
 ProblemSink = Callable[[str, str], None]
@@ -53,6 +56,12 @@ REFERENCES: dict[str, dict[str, str]] = {
 }
 """Properties that refer to other features: kind -> property -> kind that it refers to."""
 
+KNOWN_KINDS = frozenset({*REFERENCES, "crossing", "drivable"})
+"""The kinds of elements that a network has as such."""
+
+_TAKEN = frozenset({"walkableRegion"})
+"""Regions of a network that are of no kind."""
+
 LINES = ("centerline", "left_edge", "right_edge")
 """Properties that are lists of polylines."""
 
@@ -73,6 +82,17 @@ class MapFeature:
     kind: str
     shape: Shape = field(repr=False)
     properties: Mapping[str, Any] = field(default_factory=dict[str, Any], repr=False)
+
+
+def region_name(kind: str) -> str | None:
+    """What programs call the region of a kind of elements that Scenic does not know; None where nothing can.
+
+    Args:
+        kind: `carpark_area` becomes `carparkAreaRegion`.
+    """
+    first, *others = re.split(r"[_\s-]+", kind)
+    name = f"{first}{''.join(other[:1].upper() + other[1:] for other in others)}Region"
+    return name if kind not in KNOWN_KINDS and first and name.isidentifier() and name not in _TAKEN else None
 
 
 def names(feature: MapFeature, key: str) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ from scenicq.geometry.elements import (
     Shoulder,
     Sidewalk,
 )
-from scenicq.geometry.features import MapFeature, dangling, read_geojson
+from scenicq.geometry.features import MapFeature, dangling, read_geojson, region_name
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.followed_direction import FollowedDirection
 from scenicq.geometry.network_builder import Elements, link
@@ -262,6 +262,15 @@ class Network:
         """Sidewalks and crossings."""
         along = None if self.region("crossing") else self.sidewalkRegion.orientation
         return self._region("walkable", ("sidewalk", "crossing"), along)
+
+    @cached_property
+    def otherRegions(self) -> dict[str, PolygonSet]:
+        """The regions of kinds of elements that Scenic does not know, by name: `carparkAreaRegion`."""
+        kinds: dict[str, tuple[str, ...]] = {}
+        for kind in sorted({feature.kind for feature in self.features}):
+            if (name := region_name(kind)) is not None:
+                kinds[name] = *kinds.get(name, ()), kind
+        return {name: self._region(" or ".join(found), found, None) for name, found in kinds.items()}
 
     def region(self, kind: str) -> Region | None:
         """The region of all features of a kind, or None if the map has none."""

@@ -6,25 +6,22 @@ else (columns computed from the map, files, checksums) is the store's. Read next
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.fields import InvalidError, check_characters, parse_json
+from scenicq.importers.fields import InvalidError, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.columns import RecordingColumns, columns_of, second_of_track
 from scenicq.store.labels import Label, LabelObject, Recording
-from scenicq.store.value_rules import LONGEST_NAME, find_problems, json_object
-from scenicq.store.wkb import FARTHEST_M
+from scenicq.store.value_rules import find_problems
 
 if TYPE_CHECKING:
-    from scenicq.geometry.features import MapFeature, ProblemSink
+    from scenicq.geometry.features import MapFeature
 
 __all__ = [
     "ClassNames",
@@ -34,7 +31,6 @@ __all__ = [
     "OpenedSource",
     "Options",
     "Reader",
-    "on_the_map",
     "read_class_map",
     "read_maps",
 ]
@@ -277,40 +273,6 @@ class Labels:
         return replace(label, objects=tuple(sound), sensors=sensors)
 
 
-def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict[str, tuple[MapFeature, ...]]:
-    """The elements of maps that are at a place where maps can be.
-
-    Args:
-        maps: Of a source.
-        report: Takes what is left out.
-    """
-    kept: dict[str, tuple[MapFeature, ...]] = {}
-    for name, features in maps.items():
-        unsound = {feature.id: problem for feature in features if (problem := _element_problem(feature))}
-        for each in sorted(unsound):
-            message = f"map `{name}`: element `{each}` {unsound[each]}"
-            report.left_out("map element", "map-invalid", message)
-        kept[name] = tuple(feature for feature in features if feature.id not in unsound)
-    return kept
-
-
-def _element_problem(feature: MapFeature) -> str | None:
-    """What an element of a map has that no dataset may have."""
-    from scenicq.geometry.features import REFERENCES, farthest, names  # noqa: PLC0415 - slow to load, and for maps
-    from scenicq.store.map_validation import properties_problem  # noqa: PLC0415 - the same
-
-    if not farthest(feature) <= FARTHEST_M:
-        return "is at no place on a map"
-    # the centreline is numbers by now, and most of what there is
-    properties = {key: value for key, value in feature.properties.items() if key != "centerline"}
-    if problem := properties_problem(feature.kind, json_object(json.dumps(properties))):
-        return f"has unsound properties: {problem}"
-    texts = [feature.id, feature.kind]
-    for key in REFERENCES.get(feature.kind, {}):
-        texts += names(feature, key) if key in feature.properties else ()
-    return f"has a name of more than {LONGEST_NAME} characters" if max(map(len, texts)) > LONGEST_NAME else None
-
-
 def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapFeature, ...]]:
     """Read GeoJSON maps.
 
@@ -323,54 +285,9 @@ def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapF
     """
     if not files:
         return {}
-    from scenicq.geometry.features import dangling, load_geojson, read_geojson  # noqa: PLC0415 - slow to load, and for maps
+    from scenicq.importers.map_files import read_geojson_maps  # noqa: PLC0415 - slow to load, and for maps
 
-    maps: dict[str, tuple[MapFeature, ...]] = {}
-    for name in sorted(files):
-        problems: list[tuple[str, str]] = []
-        document = load_geojson(files[name])
-        features = read_geojson(document, _collector(problems), name=str(files[name]))
-        specification("geojson").count_json(document, report)
-        references = set(dangling(features)) if problems else set[tuple[str, str]]()
-        for problem in problems:
-            message = f"{files[name].name}: element `{problem[0]}`: {problem[1]}"
-            tell = report.kept if problem in references else report.left_out
-            tell("map element", "map-invalid", message)
-        if not _storable(features):
-            features = tuple(_storable_of(features, files[name].name, report))
-        maps[name] = features
-    return maps
-
-
-def _collector(problems: list[tuple[str, str]]) -> ProblemSink:
-    return lambda id, problem: problems.append((id, problem))
-
-
-def _storable(features: Sequence[MapFeature]) -> bool:
-    try:
-        check_characters([_texts(feature) for feature in features])
-    except InvalidError:
-        return False
-    return True
-
-
-def _storable_of(features: Sequence[MapFeature], file: str, report: Report) -> Iterator[MapFeature]:
-    """Those whose texts can be stored; the others are reported."""
-    for feature in features:
-        try:
-            check_characters(_texts(feature))
-        except InvalidError as error:
-            report.left_out("map element", "map-invalid", f"{file}: element {feature.id!a}: {error}")
-        else:
-            yield feature
-
-
-def _texts(feature: MapFeature) -> list[object]:
-    from scenicq.geometry.features import LINES  # noqa: PLC0415 - slow to load, and for maps
-
-    # lines are numbers by now, and most of what there is
-    properties = {key: value for key, value in feature.properties.items() if key not in LINES}
-    return [feature.id, feature.kind, properties]
+    return read_geojson_maps(files, report)
 
 
 def read_class_map(path: Path) -> dict[str, str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.base import Entry, Importer, OpenedSource, Options, on_the_map, read_class_map
+from scenicq.importers.base import Entry, Importer, OpenedSource, Options, read_class_map
 from scenicq.importers.fields import LONGEST_TEXT
 from scenicq.importers.folders import readable
 from scenicq.importers.opendrive import convert_maps
@@ -114,7 +114,10 @@ def ingest(
         converted = convert_maps(given, scratch if map_cache is None else Path(map_cache), report)
         options = Options(converted, classes, scratch, ego)
         opened = importer.read(source_path, options, report)
-        opened = replace(opened, maps=on_the_map(opened.maps, report))
+        if opened.maps:
+            from scenicq.importers.map_files import on_the_map  # noqa: PLC0415 - slow to load, and for maps
+
+            opened = replace(opened, maps=on_the_map(opened.maps, report))
         writer.maps = opened.maps
         entries = {entry.name: entry for entry in opened.entries}
         groups = [
