@@ -75,18 +75,20 @@ bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=100
 
 MAP ?= Town01.xodr
 RANDOM ?= 200
-SEED ?= 1
+SEED ?=
+ONE = $(or $(SEED),1)
+FRESH := $(or $(SEED),$(shell date +%s))
 conformance: $(READY) ## Compare with Scenic 3.1.1 and 2.1.0 (MAP=an OpenDRIVE file, RANDOM=, SEED=; or SCENIC=a checkout)
 ifdef SCENIC
 	$(BIN)/python tests/conformance/published.py $(SCENIC)
 	$(BIN)/python tests/conformance/map_questions.py $(SCENIC)
 else
-	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(SEED)
+	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(ONE)
 endif
 
 PROGRAMS ?= 3000
 conformance-random: $(READY) ## Match scenes that Scenic 3.1.1 draws from random programs on five towns (MAPS=folders of OpenDRIVE maps, PROGRAMS=, SEED=)
-	$(BIN)/python tests/conformance/random_scenes.py --maps $(MAPS) --programs $(PROGRAMS) --seed $(SEED)
+	$(BIN)/python tests/conformance/random_scenes.py --maps $(MAPS) --programs $(PROGRAMS) --seed $(ONE)
 
 TRACES ?= 2
 conformance-time: $(READY) ## Match what Scenic 3.1.1 simulates over time (MAP=an OpenDRIVE file; or SCENIC=a checkout; TRACES= of each program)
@@ -94,22 +96,22 @@ conformance-time: $(READY) ## Match what Scenic 3.1.1 simulates over time (MAP=a
 
 MINUTES ?= 60
 fuzz: $(READY) ## Attack with hostile programs, datasets, sources and kills, MINUTES=60 of each
-	$(BIN)/python tests/fuzz/hostile_programs.py --minutes $(MINUTES) --seed $(SEED)
-	$(BIN)/python tests/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(SEED)
-	$(BIN)/python tests/importers/fuzzing/fuzz.py --minutes $(MINUTES) --seed $(SEED)
-	$(BIN)/python tests/fuzz/kills.py --minutes $(MINUTES) --seed $(SEED)
-	$(BIN)/python tests/fuzz/differential.py --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python tests/fuzz/hostile_programs.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/importers/fuzzing/fuzz.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/fuzz/kills.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/fuzz/differential.py --minutes $(MINUTES) --seed $(ONE)
 
-oracle-frames: $(READY) ## Judge random programs over random labels by the definition, MINUTES=60, SEED=
-	$(BIN)/python tests/oracle/frames_attack.py --minutes $(MINUTES) --seed $(SEED)
+oracle-frames: $(READY) ## Judge random programs over random labels by the definition, MINUTES=60, SEED= (a fresh one)
+	$(BIN)/python tests/oracle/frames_attack.py --minutes $(MINUTES) --seed $(FRESH)
 
-oracle-time: $(READY) ## Judge random programs with choices over time by the definition, MINUTES=60, SEED=
-	$(BIN)/python tests/temporal/test_choices.py --minutes $(MINUTES) $(if $(SEED),--seed $(SEED))
+oracle-time: $(READY) ## Judge random programs with choices over time by the definition, MINUTES=60, SEED= (a fresh one)
+	$(BIN)/python tests/temporal/test_choices.py --minutes $(MINUTES) --seed $(FRESH)
 
 MUTATIONS ?= 200
 mutate: $(READY) ## Change the code in MUTATIONS=200 small ways and count which the fast tests notice
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev,mutation]'
-	$(BIN)/python tests/mutation/mutate.py --count $(MUTATIONS) --seed $(SEED)
+	$(BIN)/python tests/mutation/mutate.py --count $(MUTATIONS) --seed $(ONE)
 
 browser: ## Install the Chromium that the tests of reports are driven in, where the system has it
 	@$(call install_browser)

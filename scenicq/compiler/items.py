@@ -13,7 +13,7 @@ from scenicq.compiler.arithmetic import hashed, is_random
 from scenicq.compiler.attributes import corner
 from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import kind_of_model, to_vector
-from scenicq.compiler.comparisons import iterate
+from scenicq.compiler.comparisons import compare, iterate
 from scenicq.compiler.courses import option_of
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.known_properties import decided
@@ -50,6 +50,24 @@ def items_of(run: Runner, value: ModelValue, span: Span) -> list[ModelValue]:
     return list(components(run, value, span)) if is_vector(value) else iterate(option_of(run, value, span), span)
 
 
+def _index_on_course(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
+    """The index that the course takes among those that a value has.
+
+    Raises:
+        ScenarioError: map-lacks: it is none of them, which no scene has.
+    """
+    index = option_of(run, index, span)
+    if kind_of_model(index) == "boolean":
+        return decided(run, index, span)
+    if not is_random(index):
+        return index
+    count = length_of(value)
+    for each in list(cast("dict[ModelValue, ModelValue]", value)) if isinstance(value, dict) else range(-count, count):
+        if decided(run, compare("==", index, each, span), span):
+            return each
+    raise fail("map-lacks", "there is no item with this random index", span, "not found")
+
+
 def subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
     """`value[index]`.
 
@@ -59,8 +77,8 @@ def subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> 
     value = value.names if isinstance(value, Module) and value.name == "globalParameters" else regions_apart(value)
     if isinstance(value, Choice):
         return each_existing(run, value, lambda option: subscript(run, option, index, span), span)
-    if run.course is not None and kind_of_model(index) == "boolean" and isinstance(value, list | tuple | dict | str):
-        index = decided(run, index, span)
+    if run.course is not None and is_random(index) and isinstance(value, list | tuple | dict | str | range):
+        index = _index_on_course(run, value, index, span)
     if is_random(index) and isinstance(value, list | tuple):
         raise fail("unsupported-construct", "a random index is not supported", span, "random here",
                    ("use `Uniform(*list)` to pick one of the items",))  # fmt: skip

@@ -28,7 +28,7 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 __all__ = ["AtomColumns", "HiddenVariable", "reads_start"]
 
 _MOST_CHOICES = 64
-"""Combinations of directions that are tried where a field allows several."""
+"""Combinations of directions that are tried beside the first where a field allows several."""
 
 Numbers: TypeAlias = NDArray[np.float64]
 
@@ -111,7 +111,7 @@ class AtomColumns:
         several = np.zeros(len(self.samples), np.bool_)
         todo: list[dict[int, int]] = [{}]
         seen = {frozenset[tuple[int, int]]()}
-        for _ in range(_MOST_CHOICES):
+        for _ in range(1 + _MOST_CHOICES):
             if not todo:
                 return found
             picks = todo.pop(0)

@@ -212,7 +212,8 @@ class _Lanes:
         # where the last end itself is not seen, the first one may still be it
         early = unclear & cut & matches
         runs.ends[early] = self.first_match[early]
-        runs.ends[unclear & self.undecided] = self.possible[unclear & self.undecided]
+        # it may end anywhere from there on
+        runs.ends[unclear & self.undecided] = self.last[unclear & self.undecided]
         runs.undecided[:] = self.undecided
         lost = runs.truth == FALSE
         runs.broken[lost] = self.broken[lost]

@@ -246,6 +246,13 @@ def test_nothing_that_comes_close_is_told_and_not_advised_again(run, crossroads)
     assert "`--near 3`" in run("match", "-e", text, crossroads).stderr
 
 
+def test_so_is_it_over_time(run, crossroads):
+    text = "model scenic.domains.driving.model\nego = new Car\nother = new Car\nrequire (distance to other) < 0.01\n"
+    found = run("match", "-e", text + "require always (distance to other) < 90", crossroads, "--near", "3")
+    assert found.exit_code == 1
+    assert "--near shows nothing: no recording" in found.stderr
+
+
 def test_a_name_like_an_option_is_told_how_to_stand(run, crossroads):
     wrong = run("explain", "-e", "ego = new Car", crossroads, "-7-frame")
     assert wrong.exit_code == 2

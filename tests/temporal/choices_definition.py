@@ -82,7 +82,7 @@ def speed(trace: Trace, track: str, k: int) -> float | None:
     if first is last:
         return None
     one, other = first.seen[track], last.seen[track]
-    return math.hypot(other.x - one.x, other.y - one.y) / (last.time - first.time)
+    return math.hypot(other.x - one.x, other.y - one.y) / round(last.time - first.time, 6)
 
 
 @dataclass(frozen=True)
