@@ -19,6 +19,7 @@ from scenicq.importers.columnar import read_parquet
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import argoverse2_scenarios
 from scenicq.importers.motion import heading_of_yaw
+from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy
@@ -87,7 +88,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
             row = {key: values[number] for key, values in rows.items()}
             if row["timestep"] is None:
                 raise InvalidError("`timestep` is missing")
-            steps.setdefault(row["timestep"], []).append(_object(row, classes))
+            steps.setdefault(row["timestep"], []).append(_object(row, classes, report))
         except InvalidError as error:
             report.left_out("object", "record-invalid", f"{file.name}:{number + 1}: {error}")
     if not steps:
@@ -110,7 +111,7 @@ def _only(rows: Mapping[str, list[Any]], key: str) -> str:
     return next((str(value) for value in rows.get(key, ()) if value), "")
 
 
-def _object(row: Mapping[str, Any], classes: ClassNames) -> LabelObject:
+def _object(row: Mapping[str, Any], classes: ClassNames, report: Report) -> LabelObject:
     track, kind = row["track_id"], row["object_type"]
     if not track or not kind:
         raise InvalidError("`track_id` or `object_type` is missing")
@@ -123,7 +124,7 @@ def _object(row: Mapping[str, Any], classes: ClassNames) -> LabelObject:
         source_class="AV" if is_ego else kind,
         x=row["position_x"],
         y=row["position_y"],
-        heading=heading_of_yaw(math.remainder(row["heading"], 2 * math.pi)),
+        heading=heading_of_yaw(math.remainder(radians(row["heading"], report), 2 * math.pi)),
         velocity=(row["velocity_x"], row["velocity_y"]),
         track=track,
     )

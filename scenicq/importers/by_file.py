@@ -13,6 +13,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.base import ClassNames, Entry, Labels, OpenedSource
 from scenicq.importers.folders import readable
+from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
 from scenicq.store.labels import Label, Recording
 
@@ -68,6 +69,7 @@ class FileReader:
                 for diagnostic in error.diagnostics:
                     report.left_out("recording", diagnostic.code, diagnostic.message, hints=diagnostic.hints)
                 continue
+            tell_order(place.name, [label.timestamp_us for label, _ in made], report)
             if (recording := labels.recording(place.name, made)) is not None:
                 yield recording
 

@@ -20,6 +20,7 @@ from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import commonroad_files
 from scenicq.importers.motion import heading_of_yaw
+from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 from scenicq.importers.xml_tree import attribute, number, read_xml
@@ -96,7 +97,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
             report.left_out("object", "record-invalid", message)
         for index, state in enumerate(states):
             try:
-                member = _object(name, kind, size, state, classes)
+                member = _object(name, kind, size, state, classes, report)
                 if _is_static(element):
                     standing.append(member)
                     break
@@ -156,11 +157,13 @@ def _time(state: Element, index: int) -> int:
     return time
 
 
-def _object(name: str, kind: str, size: tuple[float, float] | None, state: Element, classes: ClassNames) -> LabelObject:
+def _object(
+    name: str, kind: str, size: tuple[float, float] | None, state: Element, classes: ClassNames, report: Report
+) -> LabelObject:
     x, y = number(state, "position", "point", "x"), number(state, "position", "point", "y")
     heading = None
     if state.find("orientation/exact") is not None:
-        heading = heading_of_yaw(number(state, "orientation", "exact"))
+        heading = heading_of_yaw(radians(number(state, "orientation", "exact"), report))
     velocity = None
     if heading is not None and state.find("velocity/exact") is not None:
         speed, (ahead_x, ahead_y) = number(state, "velocity", "exact"), direction(heading)

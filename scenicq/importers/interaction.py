@@ -21,6 +21,7 @@ from scenicq.importers.interaction_cases import Case, Row, cases_of, columns_of,
 from scenicq.importers.lanelet2_map import read_lanelets
 from scenicq.importers.layouts import INTERACTION_PARTS, interaction_files
 from scenicq.importers.motion import heading_of_yaw
+from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy
@@ -119,14 +120,14 @@ def _read_tracks(place: RecordingFiles, classes: ClassNames, report: Report) -> 
                 frame, time = _integer(row, "frame_id"), _integer(row, "timestamp_ms")
                 if times.setdefault(frame, time) != time:
                     raise InvalidError(f"frame {frame} has another time than before")
-                members.setdefault(frame, []).append(_object(row, classes))
+                members.setdefault(frame, []).append(_object(row, classes, report))
             except InvalidError as error:
                 report.left_out("object", "record-invalid", f"{file.name}: {place.name}: row {number}: {error}")
     moments = [Moment(f"{place.name}/{frame}", times[frame] * 1000, tuple(members[frame])) for frame in sorted(members)]
     return with_egos(moments, choice or None, place.name, place.map, place.name, report)
 
 
-def _object(row: Row, classes: ClassNames) -> LabelObject:
+def _object(row: Row, classes: ClassNames, report: Report) -> LabelObject:
     name, kind = row.get("track_id") or "", row.get("agent_type") or ""
     if not name or not kind:
         raise InvalidError("`track_id` or `agent_type` is missing")
@@ -142,7 +143,7 @@ def _object(row: Row, classes: ClassNames) -> LabelObject:
         source_class=kind,
         x=x,
         y=y,
-        heading=None if yaw is None else heading_of_yaw(math.remainder(yaw, 2 * math.pi)),
+        heading=None if yaw is None else heading_of_yaw(math.remainder(radians(yaw, report), 2 * math.pi)),
         width=width,
         length=length,
         velocity=(vx, vy),

@@ -38,6 +38,7 @@ from scenicq.importers.folders import first_files, read_bytes, readable
 from scenicq.importers.grouped_lines import GroupedLines, group_lines
 from scenicq.importers.interchange_columns import read_columns
 from scenicq.importers.layouts import is_interchange
+from scenicq.importers.recording_checks import radians, tell_order
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy, taxonomy_names
@@ -124,6 +125,7 @@ class LineReader:
             columns = None
             contents = [content for text, _ in lines if (content := _parsed(text)) is not None]
             _count(contents, "yaw" if self.yaw else "heading", report)
+            tell_order(name, [time for each in contents if isinstance(time := each.get("timestamp_us"), int)], report)
             if self.columnar and len(contents) == len(lines):
                 columns = read_columns(contents, name, self.classes, yaw=self.yaw)
             if columns is not None and labels.accept(columns):
@@ -154,6 +156,9 @@ def _count(lines: Sequence[dict[str, Any]], angle: str, report: Report) -> None:
             rows = [cast("dict[str, Any]", entry) for entry in entries if isinstance(entry, dict)]
             known.count_rows(rows, report, f"labels/{name}")
             report.not_read(f"labels/{name}/{other}", sum(other in row for row in rows))
+            for row in rows:
+                if isinstance(value := row.get(angle), int | float):
+                    radians(value, report)
         if isinstance(sensors := line.get("sensors"), dict):
             cameras = [cast("dict[str, Any]", each) for each in cast("dict[str, Any]", sensors).values()
                        if isinstance(each, dict)]  # fmt: skip

@@ -19,6 +19,7 @@ from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import kitti_files
 from scenicq.importers.motion import Rigid, euler, matrix, velocities
+from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 from scenicq.store.classes import taxonomy
@@ -117,7 +118,7 @@ def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -
             if poses is not None and frame >= len(poses):
                 raise InvalidError(f"frame {frame} has no pose")
             ego = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-            by_frame[frame].append(_object(row, (poses[frame] if poses else ego).then(camera), classes))
+            by_frame[frame].append(_object(row, (poses[frame] if poses else ego).then(camera), classes, report))
         except InvalidError as error:
             report.left_out("object", "record-invalid", f"{where}: {error}")
     return _labels(place, by_frame, poses)
@@ -178,13 +179,14 @@ def _moving(member: LabelObject, velocity: tuple[float, float] | None) -> LabelO
     )
 
 
-def _object(row: list[str], camera: Rigid, classes: ClassNames) -> LabelObject:
+def _object(row: list[str], camera: Rigid, classes: ClassNames, report: Report) -> LabelObject:
     if len(row) < 17:
         raise InvalidError(f"the row has {len(row)} columns, not 17")
     height, width, length, x, y, z, turn = _numbers(row[10:17])
     if min(height, width, length) <= 0:
         raise InvalidError("its size is not positive")
     at = camera.place((x, y - height / 2, z))
+    radians(turn, report)
     ahead = camera.turn((math.cos(turn), 0.0, -math.sin(turn)))
     attributes: dict[str, str | float | bool] = {"truncated": float(_numbers(row[3:4])[0]), "occluded": row[4]}
     heading = Rigid(ahead, ahead, ahead, at).heading

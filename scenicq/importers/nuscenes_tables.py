@@ -23,6 +23,7 @@ from scenicq.importers.json_tables import ElementBlock, Rows, read_list
 from scenicq.importers.nuscenes_boxes import Box, Boxes, BoxReader, found, joined, of_rows, pose
 from scenicq.importers.nuscenes_rows import ANNOTATIONS, EGO_POSES, SENSOR_FILES
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
+from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 
@@ -239,6 +240,7 @@ class Tables:
         self._first_box: dict[str, int] = {}
         ranked = first = 0
         for scene in self.scenes:
+            tell_order(self.scenes[scene].name, [sample.time for sample in self.samples_of[scene]], self._report)
             self.samples_of[scene].sort(key=lambda sample: (sample.time, sample.token))
             self._first_box[scene] = first
             for sample in self.samples_of[scene]:

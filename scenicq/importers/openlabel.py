@@ -22,6 +22,7 @@ from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.layouts import openlabel_files
 from scenicq.importers.openlabel_objects import FrameObjects, objects_of
 from scenicq.importers.openlabel_systems import Systems, first_vehicle
+from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 from scenicq.importers.timestamps import microseconds
@@ -151,7 +152,9 @@ def _read_recording(place: RecordingFiles, classes: ClassNames, report: Report) 
             made.append((Label(frame.name, place.name, time, place.map, frame.ego, frame.objects), frame.where))
     choice = next(iter(place.options), None)
     file_name = place.files[0].name
-    return made + (with_egos(lacking, choice, place.name, place.map, file_name, report) if lacking else [])
+    if lacking:
+        made += with_egos(lacking, choice, place.name, place.map, file_name, report)
+    return sorted(made, key=lambda each: each[0].timestamp_us)
 
 
 def _read_frames(content: Record, file: str, prefix: str, classes: ClassNames, report: Report) -> Iterator[_Frame]:
@@ -199,6 +202,7 @@ def _timed(frames: Sequence[_Frame], by_file: bool, file: str, report: Report) -
             report.left_out("label", "record-invalid", f"{frame.where}: it has no time, as others have")
         else:
             timed.append((frame, frame.time))
+    tell_order(file, [time for _, time in timed], report)
     return sorted(timed, key=lambda each: each[1])
 
 

@@ -12,6 +12,7 @@ from scenicq.importers.base import ClassNames
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.motion import euler, quaternion
 from scenicq.importers.openlabel_systems import Systems
+from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.store.labels import LabelObject, OutOfPlane
 
@@ -101,7 +102,7 @@ def _object(name: str, whole: Record, own: Record, boxes: FrameObjects) -> Label
     for each in (static, own, fields.optional_record(cuboid, "attributes")):
         attributes.update(_attributes(each, boxes))
     return replace(
-        _box(cuboid, system, boxes.systems),
+        _box(cuboid, system, boxes.systems, boxes.report),
         id="ego" if is_ego else name,
         category="Car" if is_ego else boxes.classes.category(kind),
         source_class=kind,
@@ -136,7 +137,7 @@ def _is_finite(value: str | float | bool) -> bool:
     return isinstance(value, str | bool) or abs(value) < math.inf
 
 
-def _box(cuboid: Record, system: str | None, systems: Systems) -> LabelObject:
+def _box(cuboid: Record, system: str | None, systems: Systems, report: Report) -> LabelObject:
     count = len(fields.items(cuboid, "val"))
     values = fields.vector(cuboid, "val", 10 if count == 10 else 9)
     at = (values[0], values[1], values[2])
@@ -144,7 +145,8 @@ def _box(cuboid: Record, system: str | None, systems: Systems) -> LabelObject:
         x, y, z, w = values[3:7]
         own = quaternion(w, x, y, z, at)
     else:
-        own = euler(values[3], values[4], values[5], at)
+        roll, pitch, yaw = (radians(angle, report) for angle in values[3:6])
+        own = euler(roll, pitch, yaw, at)
     length, *others = values[-3:]
     if min(values[-3:]) <= 0:
         raise InvalidError("its size is not positive")

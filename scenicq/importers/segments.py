@@ -17,8 +17,8 @@ import numpy as np
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
 from scenicq.importers.base import Entry, Labels, Reader
+from scenicq.importers.recording_checks import tell_recording
 from scenicq.importers.report import Report
-from scenicq.importers.timestamps import tell_rate
 from scenicq.processes import Lost, Workers, as_many_as_pay
 from scenicq.store.columns import columns_of
 from scenicq.store.labels import Recording
@@ -156,7 +156,7 @@ def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecordin
             writer.open()
             for found in job.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
                 columns = columns_of(found) if isinstance(found, Recording) else found
-                tell_rate(columns.name, columns.times_us, report)
+                tell_recording(columns, report)
                 writer.add(columns, indexes.of(columns.map))
                 on_recording(columns.name, len(columns.frames))
             return writer.finish(job.fingerprint, report.tally, report.told)

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from scenicq.importers.fields import InvalidError
-from scenicq.importers.report import Report
 
-__all__ = ["microseconds", "tell_rate"]
-
-_FEWEST_TIMES, _SHORTEST_STEP_US, _LONGEST_STEP_US = 3, 1e3, 1e8
-"""Labels more often than a thousand times a second, or less often than every 100 s, have times in another unit."""
+__all__ = ["microseconds"]
 
 
 def microseconds(stamp: object, key: str) -> int:
@@ -43,19 +38,3 @@ def microseconds(stamp: object, key: str) -> int:
     if not abs(seconds) < 1e12:
         raise InvalidError(f"`{key}` is out of range")
     return round(seconds * 1e6)
-
-
-def tell_rate(name: str, times_us: Sequence[int], report: Report) -> None:
-    """Tell a rate that no recorder has, as it comes from times in another unit.
-
-    Args:
-        name: Of the recording.
-        times_us: Of its labels.
-        report: Takes what is told.
-    """
-    if len(times_us) < _FEWEST_TIMES:
-        return
-    step_us = (max(times_us) - min(times_us)) / (len(times_us) - 1)
-    if not _SHORTEST_STEP_US <= step_us <= _LONGEST_STEP_US:
-        message = f"recording `{name}` has a label every {step_us / 1e6:.3g} s; its times may not be microseconds"
-        report.assumed("recording", "times in microseconds", message)

@@ -20,6 +20,7 @@ from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import waymo_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.protobuf import Message, parse, signed
+from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 from scenicq.importers.tfrecord import read_record, records
@@ -159,6 +160,7 @@ def _track(track: Message, is_ego: bool, classes: ClassNames, report: Report, wh
         except InvalidError as error:
             report.left_out("object", "record-invalid", f"{where}: step {step}: {error}")
             continue
+        radians(at["heading"], report)
         found[step] = _object(name, source_class, is_ego, at, classes)
     return found
 

@@ -67,3 +67,51 @@ def test_maps_in_degrees(crs: str | None, refused: bool, tmp_path: Path) -> None
     (diagnostic,) = error.value.diagnostics
     assert "degrees" in diagnostic.message
     assert "ogr2ogr" in diagnostic.hints[0]
+
+
+def told(folder: Path, rows: list[dict[str, Any]], target: Path) -> dict[str, int]:
+    """What an ingest assumes of some labels, each with its count."""
+    (folder / "labels.jsonl").write_text("\n".join(map(json.dumps, rows)))
+    summary = ingest(folder, target, strict=True)
+    return {entry.name: entry.count for entry in summary.left_out if entry.code == "assumed"}
+
+
+def label(number: int, time: float, heading: float = 0.5, kind: str = "Car") -> dict[str, Any]:
+    entry = {"position": [number, 0], "heading": heading}
+    return {"id": f"f{number}", "recording": "r", "timestamp_us": round(time * 1e6), "map": "m", "ego": entry,
+            "objects": [entry | {"id": "a", "track": "a", "class": kind}]}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("headings", "count"),
+    [
+        ((-3.2, 3.1, 6.3, 12.0), 0),  # radians, of turns counted on
+        ((0.5, 90.0, 180.0, 270.0), 6),
+        ((-179.0, -0.5, 90.0, 0.1), 4),
+    ],
+)
+def test_headings_in_degrees(headings: tuple[float, ...], count: int, tmp_path: Path) -> None:
+    rows = [label(n, n / 10, heading) for n, heading in enumerate(headings)]
+    found = told(write(tmp_path / "s", 1), rows, tmp_path / "d")
+    assert found == ({"angles in radians": count} if count else {})
+
+
+@pytest.mark.parametrize(
+    ("times", "back"),
+    [
+        (range(12), False),
+        ([0, 1, 2, 3, 4, 5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5], True),
+        ([3, 9, 1, 7, 2, 8, 0, 6, 4, 10, 5, 11], False),  # in no order
+    ],
+)
+def test_a_clock_that_is_set_back(times: list[float], back: bool, tmp_path: Path) -> None:
+    found = told(write(tmp_path / "s", 1), [label(n, time) for n, time in enumerate(times)], tmp_path / "d")
+    assert found == ({"order of times in r": 1} if back else {})
+
+
+def test_a_track_that_changes_its_class(tmp_path: Path) -> None:
+    rows = [label(n, n, kind=kind) for n, kind in enumerate(["Car", "Car", "Truck", "Car"])]
+    source = write(tmp_path / "s", 1)
+    assert told(source, rows, tmp_path / "d") == {"tracks that change their class": 1}
+    (warning,) = ingest(source, tmp_path / "e").diagnostics
+    assert warning.message == "track `a` of recording `r` is `Car` in 3 frames and `Truck` in 1 frames"

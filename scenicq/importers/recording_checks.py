@@ -1,0 +1,81 @@
+"""What no recording of sound units and one clock has: told and counted, taken as it is, no problem of its source."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from itertools import pairwise
+
+from scenicq.importers.report import Report
+from scenicq.store.columns import RecordingColumns
+
+__all__ = ["radians", "tell_order", "tell_recording"]
+
+_FEWEST_TIMES, _SHORTEST_STEP_US, _LONGEST_STEP_US = 3, 1e3, 1e8
+"""Labels more often than a thousand times a second, or less often than every 100 s, have times in another unit."""
+
+_LARGEST_ANGLE = 4 * math.pi
+"""Radians: some sources count turns on, but hardly more than two."""
+
+_MOST_STEPS_BACK = 0.25
+"""Share of steps back in time from which labels are in no order at all, as they may be."""
+
+
+def radians(angle: float, report: Report) -> float:
+    """An angle as it is; one that is no angle in radians is told.
+
+    Args:
+        angle: As a source has it.
+        report: Takes what is told.
+    """
+    if abs(angle) > _LARGEST_ANGLE:
+        message = f"an angle of {angle:g} is taken for radians; angles in degrees are to be divided by 57.29578"
+        report.assumed("object", "angles in radians", message)
+    return angle
+
+
+def tell_order(name: str, times_us: Sequence[int], report: Report) -> None:
+    """Tell a clock that was set back.
+
+    Args:
+        name: Of the recording.
+        times_us: Of its labels, as the source orders them.
+        report: Takes what is told.
+    """
+    steps = [after - before for before, after in pairwise(times_us)]
+    back = sum(step < 0 for step in steps)
+    if 0 < back <= _MOST_STEPS_BACK * len(steps):
+        place = next(number for number, step in enumerate(steps) if step < 0)
+        message = (
+            f"in recording `{name}` time goes back {back} times in {len(times_us)} labels, first by "
+            f"{-steps[place] / 1e6:g} s after label {place + 1}; labels are put in order of time"
+        )
+        report.assumed("recording", f"order of times in {name}", message)
+
+
+def tell_recording(columns: RecordingColumns, report: Report) -> None:
+    """Tell a rate that no recorder has, and tracks whose class changes.
+
+    Args:
+        columns: Of the recording.
+        report: Takes what is told.
+    """
+    times = columns.times_us
+    step_us = (max(times) - min(times)) / (len(times) - 1) if len(times) >= _FEWEST_TIMES else _SHORTEST_STEP_US
+    if not _SHORTEST_STEP_US <= step_us <= _LONGEST_STEP_US:
+        message = (
+            f"recording `{columns.name}` has a label every {step_us / 1e6:.3g} s; its times may not be microseconds"
+        )
+        report.assumed("recording", "times in microseconds", message)
+    objects = columns.objects
+    classes = Counter(zip(objects.track, objects.source_class, strict=True))
+    kinds: defaultdict[str, list[tuple[str, int]]] = defaultdict(list)
+    for (track, kind), count in classes.items():
+        if track is not None:
+            kinds[track].append((kind, count))
+    for track, found in kinds.items():
+        if len(found) > 1:
+            listed = " and ".join(f"`{kind}` in {count} frames" for kind, count in sorted(found))
+            message = f"track `{track}` of recording `{columns.name}` is {listed}"
+            report.assumed("track", "tracks that change their class", message)
