@@ -69,7 +69,7 @@ class FileReader:
                 for diagnostic in error.diagnostics:
                     report.left_out("recording", diagnostic.code, diagnostic.message, hints=diagnostic.hints)
                 continue
-            tell_order(place.name, [label.timestamp_us for label, _ in made], report)
+            tell_order(place.name, [label.timestamp_us for label, _ in made], report, numbered=True)
             if (recording := labels.recording(place.name, made)) is not None:
                 yield recording
 

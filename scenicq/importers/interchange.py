@@ -15,6 +15,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any, cast
 
@@ -125,7 +126,8 @@ class LineReader:
             columns = None
             contents = [content for text, _ in lines if (content := _parsed(text)) is not None]
             _count(contents, "yaw" if self.yaw else "heading", report)
-            tell_order(name, [time for each in contents if isinstance(time := each.get("timestamp_us"), int)], report)
+            for times in _times_by_file(lines, contents) if len(contents) == len(lines) else ():
+                tell_order(name, times, report, numbered=False)
             if self.columnar and len(contents) == len(lines):
                 columns = read_columns(contents, name, self.classes, yaw=self.yaw)
             if columns is not None and labels.accept(columns):
@@ -163,6 +165,12 @@ def _count(lines: Sequence[dict[str, Any]], angle: str, report: Report) -> None:
             cameras = [cast("dict[str, Any]", each) for each in cast("dict[str, Any]", sensors).values()
                        if isinstance(each, dict)]  # fmt: skip
             known.count_rows(cameras, report, "labels/sensors/*")
+
+
+def _times_by_file(lines: Sequence[tuple[bytes, str]], contents: Sequence[dict[str, Any]]) -> Iterator[list[int]]:
+    """Times of the labels of a recording in the order of each file that has some of them."""
+    for _, pairs in groupby(zip(lines, contents, strict=True), lambda pair: pair[0][1].rpartition(":")[0]):
+        yield [time for _, content in pairs if isinstance(time := content.get("timestamp_us"), int)]
 
 
 def _list(value: object) -> list[Any]:

@@ -240,7 +240,12 @@ class Tables:
         self._first_box: dict[str, int] = {}
         ranked = first = 0
         for scene in self.scenes:
-            tell_order(self.scenes[scene].name, [sample.time for sample in self.samples_of[scene]], self._report)
+            tell_order(
+                self.scenes[scene].name,
+                [sample.time for sample in self.samples_of[scene]],
+                self._report,
+                numbered=False,
+            )
             self.samples_of[scene].sort(key=lambda sample: (sample.time, sample.token))
             self._first_box[scene] = first
             for sample in self.samples_of[scene]:

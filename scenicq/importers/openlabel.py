@@ -202,7 +202,7 @@ def _timed(frames: Sequence[_Frame], by_file: bool, file: str, report: Report) -
             report.left_out("label", "record-invalid", f"{frame.where}: it has no time, as others have")
         else:
             timed.append((frame, frame.time))
-    tell_order(file, [time for _, time in timed], report)
+    tell_order(file, [time for _, time in timed], report, numbered=True)
     return sorted(timed, key=lambda each: each[1])
 
 

@@ -18,8 +18,11 @@ _FEWEST_TIMES, _SHORTEST_STEP_US, _LONGEST_STEP_US = 3, 1e3, 1e8
 _LARGEST_ANGLE = 4 * math.pi
 """Radians: some sources count turns on, but hardly more than two."""
 
-_MOST_STEPS_BACK = 0.25
-"""Share of steps back in time from which labels are in no order at all, as they may be."""
+_NO_ANGLE = 1e9
+"""From here on a number is no angle in any unit; that is for the reader of the field to tell."""
+
+_FEWEST_STEPS, _MOST_STEPS_BACK = 9, 0.1
+"""Where nothing numbers labels, with fewer steps, or a larger share of them back, they may be in no order at all."""
 
 
 def radians(angle: float, report: Report) -> float:
@@ -29,23 +32,24 @@ def radians(angle: float, report: Report) -> float:
         angle: As a source has it.
         report: Takes what is told.
     """
-    if abs(angle) > _LARGEST_ANGLE:
+    if _LARGEST_ANGLE < abs(angle) < _NO_ANGLE:
         message = f"an angle of {angle:g} is taken for radians; angles in degrees are to be divided by 57.29578"
         report.assumed("object", "angles in radians", message)
     return angle
 
 
-def tell_order(name: str, times_us: Sequence[int], report: Report) -> None:
+def tell_order(name: str, times_us: Sequence[int], report: Report, *, numbered: bool) -> None:
     """Tell a clock that was set back.
 
     Args:
         name: Of the recording.
         times_us: Of its labels, as the source orders them.
         report: Takes what is told.
+        numbered: Whether the source numbers its labels, so that their order is no accident.
     """
     steps = [after - before for before, after in pairwise(times_us)]
     back = sum(step < 0 for step in steps)
-    if 0 < back <= _MOST_STEPS_BACK * len(steps):
+    if back and (numbered or (len(steps) >= _FEWEST_STEPS and back <= _MOST_STEPS_BACK * len(steps))):
         place = next(number for number, step in enumerate(steps) if step < 0)
         message = (
             f"in recording `{name}` time goes back {back} times in {len(times_us)} labels, first by "

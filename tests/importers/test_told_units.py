@@ -102,6 +102,7 @@ def test_headings_in_degrees(headings: tuple[float, ...], count: int, tmp_path: 
         (range(12), False),
         ([0, 1, 2, 3, 4, 5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5], True),
         ([3, 9, 1, 7, 2, 8, 0, 6, 4, 10, 5, 11], False),  # in no order
+        ([0, 1, 2, 3, 1.5, 2.5], False),  # may be in no order
     ],
 )
 def test_a_clock_that_is_set_back(times: list[float], back: bool, tmp_path: Path) -> None:
