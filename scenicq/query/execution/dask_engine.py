@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import platform
+import shutil
 import tempfile
 import threading
 import time
@@ -21,6 +22,7 @@ from collections.abc import Generator, Iterable, Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from scenicq import __version__
@@ -29,10 +31,14 @@ from scenicq.processes import processors
 from scenicq.query.execution.partitions import Partition
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Done, Engine, Progress, Question, alone, run_shard
+from scenicq.store.read_lock import Reading, nobody_reads
 
 __all__ = ["dask_engine"]
 
 _LOOPBACK = "127.0.0.1"
+_SCRATCH = "scenicq-dask-"
+_BEGINS_S = 60
+"""Seconds after which a folder that nobody uses is one that is left."""
 _CONNECT_S = 20
 _LOOK_S, _NOBODY_S = 2, 60
 """Seconds between looks at who is there, and how long nobody may be."""
@@ -94,21 +100,48 @@ def _client(query: Query, address: str | None) -> Generator[Any]:
             yield client
         return
     jobs = query.options.jobs or processors()
-    with (
-        tempfile.TemporaryDirectory(prefix="scenicq-dask-", ignore_cleanup_errors=True) as folder,
-        LocalCluster(
-            n_workers=jobs,
-            threads_per_worker=1,
-            host=_LOOPBACK,
-            dashboard_address=f"{_LOOPBACK}:0",
-            worker_dashboard_address=None,
-            security=Security.temporary(),
-            local_directory=folder,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
-        yield client
+    with _scratch() as folder, contextlib.ExitStack() as stack:
+        try:
+            cluster = LocalCluster(
+                n_workers=jobs,
+                threads_per_worker=1,
+                host=_LOOPBACK,
+                dashboard_address=f"{_LOOPBACK}:0",
+                worker_dashboard_address=None,
+                security=Security.temporary(),
+                local_directory=folder,
+                silence_logs=logging.CRITICAL,
+            )
+            client = Client(stack.enter_context(cluster), set_as_default=False)
+        except (OSError, RuntimeError, ImportError, TimeoutError) as error:
+            # as where there is no /dev/shm for what processes share
+            first: BaseException = error
+            while first.__cause__ is not None:
+                first = first.__cause__
+            message = f"Dask starts no processes here: {' '.join(str(first).split()) or type(first).__name__}"
+            hints = ("without `--engine dask`, `--jobs N` runs processes that need less",)
+            raise DataError(Diagnostic("engine-failed", message, hints=hints)) from error
+        yield stack.enter_context(client)
+
+
+@contextlib.contextmanager
+def _scratch() -> Generator[str]:
+    """A folder for whatever Dask writes, which is gone at the end; that of a run that was killed goes with the next."""
+    from dask import config  # noqa: PLC0415 - optional
+
+    for left in Path(tempfile.gettempdir()).glob(f"{_SCRATCH}*"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > _BEGINS_S:
+                with nobody_reads(left) as is_left:
+                    if is_left:
+                        shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=_SCRATCH, ignore_cleanup_errors=True) as folder:
+        using = Reading(Path(folder))
+        try:
+            with config.set({"temporary-directory": folder}):
+                yield folder
+        finally:
+            using.end()
 
 
 def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tuple[Partition, Done]]:
