@@ -20,8 +20,8 @@ import click
 from scenicq import __version__
 from scenicq.errors import Diagnostic, ScenicqError
 from scenicq.garbage import seldom_collected
+from scenicq.refusals import refused_by_system
 
-from .failures import refused_by_system
 from .interrupts import Interrupts
 from .manual import write_examples, write_exit_codes
 from .report import show
@@ -137,7 +137,8 @@ def _worded_end() -> Generator[None]:
     except ScenicqError as error:
         if INTERRUPTS.noticed:
             _interrupted()
-        show(error.diagnostics)
+        refused = refused_by_system(error)
+        show([Diagnostic("resources-exhausted", refused)] if refused else error.diagnostics)
         raise click.exceptions.Exit(ERROR) from None
     except KeyboardInterrupt:
         _interrupted()

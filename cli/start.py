@@ -8,6 +8,7 @@ writes to descriptor 1, here or in a process that is started from here, goes whe
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import sys
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 _ERROR, _INTERRUPTED = 2, 130
+_ARENA_MAX = -8
+"""Of `mallopt`."""
 _LEAST_GB = 2
 """With less, libraries end the process by themselves while they load, and choose exit code 1."""
 
@@ -31,7 +34,7 @@ def main() -> None:
         _end(f"error[resources-exhausted]: {_LEAST_GB} GB of address space are needed (see `ulimit -v`)", _ERROR)
     try:
         if limit is not None:
-            _take_memory_of_linear_algebra()
+            _save_memory()
         from .main import main as run  # noqa: PLC0415 - loading may fail, too
 
         # what has been loaded may have printed
@@ -61,10 +64,10 @@ class _Messages(io.FileIO):
     """Standard error: where it takes nothing, nobody reads messages, and the command does its work all the same."""
 
     def write(self, b: ReadableBuffer, /) -> int:
-        try:
-            return super().write(b)
-        except OSError:
-            return memoryview(b).nbytes
+        taken: int | None = None  # also of what takes nothing now
+        with contextlib.suppress(OSError):
+            taken = super().write(b)
+        return memoryview(b).nbytes if taken is None else taken
 
 
 def _set_results_apart() -> TextIO:
@@ -86,10 +89,18 @@ def _address_space() -> int | None:
     return None if limit == resource.RLIM_INFINITY else limit
 
 
-def _take_memory_of_linear_algebra() -> None:
-    """Have OpenBLAS take its buffer now: where it finds no memory for it later, it ends the process with 1."""
+def _save_memory() -> None:
+    """Have libraries take little address space, and OpenBLAS its buffer now: without, it ends the process with 1.
+
+    By default the C library sets 64 MB aside for each thread: a third of all that a query takes.
+    """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    import numpy as np  # noqa: PLC0415 - loading may fail, too
+    os.environ.setdefault("MALLOC_ARENA_MAX", "1")
+    import ctypes  # noqa: PLC0415 - loading may fail, too
+
+    if hasattr(library := ctypes.CDLL(None), "mallopt"):
+        library.mallopt(_ARENA_MAX, 1)
+    import numpy as np  # noqa: PLC0415 - as above
 
     # larger than what it multiplies without a buffer
     square = np.ones((256, 256))
@@ -98,7 +109,7 @@ def _take_memory_of_linear_algebra() -> None:
 
 def _line(error: BaseException) -> str:
     try:
-        from .failures import refused_by_system  # noqa: PLC0415 - loading may fail, too
+        from scenicq.refusals import refused_by_system  # noqa: PLC0415 - loading may fail, too
 
         refused = refused_by_system(error)
     except BaseException:  # noqa: BLE001 - as above

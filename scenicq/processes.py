@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import seldom_collected
+from scenicq.refusals import refused_by_system
 
 if TYPE_CHECKING:  # whoever starts no process need not load what starts them
     from multiprocessing.connection import Connection
@@ -286,10 +287,14 @@ def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _interrupts())
     parent = multiprocessing.parent_process()
     assert parent is not None
-    threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
     seldom_collected()
     work: Work[Any, Any] | None = None
     with contextlib.suppress(EOFError, OSError):
+        try:
+            threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+        except RuntimeError as error:
+            connection.send(("failed", _portable(error)))
+            return
         connection.send(("ready", None))
         while (task := connection.recv()) is not None:
             try:
@@ -344,7 +349,9 @@ def as_many_as_pay() -> int:
 
 
 def _portable(error: Exception) -> Exception:
-    """The error, or one that says the same where it cannot be sent."""
+    """The error, or one that says the same where it cannot be sent: what is behind it never is."""
+    if (refused := refused_by_system(error)) is not None:
+        return DataError(Diagnostic("resources-exhausted", refused))
     try:
         copy: Exception = pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
     except Exception:  # noqa: BLE001 - whatever pickling raises

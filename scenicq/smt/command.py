@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import IO, Self
 
 from scenicq.errors import Diagnostic, SolverError
+from scenicq.refusals import limit_memory, refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem
@@ -26,7 +27,7 @@ from scenicq.smt.pool import end_group
 from scenicq.smt.smtlib import read_reply, to_smtlib
 
 if sys.platform == "linux":
-    import resource
+    pass
 
 __all__ = ["SmtlibSolver"]
 
@@ -115,24 +116,18 @@ class SmtlibSolver:
                 pass_fds=passed,
             )
         except (OSError, ValueError) as error:
+            if refused_by_system(error) is not None:
+                raise
             raise self._missing(str(error)) from None
         if self._memory_mb is not None:
-            _limit_memory(process.pid, self._memory_mb)
+            with contextlib.suppress(OSError, ValueError):  # it has ended
+                limit_memory(self._memory_mb * 2**20, process.pid)
         return process
 
     def _missing(self, reason: str) -> SolverError:
         hint = "known names are auto, dreal and portable; anything else is a command that reads SMT-LIB 2"
         message = f"solver command `{self._command}` cannot be started: {reason}"
         return SolverError(Diagnostic("solver-missing", message, hints=(hint,)))
-
-
-def _limit_memory(pid: int, memory_mb: int) -> None:
-    """Limit the address space of a process and of all that it starts."""
-    if sys.platform == "linux":
-        size = memory_mb * 2**20
-        with contextlib.suppress(OSError, ValueError):
-            # it has ended, or its own limit is lower
-            resource.prlimit(pid, resource.RLIMIT_AS, (size, size))
 
 
 @contextlib.contextmanager

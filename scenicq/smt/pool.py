@@ -169,6 +169,8 @@ class _Worker:
                 self._version, self._loads = greeting["ready"], True
                 return self._version
             self.stop()
+            if "refused" in greeting:
+                raise SolverError(Diagnostic("resources-exhausted", greeting["refused"]))
             if "failed" in greeting:
                 break
         reason = greeting.get("failed", "the process ended while it loaded the solver")

@@ -21,6 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO, Any, TypeGuard, cast
 
+from scenicq.refusals import limit_memory, refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import Problem
 
@@ -88,20 +89,16 @@ def _load(setup: Setup, answers: IO[bytes]) -> Check:
     try:
         check: Check = getattr(importlib.import_module(module), name)
         if setup.memory_mb is not None:
-            _limit_memory(setup.memory_mb)
+            limit_memory(setup.memory_mb * 2**20)
+            # absent on Windows
+            resource = importlib.import_module("resource")
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     except Exception as error:  # noqa: BLE001 - whatever a library raises when it is loaded is the reason to report
-        _send(answers, {"failed": f"{type(error).__name__}: {error}"})
+        refused = refused_by_system(error)
+        _send(answers, {"refused": refused} if refused else {"failed": f"{type(error).__name__}: {error}"})
         os._exit(1)
     _send(answers, {"ready": str(getattr(sys.modules[module], "VERSION", ""))})
     return check
-
-
-def _limit_memory(memory_mb: int) -> None:
-    # absent on Windows
-    resource = importlib.import_module("resource")
-    size = memory_mb * 2**20
-    resource.setrlimit(resource.RLIMIT_AS, (size, size))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _receive(requests: IO[bytes], inbox: queue.SimpleQueue[Request]) -> None:

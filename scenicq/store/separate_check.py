@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.processes import Lost, Workers
+from scenicq.refusals import limit_memory
 from scenicq.store.dataset import DatasetReference
 
 __all__ = ["check_apart"]
@@ -32,12 +32,7 @@ def check_apart(dataset: DatasetReference) -> None:
 
 
 def _start() -> Callable[[DatasetReference, Callable[[object], None]], None]:
-    if sys.platform == "linux":
-        import resource  # noqa: PLC0415 - not everywhere
-
-        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-        limits = [limit for limit in (_MEMORY, soft, hard) if limit != resource.RLIM_INFINITY]
-        resource.setrlimit(resource.RLIMIT_AS, (min(limits), hard))
+    limit_memory(_MEMORY)
 
     def work(dataset: DatasetReference, _tell: Callable[[object], None]) -> None:
         dataset.open(check=True)

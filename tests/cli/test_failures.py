@@ -4,14 +4,17 @@ import csv
 import errno
 import io
 import json
+import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
 
-from scenicq_cli.failures import refused_by_system
+from scenicq.refusals import refused_by_system
 from scenicq_cli.formats import make_writer
 
 PROGRAM = Path(__file__).parents[2] / "sample_data/scenarios/02_crossing_cars.scenic"
@@ -96,11 +99,76 @@ def test_a_query_with_too_few_files_never_says_that_nothing_matched(command, cro
     assert bool(done.stdout) == (done.returncode == 0)
 
 
+WAYS = {
+    "match": ("match", PROGRAM, "DATASET", "--limit", "1", "--format", "ids"),
+    "workers": ("match", PROGRAM, "DATASET", "--limit", "1", "--format", "ids", "--jobs", "2"),
+    "solver": (
+        "match",
+        PROGRAM,
+        "DATASET",
+        "--limit",
+        "1",
+        "--format",
+        "ids",
+        "--method",
+        "smt",
+        "--solver",
+        "portable",
+    ),
+    "ingest": ("ingest", PROGRAM.parents[1] / "crossroads", "made", "-q"),
+    "info": ("info", "DATASET", "--verify"),
+}
+
+
+def _limited(limits, words, folder, dataset):
+    """A command, run with limits of the system's."""
+    code = (
+        "import os, resource, sys\n"
+        f"for name, most in {limits}: resource.setrlimit(getattr(resource, name), (most, most))\n"
+        "os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    line = [sys.executable, "-c", code, *(str(dataset if word == "DATASET" else word) for word in words)]
+    if os.geteuid() == 0 and any(name == "RLIMIT_NPROC" for name, _ in limits):
+        # the number of processes is no limit for root, nor for who may change limits
+        rights = "-all,+dac_override,+dac_read_search"
+        mine = [f"--{kind}={rights}" for kind in ("inh-caps", "ambient-caps", "bounding-set")]
+        line = ["setpriv", "--reuid", "54321", "--regid", "54321", "--clear-groups", *mine, *line]
+    return subprocess.run(line, capture_output=True, text=True, check=False, cwd=folder)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")
+@pytest.mark.parametrize("way", WAYS)
+def test_two_gigabytes_of_address_space_are_enough(way, command, crossroads, tmp_path):
+    """As README.md says."""
+    done = _limited([("RLIMIT_AS", 2 * 10**9)], [command, *WAYS[way]], tmp_path, crossroads)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(shutil.which("setpriv") is None, reason="limits of processes are those of Linux")
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("limit", "most", "letter"), [
+    ("RLIMIT_NPROC", 1, "u"), ("RLIMIT_NPROC", 4, "u"), ("RLIMIT_NPROC", 8, "u"), ("RLIMIT_NOFILE", 8, "n"),
+])  # fmt: skip
+def test_what_runs_out_is_named_with_its_limit(limit, most, letter, way, command, crossroads):
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        folder.chmod(0o777)  # for whoever the command runs as
+        shutil.copytree(crossroads, folder / "dataset")  # what has been checked before is not checked again
+        done = _limited([(limit, most)], [command, *WAYS[way]], folder, folder / "dataset")
+    if done.returncode != 0:
+        *noise, last = done.stderr.splitlines()
+        assert (done.returncode, done.stdout) == (2, ""), done.stderr
+        assert last.startswith("error[resources-exhausted]")
+        assert last.endswith(f"(`ulimit -{letter}` is {most})")
+        assert all(line.startswith("<jemalloc>") for line in noise)  # Arrow's, before anybody can prevent it
+    assert done.returncode in ((0, 2) if way == "ingest" else (2,))
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")
 def test_linear_algebra_takes_its_memory_before_it_can_end_the_process_with_1():
     code = (
         "import resource, scenicq_cli.start as start\n"
-        "start._take_memory_of_linear_algebra()\n"
+        "start._save_memory()\n"
         "import numpy as np\n"
         "square, product = np.ones((900, 900)), np.ones((900, 900))\n"
         "taken = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
@@ -112,11 +180,11 @@ def test_linear_algebra_takes_its_memory_before_it_can_end_the_process_with_1():
     assert (done.returncode, done.stdout) == (0, "900.0\n"), done.stderr
 
 
-@pytest.mark.parametrize("module", ["failures", "main"])
+@pytest.mark.parametrize("module", ["scenicq.refusals", "scenicq_cli.main"])
 def test_a_program_that_cannot_be_loaded_ends_with_2(module):
     code = (
         "import sys, scenicq_cli.start\n"
-        f"sys.modules['scenicq_cli.{module}'] = None\n"
+        f"sys.modules['{module}'] = None\n"
         "sys.argv = ['scenicq', '--version']\n"
         "scenicq_cli.start.main()"
     )
