@@ -33,8 +33,8 @@ def parse_shard(_ctx: click.Context, _parameter: click.Parameter, text: str | No
     return int(left), int(right)
 
 
-def _whole(query: Query, shard: Shard, bar: ProgressBar) -> Iterator[dict[str, Any]]:
-    """The records of a shard, all of them.
+def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterator[dict[str, Any]]:
+    """The records of a shard, all of them; what is asked is written once they are there, not by a run that is stopped.
 
     Raises:
         DataError: deadline-passed.
@@ -47,6 +47,7 @@ def _whole(query: Query, shard: Shard, bar: ProgressBar) -> Iterator[dict[str, A
         message = f"shard {number}/{count} was not finished by the --deadline, and a shard is kept whole or not at all"
         hints = ("more shards are smaller; those that are finished are kept",)
         raise DataError(Diagnostic("deadline-passed", message, hints=hints))
+    note_question(folder, query)
 
 
 def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> Funnel:
@@ -58,8 +59,7 @@ def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> Funne
         return Funnel()  # fewer recordings than shards: nothing is left for this one
     piece = pieces[number - 1]
     if not is_done(folder, question, piece.number, piece.count):
-        note_question(folder, query)
         query.recordings = piece.recordings
         with ProgressBar(piece.frames, quiet=quiet) as bar:
-            write_partition(folder, question, piece, _whole(query, shard, bar), query.funnel)
+            write_partition(folder, question, piece, _whole(query, shard, folder, bar), query.funnel)
     return gather(folder, question, only=piece.number).funnel

@@ -197,7 +197,8 @@ class Dataset:
         something has failed, and only then.
 
         Raises:
-            DataError: `store-damaged` in place of another error, where a file is not as it was written.
+            DataError: `store-damaged` in place of another error, where a file is not as it was written;
+                `store-unreachable` where it could not be read.
         """
         try:
             yield
@@ -207,6 +208,9 @@ class Dataset:
             # what has failed may be the loading of DuckDB, which tried twice may end the process
             duckdb = sys.modules.get("duckdb")
             of_files = (OSError, ValueError) if duckdb is None else (duckdb.Error, OSError, ValueError)
+            failure = self.place.failure()
+            if failure is not None:
+                raise failure from error
             if self.folder is not None:
                 self.verify()
             elif isinstance(error, of_files):

@@ -69,6 +69,10 @@ class Place(Protocol):
         """What changes with any file, as far as the place itself can tell without reading them."""
         ...
 
+    def failure(self) -> DataError | None:
+        """Why a file could not be read, where whoever read it tells only that; once."""
+        ...
+
     def admit(self, connection: duckdb.DuckDBPyConnection, parts: Iterable[Part]) -> None:
         """Make files of the dataset readable for a connection."""
         ...
@@ -137,8 +141,15 @@ class LocalFolder:
 
     def stamp(self, parts: Iterable[Part]) -> str:
         """Identity, size and times of change of every file."""
-        found = [(self._root / part.path).stat() for part in parts]
+        try:
+            found = [(self._root / part.path).stat() for part in parts]
+        except OSError as error:
+            message = f"{self.path} has changed since it was opened: {error.filename}: {error.strerror}"
+            raise DataError(Diagnostic("store-damaged", message, hints=("run it again",))) from error
         return str([(each.st_ino, each.st_size, each.st_mtime_ns, each.st_ctime_ns) for each in found])
+
+    def failure(self) -> None:
+        """Nothing: the files can be looked at again."""
 
     def admit(self, connection: duckdb.DuckDBPyConnection, parts: Iterable[Part]) -> None:
         """Nothing to do: DuckDB knows files."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import io
 import threading
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -36,6 +36,8 @@ _TAIL = 1 << 17
 _TAILS = 512
 """Files whose ends are kept."""
 _BLOCK = 1 << 24
+_PATIENCE_S = 60
+"""Seconds that a request may take, with all that is tried again."""
 _SCHEME = "scenicq"
 """Of addresses in SQL, whatever the real ones are."""
 _INSTALL = {
@@ -80,6 +82,7 @@ class RemoteFolder:
     files: Any = field(repr=False)
     root: str
     _tails: OrderedDict[str, bytes] = field(default_factory=OrderedDict[str, bytes], init=False, repr=False)
+    _failures: deque[DataError] = field(default_factory=lambda: deque[DataError](maxlen=1), init=False, repr=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False)
 
     @classmethod
@@ -109,15 +112,19 @@ class RemoteFolder:
         return self.name
 
     def manifest(self) -> bytes:
-        """The content of `dataset.json`, as it is now."""
+        """The content of `dataset.json`, as it is now.
+
+        Raises:
+            DataError: store-missing, store-unreachable.
+        """
         try:
-            return bytes(self.files.cat_file(f"{self.root}/{MANIFEST}"))
+            return bytes(self._ask("cat_file", MANIFEST))
         except FileNotFoundError as error:
             hint = "`scenicq ingest SOURCE DATASET` makes a dataset, to be copied there as a folder"
             raise DataError(Diagnostic("store-missing", f"{self.name} has no {MANIFEST}", hints=(hint,))) from error
         except Exception as error:
             # every protocol has exceptions of its own
-            raise DataError(Diagnostic("store-missing", f"{self.name} cannot be read: {_line(error)}")) from error
+            raise _unreachable(self.name, error) from error
 
     def problems(self, parts: Iterable[Part]) -> list[Diagnostic]:
         """Nothing: each file would cost a request; what is wrong with one shows when it is read."""
@@ -131,12 +138,18 @@ class RemoteFolder:
         """SHA-256 of a file; nothing where it is missing or has another size."""
         digest = hashlib.sha256()
         try:
-            if self.files.size(f"{self.root}/{part.path}") != part.bytes:
+            if self._ask("info", part.path)["size"] != part.bytes:
                 return ""
             for start in range(0, part.bytes, _BLOCK):
                 digest.update(self.fetch(part, start, min(start + _BLOCK, part.bytes)))
-        except (FileNotFoundError, DataError):
+        except FileNotFoundError:
             return ""
+        except DataError as error:
+            if error.diagnostics[0].code == "store-damaged":
+                return ""
+            raise
+        except Exception as error:
+            raise _unreachable(f"{part.path} in {self.name}", error) from error
         return digest.hexdigest()
 
     def stamp(self, parts: Iterable[Part]) -> str:
@@ -151,19 +164,43 @@ class RemoteFolder:
         """A range of bytes of a file.
 
         Raises:
-            DataError: store-damaged: the file is missing or shorter.
+            DataError: store-damaged: the file is missing or shorter; store-unreachable. DuckDB makes texts of what is
+                raised while it reads: `failure` still has it.
         """
         try:
-            data = bytes(self.files.cat_file(f"{self.root}/{part.path}", start=start, end=end))
+            return self._fetched(part, start, end)
+        except DataError as error:
+            self._failures.append(error)
+            raise
+
+    def failure(self) -> DataError | None:
+        """What went wrong last since somebody asked."""
+        return self._failures.pop() if self._failures else None
+
+    def _fetched(self, part: Part, start: int, end: int) -> bytes:
+        try:
+            data = bytes(self._ask("cat_file", part.path, start=start, end=end))
         except FileNotFoundError as error:
             raise DataError(Diagnostic("store-damaged", f"{self.name} lacks {part.path}", hints=_AGAIN)) from error
         except Exception as error:
-            message = f"{part.path} in {self.name} cannot be read: {_line(error)}"
-            raise DataError(Diagnostic("store-damaged", message)) from error
+            raise _unreachable(f"{part.path} in {self.name}", error) from error
         if len(data) != end - start:
             message = f"{part.path} in {self.name} has not the size that it should have"
             raise DataError(Diagnostic("store-damaged", message, hints=_AGAIN))
         return data
+
+    def _ask(self, method: str, path: str, **options: Any) -> Any:
+        """Call a method of the file system; where nothing answers, whatever it would try again ends, too.
+
+        Raises:
+            TimeoutError: After `_PATIENCE_S`.
+        """
+        path = f"{self.root}/{path}"
+        if not getattr(self.files, "async_impl", False):
+            return getattr(self.files, method)(path, **options)
+        from fsspec.asyn import sync  # noqa: PLC0415 - optional
+
+        return sync(self.files.loop, getattr(self.files, f"_{method}"), path, timeout=_PATIENCE_S, **options)
 
     def tail(self, part: Part) -> bytes:
         """The end of a file."""
@@ -183,6 +220,20 @@ def _line(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
+def _unreachable(what: str, error: Exception) -> DataError:
+    line = f"nothing answers within {_PATIENCE_S} s" if isinstance(error, TimeoutError) else _line(error)
+    named = f"{type(error).__name__} {line}".lower()
+    # S3 calls a request bad whose token has expired, where the answer has no text
+    refused = isinstance(error, PermissionError) or any(
+        each in named for each in ("credential", "token", "bad request")
+    )
+    message = f"{what} cannot be read with these credentials: {line}" if refused else f"{what} cannot be read: {line}"
+    return DataError(Diagnostic("store-unreachable", message, hints=_CREDENTIALS if refused else ()))
+
+
+_CREDENTIALS = (
+    "those for S3 come from the variables and files of AWS (AWS_PROFILE, AWS_ACCESS_KEY_ID, ~/.aws), and may expire",
+)
 _AGAIN = ("copy the dataset there again, its `dataset.json` last",)
 
 

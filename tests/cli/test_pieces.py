@@ -151,3 +151,24 @@ def test_the_plan_is_printed_with_the_frames_left_after_each_step(run, program, 
     assert left == sorted(left, reverse=True)
     assert any("pedestrian.class" in words for words in steps)
     assert "memberships" in found.stdout
+
+
+@pytest.mark.parametrize("after", [0, 1, 3])
+def test_a_shard_that_is_stopped_leaves_no_file(run, crossroads, program, tmp_path, monkeypatch, after):
+    """SIGTERM is an interrupt like Ctrl-C; the next run does what was not done."""
+    real = Query.results
+
+    def stopped(query, *given):
+        for number, result in enumerate(real(query, *given)):
+            if number >= after:
+                raise KeyboardInterrupt
+            yield result
+
+    words = ("match", program, crossroads, "--all", "--shard", "1/2", "-o", tmp_path / "pieces")
+    with monkeypatch.context() as patch:
+        patch.setattr(Query, "results", stopped)
+        assert run(*words).exit_code == 130
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert run(*words).exit_code == 0
+    assert run("match", program, crossroads, "--all", "--shard", "2/2", "-o", tmp_path / "pieces").exit_code == 0
+    assert run("gather", tmp_path / "pieces").exit_code == 0

@@ -1,7 +1,7 @@
 """Names of folders are names: a dataset says the same wherever it lies, also beside others that are named alike.
 
 The oracle is the dataset where it was made. Each column of each table and each sign that an engine might take for a
-pattern has its turn as a folder; `test_remote.py` does the same in object storage.
+pattern has its turn as a folder, here and in object storage.
 """
 
 from __future__ import annotations
@@ -112,6 +112,27 @@ def test_nor_are_all_of_them(value: str, town: Path, expected: tuple[Any, Any], 
     place = tmp_path.joinpath(*(f"{column}={value}" for column in COLUMNS), "town")
     shutil.copytree(town, place)
     assert answers(place) == expected[1]
+
+
+ELSEWHERE = [f"{column}={value}" for column in COLUMNS for value in ("1", "zzz")] + [*PATTERNS, *ORDINARY]
+"""Names of folders in object storage."""
+_FEW = {"class=1", "map=zzz", "frame=1", "id=1", "heading=1", "a?b", "a*b", "a[xy]b", "{a,b}", "a%3Fb", "a#b", "a b"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in _FEW else [pytest.mark.slow]) for name in ELSEWHERE]
+)
+def test_nor_in_object_storage(name: str, bucket: Any, town: Path, other: Path, expected: tuple[Any, Any]) -> None:
+    """A sibling that a pattern would find is beside it."""
+    places = {f"fleet/{name}": town} | ({f"fleet/{PATTERNS[name]}": other} if name in PATTERNS else {})
+    for place, content in places.items():
+        for file in content.rglob("*"):
+            if file.is_file():
+                bucket.pipe_file(f"{place}/town/{file.relative_to(content).as_posix()}", file.read_bytes())
+    assert rows(f"s3://fleet/{name}/town") == expected[0]
+    if name in _FEW:
+        found = answers(f"s3://fleet/{name}/town")
+        assert found == expected[1]
 
 
 @pytest.mark.parametrize("column", ["class", "map", "frame", "recording", "id", "heading", "ego_x", "first_object"])
