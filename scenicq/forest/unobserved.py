@@ -129,7 +129,7 @@ class _Reader:
         inside = (each for each in postorder((node,)) if isinstance(each, Select) and each is not node)
         choice = next((each for each in inside if id(each) in reading), None)
         if choice is None or selects == 0:
-            return _FALSE, _TRUE
+            return _of_speed(node, reading)
         outcomes: list[Node] = []
         for number in range(len(choice.options)):
 
@@ -174,3 +174,26 @@ def _chosen(node: Select, found: dict[int, Truths], *, index_known: bool) -> Tru
     index, (no, yes) = found[id(node.index)], options
     chosen = _joined(LogicOp.OR, _joined(LogicOp.AND, index, yes), _joined(LogicOp.AND, _opposite(index), no))
     return _joined(LogicOp.OR, chosen, (every, every))[0], chosen[1]
+
+
+def _of_speed(node: Node, reading: set[int]) -> Truths:
+    """The same of a comparison with a speed, which is never negative; nothing is known of anything else."""
+    match node:
+        case Compare(left=Feature(property="speed") as speed, right=bound) if id(bound) not in reading:
+            op = node.op
+        case Compare(left=bound, right=Feature(property="speed") as speed) if id(bound) not in reading:
+            op = _MIRRORED.get(node.op, node.op)
+        case _:
+            return _FALSE, _TRUE
+    if id(speed) not in reading or kind_of(bound) != "scalar":
+        return _FALSE, _TRUE
+    zero = build.constant(0.0)
+    match op:
+        case CompareOp.GT | CompareOp.NE:
+            return build.compare(CompareOp.LT, bound, zero, node.span), _TRUE
+        case CompareOp.GE:
+            return build.compare(CompareOp.LE, bound, zero, node.span), _TRUE
+        case CompareOp.LT:
+            return _FALSE, build.compare(CompareOp.GT, bound, zero, node.span)
+        case CompareOp.LE | CompareOp.EQ:
+            return _FALSE, build.compare(CompareOp.GE, bound, zero, node.span)

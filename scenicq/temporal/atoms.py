@@ -21,7 +21,8 @@ from scenicq.forest.condition import expand
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
 from scenicq.forest.nodes import DirectionAt, Feature, Identity, Leaf, Node, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.forest.unobserved import certain_and_possible
+from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.temporal.samples import FIXED, MOVING, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -37,6 +38,10 @@ def reads_start(condition: Node) -> bool:
     """Whether an expanded condition over time hangs on what was observed at the first sample."""
     nodes = postorder((condition,))
     return any(isinstance(node, Feature) and not node.current and node.property not in FIXED for node in nodes)
+
+
+def _is_speed(node: Node) -> bool:
+    return isinstance(node, Feature) and node.property == "speed"
 
 
 class HiddenVariable(Exception):
@@ -113,7 +118,7 @@ class AtomColumns:
         seen = {frozenset[tuple[int, int]]()}
         for _ in range(1 + _MOST_CHOICES):
             if not todo:
-                return found
+                return self._with_bounds(condition, found)
             picks = todo.pop(0)
             counts: dict[int, NDArray[np.intp]] = {}
             found = np.maximum(found, self._truth(condition, picks, counts))
@@ -129,6 +134,16 @@ class AtomColumns:
             open_ = several & (found != TRUE)
             self.undecided.append(open_)
             found[open_] = UNKNOWN
+        return found
+
+    def _with_bounds(self, condition: Node, found: Truth) -> Truth:
+        """The truth where a condition is the same for every speed that is not observed."""
+        open_ = found == UNKNOWN
+        # between two cells a bound of a hidden number would be another one
+        if open_.any() and any(map(_is_speed, postorder((condition,)))) and not leaves(condition):
+            certain, possible = certain_and_possible(condition, _is_speed)
+            found[open_ & (self._truth(possible, {}, {}) == FALSE)] = FALSE
+            found[open_ & (self._truth(certain, {}, {}) == TRUE)] = TRUE
         return found
 
     def number(self, node: Node) -> Numbers | None:
