@@ -120,7 +120,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               "single change of the program would leave. Without it, this is said where hardly any frame matches.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, parquet or ids.  [default: by the extension of FILE, else table on a terminal "
-              "and jsonl in a pipe]")
+              "and jsonl in a pipe]  In csv, a cell that a spreadsheet would take for a formula (=, +, -, @) begins "
+              "with ', and is read back without it.")
 @click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path),
               help="Write to a file, which appears when it is complete; `-` is standard output.")
 @click.option("--shard", metavar="I/N", callback=parse_shard, help="Match only piece I of N; -o names the folder for "

@@ -24,6 +24,7 @@ __all__ = [
     "LeftOut",
     "Manifest",
     "Part",
+    "check_path",
     "find_links",
     "is_dataset",
     "read_manifest",
@@ -138,6 +139,24 @@ def is_dataset(folder: Path) -> bool:
     except (OSError, ValueError, RecursionError):
         return False
     return isinstance(content, dict) and cast(dict[str, object], content).get("format") == _FORMAT
+
+
+def check_path(folder: Path, code: str) -> None:
+    """Refuse a folder whose path is no text: neither Arrow nor DuckDB open files in it.
+
+    Args:
+        folder: Of a dataset.
+        code: Of the error.
+
+    Raises:
+        DataError: It is none, as where a path has bytes that are not UTF-8, or Python takes it for ASCII.
+    """
+    try:
+        str(folder.absolute()).encode()
+    except UnicodeEncodeError as error:
+        message = f"the path of {folder} is not text in UTF-8, and no other can hold a dataset"
+        hints = ("PYTHONUTF8=1 or a locale of UTF-8 has Python take paths for UTF-8", "else give it another name")
+        raise DataError(Diagnostic(code, message, hints=hints)) from error
 
 
 def find_links(folder: Path) -> list[Path]:

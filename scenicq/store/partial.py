@@ -18,7 +18,7 @@ from typing import IO
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.atomic_files import sync_folder
-from scenicq.store.manifest import FOLDERS, find_links, is_dataset
+from scenicq.store.manifest import FOLDERS, check_path, find_links, is_dataset
 from scenicq.store.read_lock import nobody_reads
 
 try:
@@ -175,11 +175,12 @@ def check_target(target: Path, *, force: bool = False, update: bool = False) -> 
         update: Whether it may be brought up to date.
 
     Raises:
-        DataError: `target-exists`; `target-unwritable` for a path without a name of its own, or one of whose folders
-            is a link.
+        DataError: `target-exists`; `target-unwritable` for a path without a name of its own, one that is no text, or
+            one of whose folders is a link.
     """
     if not target.name or target.name == "..":
         raise DataError(Diagnostic("target-unwritable", f"{target} is not the name of a new folder"))
+    check_path(target, "target-unwritable")
     if not os.path.lexists(target):
         return
     if not is_dataset(target):

@@ -19,7 +19,7 @@ from urllib.parse import unquote
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.manifest import MANIFEST, Manifest, Part, find_links
+from scenicq.store.manifest import MANIFEST, Manifest, Part, check_path, find_links
 from scenicq.store.read_lock import Reading
 from scenicq.store.remote import RemoteFile, RemoteFolder
 
@@ -92,7 +92,12 @@ class LocalFolder:
 
     @classmethod
     def at(cls, path: Path) -> Self:
-        """The folder, which is read from now on."""
+        """The folder, which is read from now on.
+
+        Raises:
+            DataError: `store-missing` where its path is no text.
+        """
+        check_path(path, "store-missing")
         return cls(path, path.resolve(), Reading(path))
 
     def release(self) -> None:
