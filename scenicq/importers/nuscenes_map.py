@@ -58,7 +58,7 @@ def read_expansion(
     try:
         content = fields.record(fields.parse_json(path.read_bytes()), "the map")
         specification("nuscenes-map").count_json(content, report)
-        expansion = _Expansion(content, on_problem)
+        expansion = _Expansion(content, on_problem, report)
         return tuple(link_roads(list(expansion.features()), expansion.segments(), left_hand=left_hand))
     except OSError as error:
         raise DataError(Diagnostic("file-missing", f"map {path} cannot be read: {error.strerror}")) from error
@@ -67,8 +67,9 @@ def read_expansion(
 
 
 class _Expansion:
-    def __init__(self, content: Record, on_problem: ProblemSink) -> None:
+    def __init__(self, content: Record, on_problem: ProblemSink, report: Report) -> None:
         self._content = content
+        self._report = report
         self._on_problem = on_problem
         nodes = self._layer("node")
         self._nodes = {
@@ -157,6 +158,9 @@ class _Expansion:
         for name, key in (("predecessors", "incoming"), ("successors", "outgoing")):
             others: list[str] = self._try(token, lambda key=key: self._linked(token, key)) or []
             properties[name] = [other for other in others if other in self._lanes]
+            self._report.not_read(
+                f"connectivity/*/{key} of lanes that are not there", len(others) - len(properties[name])
+            )
         return properties
 
     def _linked(self, token: str, key: str) -> list[str]:

@@ -101,6 +101,25 @@ def test_each_field_is_what_the_list_says(format_: str, name: str, tmp_path: Pat
     assert not wrong, "\n".join(wrong)
 
 
+def test_lanes_of_both_directions_are_counted(tmp_path: Path) -> None:
+    document = full("interaction")
+    lanelets = document["lanelet2"]["relation"]["lanelet"]
+    for each in lanelets[:3]:
+        each["tag"] = each["tag"] | {"one_way": "no"}
+    lanelets[0]["tag"]["subtype"] = "crosswalk"  # an area has no direction
+    _, counts = take_in("interaction", document, tmp_path)
+    assert counts['relation/lanelet/tag/one_way="no": the other direction'] == 2
+
+
+def test_links_to_lanes_that_are_not_there_are_counted(tmp_path: Path) -> None:
+    document = full("nuscenes")
+    lane = document["nuscenes-map"]["lane"][0]["token"]
+    document["nuscenes-map"]["connectivity"][lane] = {"incoming": ["gone"], "outgoing": ["gone", "far"]}
+    _, counts = take_in("nuscenes", document, tmp_path)
+    assert counts["connectivity/*/incoming of lanes that are not there"] == 1
+    assert counts["connectivity/*/outgoing of lanes that are not there"] == 2
+
+
 def page() -> str:
     """The lists as tables: a row for each element, with its fields by what becomes of them."""
     text = PAGE_BEGIN
