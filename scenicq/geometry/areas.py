@@ -8,6 +8,7 @@ from typing import assert_never
 
 import shapely
 
+from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction
 from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.membership import bounds
@@ -55,7 +56,7 @@ def area(region: Region) -> float | None:
 
 @cache
 def _whole_area(region: PolygonSet) -> float:
-    return float(shapely.union_all(list(region.polygons)).area)
+    return float(shapes.union_all(region.polygons).area)
 
 
 def _shape(region: Region, within: Bounds) -> Shape | None:
@@ -66,7 +67,7 @@ def _shape(region: Region, within: Bounds) -> Shape | None:
         case Nowhere():
             return shapely.Polygon()
         case PolygonSet():
-            return shapely.union_all(list(region.near(within)))
+            return shapes.union_all(list(region.near(within)))
         case PolylineSet() | PointSet():
             return None
         case Disc():
@@ -80,10 +81,10 @@ def _shape(region: Region, within: Bounds) -> Shape | None:
             known = [part for part in parts if part is not None]
             if len(known) < len(parts):
                 return None
-            return shapely.union_all(known) if isinstance(region, UnionOf) else shapely.intersection_all(known)
+            return shapes.union_all(known) if isinstance(region, UnionOf) else shapes.intersection_all(known)
         case DifferenceOf():
             base, removed = _shape(region.base, within), _shape(region.removed, within)
-            return base if base is None or removed is None else shapely.difference(base, removed)
+            return base if base is None or removed is None else shapes.difference(base, removed)
         case _:
             assert_never(region)
 

@@ -67,7 +67,7 @@ def _outside(edge: LineString, area: Shape) -> list[LineString]:
 
 def side_edges(area: Shape, centerlines: Sequence[Shape], *, left: bool = False) -> list[LineString]:
     """The parts of a lane's boundary on the right of its centreline, or the left, in the direction of travel."""
-    line = centerlines[0] if len(centerlines) == 1 else shapely.line_merge(shapely.union_all(list(centerlines)))
+    line = centerlines[0] if len(centerlines) == 1 else shapely.line_merge(shapes.union_all(centerlines))
     if not isinstance(line, LineString):
         return []
     points = shapely.get_coordinates(shapely.get_exterior_ring(shapely.get_parts(area)[0]))

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import reduce
 from itertools import chain
 from typing import Any, TypeAlias, cast
 
@@ -27,8 +28,6 @@ Bounds: TypeAlias = tuple[float, float, float, float]
 """A box: xmin, ymin, xmax, ymax."""
 Coordinates: TypeAlias = NDArray[np.float64]
 """Points, shape (n, 2)."""
-_GRID = 1e-9
-"""Metres to which coordinates are rounded where an overlay of nearly coinciding edges fails without."""
 _SLIT = 1e-3
 """Metres on either side by which slits between polygons are closed."""
 
@@ -163,17 +162,46 @@ def covers_many(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
     return shapely.covers(a, b)
 
 
+def _overlay(operation: Callable[..., Any], *operands: Any, exact: bool = True) -> Any:
+    """The result of an operation on areas; on a grid where GEOS cannot tell how edges cross, ever coarser."""
+    for grid in _GRIDS[not exact :]:
+        try:
+            return operation(*operands, grid_size=grid)
+        except shapely.GEOSException:
+            continue
+    return operation(*map(_repaired, operands), grid_size=_GRIDS[-1])
+
+
+def _repaired(shape: Any) -> Any:
+    """A shape whose edges do not cross, without what has fewer dimensions; each of an array."""
+    if isinstance(shape, np.ndarray):
+        return array([_repaired(each) for each in cast("list[Shape]", shape.tolist())])
+    parts = shapely.get_parts(shapely.make_valid(shape))
+    return shapely.union_all(parts[shapely.get_dimensions(parts) == shapely.get_dimensions(shape)])
+
+
+_GRIDS = (None, 1e-9, 1e-7, 1e-5)
+"""Metres that coordinates are rounded to, the exact ones first."""
+
+
+def intersection_all(geometries: Sequence[Shape]) -> Shape:
+    """What all of the geometries share."""
+    return reduce(intersection, geometries)
+
+
 def intersection(a: Shape, b: Shape) -> Shape:
     """What two geometries share."""
-    try:
-        return shapely.intersection(a, b)
-    except shapely.GEOSException:
-        return shapely.intersection(a, b, grid_size=_GRID)
+    return _overlay(shapely.intersection, a, b)
+
+
+def shared(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """What each pair of geometries has in common."""
+    return _overlay(shapely.intersection, a, b)
 
 
 def shared_areas(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
     """What each pair of polygons has in common, in square metres."""
-    return shapely.area(shapely.intersection(a, b))
+    return shapely.area(shared(a, b))
 
 
 def intersections(geometries: Sequence[Shape], window: Shape) -> list[Shape]:
@@ -183,23 +211,17 @@ def intersections(geometries: Sequence[Shape], window: Shape) -> list[Shape]:
 
 def difference(a: Shape, b: Shape) -> Shape:
     """The closure of what lies in a and not in b."""
-    try:
-        return shapely.difference(a, b)
-    except shapely.GEOSException:
-        return shapely.difference(a, b, grid_size=_GRID)
+    return _overlay(shapely.difference, a, b)
 
 
 def union_all(geometries: Sequence[Shape]) -> Shape:
     """The union."""
-    try:
-        return shapely.union_all(array(geometries))
-    except shapely.GEOSException:
-        return shapely.union_all(array(geometries), grid_size=_GRID)
+    return _overlay(shapely.union_all, array(geometries))
 
 
 def snapped_union(geometries: Sequence[Shape]) -> Shape:
     """The union, with coordinates rounded to a nanometre so that slivers close."""
-    return shapely.union_all(array(geometries), grid_size=_GRID)
+    return _overlay(shapely.union_all, array(geometries), exact=False)
 
 
 def areas(geometries: Sequence[Shape]) -> NDArray[np.float64]:
@@ -247,7 +269,7 @@ def divided(shape: Shape, others: Sequence[Shape]) -> tuple[Shape, ...]:
     """A polygon cut along the borders of others: its parts, each inside or outside of any of them."""
     if not others:
         return (shape,)
-    lines = shapely.union_all(shapely.boundary(array([shape, *others])))
+    lines = union_all(shapely.boundary(array([shape, *others])).tolist())
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(lines)))
     return tuple(face for face in faces if shapely.contains_xy(shape, *inner_point(face)))
 

@@ -19,6 +19,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
+from scenicq.geometry import shapes
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.lane_parts import LanePart
@@ -85,7 +86,7 @@ def sound_area(shape: BaseGeometry) -> Polygon | MultiPolygon:
     if not shape.is_valid:
         made = shapely.make_valid(shape)
         parts = [part for part in getattr(made, "geoms", [made]) if isinstance(part, Polygon | MultiPolygon)]
-        shape = shapely.union_all(parts)
+        shape = shapes.union_all(parts)
     if not isinstance(shape, Polygon | MultiPolygon) or shape.is_empty or not 0 < shape.area < math.inf:
         raise InvalidError("its polygon is not valid")
     return shape
@@ -253,7 +254,7 @@ def _members(keys: Mapping[str, str]) -> dict[str, list[str]]:
 
 
 def _union(areas: Iterable[Polygon | MultiPolygon]) -> Polygon | MultiPolygon:
-    return cast("Polygon | MultiPolygon", shapely.union_all(list(areas)))
+    return cast("Polygon | MultiPolygon", shapes.union_all(list(areas)))
 
 
 def _group_features(

@@ -17,6 +17,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.geometry import shapes
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
@@ -219,7 +220,7 @@ def _sound(shape: BaseGeometry) -> BaseGeometry:
     if not shape.is_valid:
         made = shapely.make_valid(shape)
         parts = [part for part in getattr(made, "geoms", [made]) if isinstance(part, Polygon | MultiPolygon)]
-        shape = shapely.union_all(parts)
+        shape = shapes.union_all(parts)
     if shape.is_empty or shape.area == 0:
         raise InvalidError("its polygon is not valid")
     return shape

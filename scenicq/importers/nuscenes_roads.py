@@ -18,6 +18,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from scenicq.geometry import shapes
 from scenicq.geometry.features import MapFeature
 
 __all__ = ["link_roads"]
@@ -77,11 +78,11 @@ def _beside(lanes: Sequence[MapFeature], sign: float) -> dict[str, str]:
     travel = np.concatenate([_directions(line, _SAMPLES * line.length) for line in lines])
     aside = np.column_stack((-travel[:, 1], travel[:, 0])) * sign
     rays: Any = shapely.linestrings(np.stack((start, start + _REACH_M * aside), axis=1))
-    own_m = shapely.length(shapely.intersection(rays, areas[owner]))
+    own_m = shapely.length(shapes.shared(rays, areas[owner]))
     ray, other = shapely.STRtree(areas).query(rays, predicate="intersects")
     kept = owner[ray] != other
     ray, other = ray[kept], other[kept]
-    away_m = shapely.distance(shapely.points(start[ray]), shapely.intersection(rays[ray], areas[other]))
+    away_m = shapely.distance(shapely.points(start[ray]), shapes.shared(rays[ray], areas[other]))
     # Lanes that fork or merge overlap: they are not beside each other there.
     near = np.abs(away_m - own_m[ray]) <= _GAP_M
     votes: defaultdict[int, Counter[int]] = defaultdict(Counter)
@@ -110,9 +111,9 @@ def _holders(lanes: Sequence[MapFeature], areas: Sequence[MapFeature]) -> dict[s
     """For each lane the area with most of it, if that is more than half."""
     if not lanes or not areas:
         return {}
-    shapes, outer = np.array([lane.shape for lane in lanes]), np.array([area.shape for area in areas])
-    inside, around = shapely.STRtree(outer).query(shapes, predicate="intersects")
-    shares = shapely.area(shapely.intersection(shapes[inside], outer[around])) / shapely.area(shapes[inside])
+    inner, outer = np.array([lane.shape for lane in lanes]), np.array([area.shape for area in areas])
+    inside, around = shapely.STRtree(outer).query(inner, predicate="intersects")
+    shares = shapes.shared_areas(inner[inside], outer[around]) / shapely.area(inner[inside])
     best: dict[str, tuple[float, str]] = {}
     for lane, area, share in zip(inside.tolist(), around.tolist(), shares.tolist(), strict=True):
         name = lanes[lane].id

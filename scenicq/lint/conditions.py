@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from typing import cast
 
-from shapely import minimum_rotated_rectangle, unary_union
+from shapely import minimum_rotated_rectangle
 from shapely.geometry import MultiPolygon, Polygon
 
 from scenicq.compiler.temporal import is_temporal
@@ -33,6 +33,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.walk import postorder, transform
+from scenicq.geometry import shapes
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Nowhere, PolygonSet, PolylineSet
@@ -215,7 +216,7 @@ def _fits(region: PolygonSet, short: float, long: float) -> bool:
         return True
     if len(region.polygons) > _MOST_POLYGONS:
         return True
-    joined = unary_union(region.polygons)
+    joined = shapes.union_all(region.polygons)
     parts = joined.geoms if isinstance(joined, MultiPolygon) else (joined,)
     return any(_may_hold(part, short, long) for part in parts if isinstance(part, Polygon))
 

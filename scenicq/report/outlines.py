@@ -127,7 +127,7 @@ def outline(region: Region, bounds: Bounds) -> list[Shape]:
 
 
 def _cut(pieces: list[Shape], bounds: Bounds) -> list[Shape]:
-    cut: list[Shape] = shapely.intersection(shapes.array(pieces), shapes.box(*bounds)).tolist()
+    cut: list[Shape] = shapes.intersections(pieces, shapes.box(*bounds))
     return [piece for piece in cut if not piece.is_empty]
 
 
