@@ -11,32 +11,27 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Any, cast
 
-from shapely.geometry import LineString
-
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_flat, is_random
 from scenicq.compiler.choices import each_existing, regions_apart
-from scenicq.compiler.coerce import property_node, to_heading, to_scalar, to_vector
+from scenicq.compiler.coerce import property_node, to_heading, to_region, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.following import follow
 from scenicq.compiler.lookups import look_up
+from scenicq.compiler.region_attributes import REGION_METHODS, holds_regions, of_region
 from scenicq.compiler.unavailable import unavailable_attribute
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import ArithmeticOp, Constant, Node, PointIn
-from scenicq.geometry.angles import heading_of
+from scenicq.forest.nodes import ArithmeticOp, Node
 from scenicq.geometry.elements import Lane, Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
-from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, orientation_of
-from scenicq.geometry.road_direction import along_lines
-from scenicq.geometry.shapes import simple_parts
 from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS
 
-__all__ = ["attribute", "corner", "part_of"]
+__all__ = ["attribute", "part_of"]
 
 _PLAIN: dict[type, frozenset[str]] = {
     str: frozenset("lower upper strip lstrip rstrip split startswith endswith replace title isdigit join".split()),
@@ -83,18 +78,16 @@ def attribute(run: Runner, value: ModelValue, name: str, span: Span) -> ModelVal
     if name.startswith("__"):
         raise fail("unsupported-construct", f"`{name}` is not available to scenarios", span, "Python's own attribute",
                    ("scenarios are data: they never reach the Python interpreter",))  # fmt: skip
-    if name in _OF_LINES:
-        value = regions_apart(value)
     if isinstance(value, Choice):
+        if name in REGION_METHODS and holds_regions(value):
+            return REGION_METHODS[name](to_region(value, span))
         return _of_choice(run, value, name, span)
     found = _lookup(run, value, name, span)
+    if found is MISSING and isinstance(options := regions_apart(value), Choice):
+        return _of_choice(run, options, name, span)
     if found is MISSING:
         raise _unknown(value, name, span)
     return found
-
-
-_OF_LINES = frozenset({"start", "end", "points", "length", "orientation"})
-"""Attributes of a region that depend on which region it is."""
 
 
 def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
@@ -178,7 +171,7 @@ def _lookup(run: Runner, value: ModelValue, name: str, span: Span) -> ModelValue
         case Network():
             return of_network(run, value, name, span)
         case NetworkElement():
-            region = _of_region(build.constant(value.region, span), name, span)
+            region = of_region(build.constant(value.region, span), name, span)
             return of_element(run, value, name, span) if region is MISSING else region
         case Maneuver() | Signal():
             return of_element(run, value, name, span)
@@ -298,87 +291,6 @@ def _of_node(value: Node, name: str, span: Span) -> ModelValue:
         case "vector", "offsetRadially":
             return Builtin(name, lambda span, by, turn: operators.along(value, to_heading(turn, span), (0, by), span))
         case "region", _:
-            return _of_region(value, name, span)
+            return of_region(value, name, span)
         case _:
             return MISSING
-
-
-def _of_region(value: Node, name: str, span: Span) -> ModelValue:
-    match name:
-        case "union":
-            return Builtin(name, lambda span, other: operators.region_union(value, other, span), cost=800)
-        case "intersect":
-            return Builtin(name, lambda span, other: operators.region_intersection(value, other, span), cost=800)
-        case "difference":
-            return Builtin(name, lambda span, other: operators.region_difference(value, other, span), cost=800)
-        case "intersects":
-            return Builtin(name, lambda span, other: operators.intersects(value, other, span))
-        case "orientation" if isinstance(value, Constant):
-            field = orientation_of(cast(Region, value.value))
-            return None if field is None else build.constant(field, span)
-        case "containsPoint":
-            return Builtin(name, lambda span, point: operators.within(to_vector(point, span), value, span))
-        case "containsObject":
-            return Builtin(name, lambda span, thing: operators.within(thing, value, span))
-        case "distanceTo":
-            return Builtin(name, lambda span, point: operators.distance_to(value, point, span))
-        case "uniformPointInner" | "uniformPoint":
-            return Builtin(name, lambda span: PointIn(operators.existing(value, span), span=span))
-        case "start" | "end" if (points := _line(value)) is not None:
-            (x, y), (u, v) = points[:2] if name == "start" else points[-2:]
-            place = points[0] if name == "start" else points[-1]
-            return operators.oriented(build.constant(place, span), build.constant(heading_of(u - x, v - y), span))
-        case "points" if (points := _line(value)) is not None:
-            return tuple(build.constant(point, span) for point in points)
-        case "footprint" if isinstance(value, Constant) and isinstance(value.value, PolygonSet):
-            return value
-        case "boundary" if isinstance(value, Constant) and isinstance(value.value, PolygonSet):
-            return _boundary(value.value, span)
-        case "pointAlongBy" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
-            region = value.value
-            return Builtin(
-                name, lambda span, by, normalized=False: _point_along(region, by, span, normalized=normalized)
-            )
-        case "length" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
-            return float(sum(line.length for line in value.value.lines))
-        case _:
-            return MISSING
-
-
-def _boundary(region: PolygonSet, span: Span) -> ModelValue:
-    """The border of a single polygon, directed along itself."""
-    if len(region.polygons) != 1:
-        return MISSING
-    lines = cast("tuple[LineString, ...]", tuple(simple_parts([region.polygons[0].boundary])))
-    return build.constant(PolylineSet(lines, region.name, along_lines(lines, region.name)), span)
-
-
-def _point_along(region: PolylineSet, by: ModelValue, span: Span, *, normalized: ModelValue) -> ModelValue:
-    """The point at a distance along a single line, in metres or as a share of its length."""
-    distance = to_scalar(by, span)
-    if len(region.lines) != 1 or not isinstance(distance, Constant):
-        raise fail("unsupported-construct", "this point along a line is not supported", span,
-                   "a random distance, or several lines", ("place something `on` the line",))  # fmt: skip
-    point = region.lines[0].interpolate(float(cast(float, distance.value)), normalized=bool(normalized))
-    return build.constant((float(point.x), float(point.y)), span)
-
-
-def _line(value: ModelValue) -> list[tuple[float, float]] | None:
-    """The corners of a polyline, pieces one after the other; None for other regions."""
-    if not (isinstance(value, Constant) and isinstance(value.value, PolylineSet)):
-        return None
-    return [(float(x), float(y)) for line in value.value.pieces for x, y in line.coords]
-
-
-def corner(value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
-    """`polyline[n]`.
-
-    Raises:
-        ScenarioError: wrong-type for other regions, runtime-error where there is no such corner.
-    """
-    points = _line(value)
-    if points is None:
-        raise fail("wrong-type", "a region has no items", span, "indexed here", ("only polylines have corners",))
-    if not isinstance(index, int) or not -len(points) <= index < len(points):
-        raise fail("runtime-error", "there is no item with this index", span, "not found")
-    return build.constant(points[index], span)

@@ -26,6 +26,7 @@ __all__ = [
     "is_choice",
     "make_choice",
     "map_choice",
+    "nothing_to_choose",
     "regions_apart",
 ]
 
@@ -37,6 +38,13 @@ LACKING = frozenset({"map-lacks", "runtime-error"})
 
 class NothingLeftError(ScenarioError):
     """No outcome of a random choice has what the program asks for."""
+
+
+def nothing_to_choose(span: Span) -> NothingLeftError:
+    """What is said of a choice from an empty list."""
+    hint = "if the list comes from the map, the map has no such element"
+    error = fail("map-lacks", "there is nothing to choose from", span, "an empty list", (hint,))
+    return NothingLeftError(error.diagnostics)
 
 
 def make_choice(index: Node, options: list[ModelValue], span: Span | None) -> ModelValue:

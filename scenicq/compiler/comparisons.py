@@ -16,7 +16,7 @@ from scenicq.compiler.coerce import kind_of_model
 from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import CompareOp, Constant, Index, Node, Select
+from scenicq.forest.nodes import CompareOp, Constant, Node, Select
 from scenicq.geometry.elements import Maneuver, NetworkElement
 
 __all__ = ["binary", "compare", "iterate", "symbolic"]
@@ -53,6 +53,8 @@ def compare(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelVa
     if op in _SAMENESS:
         same = _same_choice(left, right, span)
         if same is not None:
+            if isinstance(same, bool):
+                return same is not _SAMENESS[op]
             return operators.combine("not", [same], span) if _SAMENESS[op] else same
     return distribute(lambda a, b: _compare_known(op, a, b, span), (left, right), span, spread=is_choice)
 
@@ -61,33 +63,51 @@ _SAMENESS = {"==": False, "is": False, "!=": True, "is not": True}
 """Whether an operator asks if two values differ."""
 
 
-def _same_choice(left: ModelValue, right: ModelValue, span: Span) -> Node | None:
-    """Whether a random choice of elements comes out as another or as one element, without going through all pairs."""
+def _same_choice(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    """Whether a random choice of elements comes out as another or as one element, without going through all pairs.
+
+    None where something else is compared.
+    """
     if not isinstance(left, Choice):
         left, right = right, left
-    if not _of_atoms(left) or not (_of_atoms(right) or _is_atom(right)):
+    atoms = _atoms(left), _atoms(right)
+    if not isinstance(left, Choice) or atoms[0] is None or atoms[1] is None:
         return None
-    codes: dict[ModelValue, int] = {}
-    first = _numbered(cast(Choice, left), codes, span)
-    if isinstance(right, Choice):
-        return build.compare(CompareOp.EQ, first, _numbered(right, codes, span), span)
-    return build.compare(CompareOp.EQ, first, build.constant(float(codes.get(right, -1)), span), span)
+    if not atoms[0] & atoms[1]:
+        return False
+    codes: dict[ModelValue, float] = {atom: float(code) for code, atom in enumerate(dict.fromkeys(_options(left)))}
+    one, other = _numbered(left, codes, span), _numbered(right, codes, span)
+    return build.compare(CompareOp.EQ, one, other, span)
 
 
-def _is_atom(value: ModelValue) -> bool:
-    return value is None or isinstance(value, NetworkElement | Maneuver)
+def _options(value: ModelValue) -> list[ModelValue]:
+    """What a random choice may come out as, those of nested choices included, in their order."""
+    found: list[ModelValue] = []
+    stack = [value]
+    while stack:
+        each = stack.pop()
+        if isinstance(each, Choice):
+            stack += reversed(each.options)
+        else:
+            found.append(each)
+    return found
 
 
-def _of_atoms(value: ModelValue) -> bool:
-    return isinstance(value, Choice) and not isinstance(value.index, Index) and all(map(_is_atom, value.options))
+def _atoms(value: ModelValue) -> set[ModelValue] | None:
+    """The elements that a value may be, or None where it may be something else."""
+    options = _options(value)
+    return (
+        set(options) if all(each is None or isinstance(each, NetworkElement | Maneuver) for each in options) else None
+    )
 
 
-def _numbered(choice: Choice, codes: dict[ModelValue, int], span: Span) -> Node:
-    """The number of the option that a choice comes out as, where equal options have equal numbers."""
-    numbers = [codes.setdefault(option, len(codes)) for option in choice.options]
-    if numbers == list(range(len(numbers))):
-        return choice.index
-    return Select(choice.index, tuple(build.constant(float(number), span) for number in numbers), span=span)
+def _numbered(value: ModelValue, codes: dict[ModelValue, float], span: Span) -> Node:
+    """The number of the element that a value comes out as, where equal elements have equal numbers."""
+    if not isinstance(value, Choice):
+        return build.constant(codes.setdefault(value, float(len(codes))), span)
+    numbers = tuple(_numbered(option, codes, span) for option in value.options)
+    known = [number.value for number in numbers if isinstance(number, Constant)]
+    return value.index if known == list(range(len(numbers))) else Select(value.index, numbers, span=span)
 
 
 def _compare_known(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:

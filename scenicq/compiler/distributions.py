@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, cast
 
 from scenicq.compiler.arithmetic import LARGEST
-from scenicq.compiler.choices import make_choice
+from scenicq.compiler.choices import make_choice, nothing_to_choose
 from scenicq.compiler.coerce import to_scalar
 from scenicq.compiler.values import Choice, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
@@ -46,8 +46,7 @@ def uniform(options: list[ModelValue], weights: list[float] | None, span: Span) 
         ScenarioError: map-lacks for no options at all, wrong-value for weights that are not.
     """
     if not options:
-        raise fail("map-lacks", "there is nothing to choose from", span, "an empty list",
-                   ("if the list comes from the map, the map has no such element",))  # fmt: skip
+        raise nothing_to_choose(span)
     weights = weights or [1.0] * len(options)
     if len(weights) != len(options):
         raise fail("wrong-value", f"{len(options)} options need as many weights, not {len(weights)}", span)

@@ -16,7 +16,7 @@ from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, plain_unary
 from scenicq.compiler.assignment import assign_around, go_through
 from scenicq.compiler.attributes import attribute
-from scenicq.compiler.choices import each_existing, map_choice
+from scenicq.compiler.choices import each_existing, map_choice, nothing_to_choose
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
 from scenicq.compiler.constructs import construct
 from scenicq.compiler.courses import option_of
@@ -130,8 +130,7 @@ def _call_each(run: Runner, function: ModelValue, choice: Choice, span: Span) ->
             return _call_each(run, function, items, span)
         given = iterate(items, span)
         if not given:
-            raise fail("map-lacks", "there is nothing to choose from", span, "an empty list",
-                       ("if the list comes from the map, the map has no such element",))  # fmt: skip
+            raise nothing_to_choose(span)
         return call(run, function, given, {}, span)
 
     return each_existing(run, choice, now, span)

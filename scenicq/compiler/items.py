@@ -10,13 +10,13 @@ from typing import Any, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, is_random
-from scenicq.compiler.attributes import corner
 from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import kind_of_model, to_vector
 from scenicq.compiler.comparisons import compare, iterate
 from scenicq.compiler.courses import option_of
 from scenicq.compiler.environment import Runner
 from scenicq.compiler.known_properties import decided
+from scenicq.compiler.region_attributes import corner
 from scenicq.compiler.values import Choice, ModelValue, Module, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build

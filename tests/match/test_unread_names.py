@@ -38,8 +38,11 @@ def test_a_name_that_is_read(value):
     )
 
 
-def test_a_choice_of_nothing_is_an_error_once_it_is_read():
-    nothing = "zone = Uniform(*Uniform([], []))\n"
+@pytest.mark.parametrize(
+    "choice", ["*Uniform([], [])", "*Uniform(*[[]])", "*Uniform(*network.lanes[:1]).group.lanes[9:]"]
+)
+def test_a_choice_of_nothing_is_an_error_once_it_is_read(choice):
+    nothing = f"zone = Uniform({choice})\n"
     assert isinstance(verdict(nothing), Match)
     with pytest.raises(ScenarioError, match="nothing to choose from"):
         verdict(nothing + "require zone > 3\n")

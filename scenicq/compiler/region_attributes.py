@@ -1,0 +1,131 @@
+"""What a program may read of regions: methods of any region, and parts of known ones."""
+
+# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import cast
+
+from shapely.geometry import LineString
+
+from scenicq.compiler import operators
+from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
+from scenicq.compiler.elements import MISSING
+from scenicq.compiler.values import Builtin, Choice, ModelValue, fail
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.nodes import Constant, Node, PointIn
+from scenicq.geometry.angles import heading_of
+from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, orientation_of
+from scenicq.geometry.road_direction import along_lines
+from scenicq.geometry.shapes import simple_parts
+
+__all__ = ["REGION_METHODS", "corner", "holds_regions", "of_region"]
+
+
+def holds_regions(choice: Choice) -> bool:
+    """Whether each outcome of a random choice is a region."""
+    stack: list[ModelValue] = [choice]
+    while stack:
+        value = stack.pop()
+        if isinstance(value, Choice):
+            stack += value.options
+        elif kind_of_model(value) != "region":
+            return False
+    return True
+
+
+def of_region(value: Node, name: str, span: Span) -> ModelValue:
+    """An attribute of a region, `MISSING` where it has none of this name, or not as one region."""
+    if name in REGION_METHODS:
+        return REGION_METHODS[name](value)
+    match name:
+        case "orientation" if isinstance(value, Constant):
+            field = orientation_of(cast(Region, value.value))
+            return None if field is None else build.constant(field, span)
+        case "start" | "end" if (points := _line(value)) is not None:
+            (x, y), (u, v) = points[:2] if name == "start" else points[-2:]
+            place = points[0] if name == "start" else points[-1]
+            return operators.oriented(build.constant(place, span), build.constant(heading_of(u - x, v - y), span))
+        case "points" if (points := _line(value)) is not None:
+            return tuple(build.constant(point, span) for point in points)
+        case "footprint" if isinstance(value, Constant) and isinstance(value.value, PolygonSet):
+            return value
+        case "boundary" if isinstance(value, Constant) and isinstance(value.value, PolygonSet):
+            return _boundary(value.value, span)
+        case "pointAlongBy" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
+            region = value.value
+            return Builtin(
+                name, lambda span, by, normalized=False: _point_along(region, by, span, normalized=normalized)
+            )
+        case "length" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
+            return float(sum(line.length for line in value.value.lines))
+        case _:
+            return MISSING
+
+
+def _point(value: Node, span: Span) -> Node:
+    return PointIn(operators.existing(value, span), span=span)
+
+
+def _method(name: str, make: Callable[..., ModelValue], cost: int = 0) -> Callable[[Node], Builtin]:
+    return lambda value: Builtin(name, lambda span, *given: make(value, *given, span), cost=cost)
+
+
+REGION_METHODS: dict[str, Callable[[Node], Builtin]] = {
+    name: _method(name, make, cost)
+    for name, make, cost in (
+        ("union", operators.region_union, 800),
+        ("intersect", operators.region_intersection, 800),
+        ("difference", operators.region_difference, 800),
+        ("intersects", operators.intersects, 0),
+        ("containsPoint", lambda value, point, span: operators.within(to_vector(point, span), value, span), 0),
+        ("containsObject", lambda value, thing, span: operators.within(thing, value, span), 0),
+        ("distanceTo", operators.distance_to, 0),
+        ("uniformPointInner", _point, 0),
+        ("uniformPoint", _point, 0),
+    )
+}
+"""Methods that mean the same of any region, a random one as well."""
+
+
+def _boundary(region: PolygonSet, span: Span) -> ModelValue:
+    """The border of a single polygon, directed along itself."""
+    if len(region.polygons) != 1:
+        return MISSING
+    lines = cast("tuple[LineString, ...]", tuple(simple_parts([region.polygons[0].boundary])))
+    return build.constant(PolylineSet(lines, region.name, along_lines(lines, region.name)), span)
+
+
+def _point_along(region: PolylineSet, by: ModelValue, span: Span, *, normalized: ModelValue) -> ModelValue:
+    """The point at a distance along a single line, in metres or as a share of its length."""
+    distance = to_scalar(by, span)
+    if len(region.lines) != 1 or not isinstance(distance, Constant):
+        raise fail("unsupported-construct", "this point along a line is not supported", span,
+                   "a random distance, or several lines", ("place something `on` the line",))  # fmt: skip
+    point = region.lines[0].interpolate(float(cast(float, distance.value)), normalized=bool(normalized))
+    return build.constant((float(point.x), float(point.y)), span)
+
+
+def _line(value: ModelValue) -> list[tuple[float, float]] | None:
+    """The corners of a polyline, pieces one after the other; None for other regions."""
+    if not (isinstance(value, Constant) and isinstance(value.value, PolylineSet)):
+        return None
+    return [(float(x), float(y)) for line in value.value.pieces for x, y in line.coords]
+
+
+def corner(value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
+    """`polyline[n]`.
+
+    Raises:
+        ScenarioError: wrong-type for other regions, runtime-error where there is no such corner.
+    """
+    points = _line(value)
+    if points is None:
+        raise fail("wrong-type", "a region has no items", span, "indexed here", ("only polylines have corners",))
+    if not isinstance(index, int) or not -len(points) <= index < len(points):
+        raise fail("runtime-error", "there is no item with this index", span, "not found")
+    return build.constant(points[index], span)
