@@ -246,7 +246,7 @@ class Labels:
     def _with_sound_objects(self, label: Label, of_objects: _Facts, of_sensors: _Facts, place: str) -> Label:
         """A label without the objects and sensor files of which something is wrong."""
         ids = {"ego"}
-        tracks: dict[str, str] = {}
+        tracks: dict[str, str] = {} if label.ego.track is None else {label.ego.track: "ego"}
         sound: list[LabelObject] = []
         owner = f"of label `{label.frame}`"
         for member, fact in zip(label.objects, of_objects, strict=True):

@@ -103,6 +103,10 @@ def _list_scenarios(
         if name not in maps:
             sink = map_sink(f"{file.name}: scenario {name}", report)
             maps[name] = scenario_features(scenario.get(_MAP, []), sink, report)
+            kinds = {feature.kind for feature in maps[name]}
+            if "lane" in kinds and "intersection" not in kinds:
+                message = f"{file.name}: scenario {name}: no lane is `interpolating`: its map has no intersection"
+                report.assumed("map", "no intersections", message)
 
 
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:

@@ -123,9 +123,9 @@ def columns_of(recording: Recording) -> RecordingColumns:
 
 
 def second_of_track(recording: RecordingColumns) -> int | None:
-    """The first row of `objects` whose track another object of its label has, too; None if there is none."""
+    """The first row of `objects` whose track another object or the ego of its label has, too; None if there is none."""
     labels = np.repeat(np.arange(len(recording.object_counts)), recording.object_counts).tolist()
-    seen: set[tuple[int, str]] = set()
+    seen = {(label, track) for label, track in enumerate(recording.egos.track) if track is not None}
     for row, (label, track) in enumerate(zip(labels, recording.objects.track, strict=True)):
         if track is not None:
             if (label, track) in seen:

@@ -1,6 +1,7 @@
 """One track is at most one object of a label: of two the first is kept, and the source is told where."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,18 @@ def test_every_importer_keeps_the_first_and_tells_of_the_others():
     assert [each.message for each in report.told] == [
         f"source line 7: object `{id_}` of label `f`: has the track `t` of object `a`, which is kept"
         for id_ in ("b", "g")
+    ]
+
+
+def test_an_object_with_the_ego_s_track_is_left_out():
+    """The importer that takes an object for the ego and leaves it among the objects, too, is told."""
+    report = Report()
+    label = replace(LABEL, ego=replace(LABEL.ego, track="u"))
+    recording = Labels({STREET.name}, report).recording("r", [(label, "source line 7")])
+    assert recording is not None
+    assert [each.id for each in recording.labels[0].objects] == ["a", "d", "e"]
+    assert "source line 7: object `c` of label `f`: has the track `u` of object `ego`, which is kept" in [
+        each.message for each in report.told
     ]
 
 
