@@ -2,7 +2,8 @@
 
 The text is in the dialect that dReal, z3 and cvc5 share, with dReal's names for functions beyond it. Parts that are
 used more than once are defined once, so that the text is no longer than the graph. Where a quotient is undefined,
-SMT-LIB lets it be anything: a solver's model must be replayed, its "unsat" holds all the more.
+SMT-LIB lets it be anything: a solver's model must be replayed, its "unsat" holds all the more. Inverse trigonometric
+functions go out as relations, as dReal loses solutions of its own and others have none (`inverse_elimination`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from fractions import Fraction
 
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import Problem, Row, flatten
+from scenicq.smt.inverse_elimination import without_inverses
 
 __all__ = ["read_reply", "to_smtlib"]
 
@@ -91,6 +93,7 @@ def to_smtlib(problem: Problem, precision: float) -> str:
         problem: The problem.
         precision: The δ of delta-complete solvers; others ignore it.
     """
+    problem = without_inverses(problem)
     rows = flatten(problem.constraint)
     names = _symbols(variable.name for variable in problem.variables)
     lines = ["(set-option :produce-models true)", "(set-logic QF_NRA)", f"(set-info :precision {_decimal(precision)})"]
