@@ -8,6 +8,8 @@ import pytest
 
 from scenicq.match.options import MatchOptions
 from scenicq.query.execution import recording_starts
+from scenicq.store.classes import ROOT as ROOT_CLASS
+from scenicq.store.classes import ancestors, subclasses
 from scenicq.syntax.parser import MAX_CHARACTERS
 from scenicq_cli.main import COMMANDS, cli
 
@@ -60,14 +62,36 @@ def _reference():
     return "\n".join(parts)
 
 
-def test_the_reference_in_the_readme_is_what_help_says(request):
-    start, end = "<!-- commands: `make golden` writes this -->\n", "<!-- end of commands -->"
-    before, _, rest = README.partition(start)
-    shown, _, after = rest.partition(end)
+def _class_tree():
+    """Each class that has others below it, with these."""
+    lines = []
+    for name in subclasses(ROOT_CLASS):
+        below = [each for each in subclasses(name)[1:] if ancestors(each)[1] == name]
+        if below:
+            lines.append(f"- `{name}`: {', '.join(f'`{each}`' for each in below)}")
+    return "\n".join([*lines, ""])
+
+
+@pytest.mark.parametrize(
+    ("page", "start", "end", "written"),
+    [
+        ("README.md", "<!-- commands: `make golden` writes this -->\n", "<!-- end of commands -->", _reference),
+        (
+            "tests/language/world-model.md",
+            "<!-- classes: `make golden` writes this -->\n",
+            "<!-- end of classes -->",
+            _class_tree,
+        ),
+    ],
+)
+def test_what_pages_have_from_the_code_is_so(page, start, end, written, request):
+    before, _, rest = (ROOT / page).read_text(encoding="utf-8").partition(start)
+    shown, found, after = rest.partition(end)
+    assert found
     if request.config.getoption("--update-golden"):
-        shown = _reference()
-        (ROOT / "README.md").write_text(f"{before}{start}{shown}{end}{after}", encoding="utf-8")
-    assert shown == _reference(), "`make golden` writes it again"
+        shown = written()
+        (ROOT / page).write_text(f"{before}{start}{shown}{end}{after}", encoding="utf-8")
+    assert shown == written(), "`make golden` writes it again"
 
 
 def test_help_fits_a_page_and_has_every_section():
@@ -86,7 +110,7 @@ def test_help_fits_a_page_and_has_every_section():
 @pytest.mark.parametrize(
     ("sentence", "limit"),
     [
-        ("Of one frame {:,} correspondences are told", MatchOptions().correspondences),
+        ("At most {:,} correspondences are reported per frame", MatchOptions().correspondences),
         ("an interval may begin in {:,} ways a recording", recording_starts._MOST_STARTS),
         ("it has {:,} characters", MAX_CHARACTERS),
     ],
