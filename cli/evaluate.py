@@ -66,7 +66,7 @@ _EXTENSIONS = {".json": "json"}
 @click.option("--simulated", metavar="FILE", type=click.Path(path_type=Path),
               help="Simulated runs to set beside it: CSV with `scenario` (the name of a results file) and `failed` or "
               "`score` (the share missed, 0 to 1).")
-@click.option("--seed", metavar="N", type=click.IntRange(0), default=0, help="Of the resamples.")
+@click.option("--seed", metavar="N", type=click.IntRange(0), default=0, help="Seed of the resamples.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(_FORMATS),
               help="table, json, csv or parquet.  [default: by the extension of FILE, else table]")
 @click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write to a file.")

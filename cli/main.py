@@ -55,7 +55,7 @@ NOTHING, ERROR, INTERRUPTED = 1, 2, 130
 _NO_ROOM = {errno.ENOSPC, errno.EFBIG, errno.EIO, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
 INTERRUPTS = Interrupts()
-"""Of this process."""
+"""The interrupts of this process."""
 
 
 class Commands(click.Group):

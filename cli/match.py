@@ -144,7 +144,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--min-duration", metavar="S", type=click.FloatRange(0), help="Find intervals of at least S seconds: of "
               "a program about one instant, those in which every frame matches with the same objects.")
 @click.option("--intervals", type=click.Choice(["longest", "all"]), default="longest",
-              help="Of intervals that overlap the longest, or all of them.")
+              help="Report the longest of overlapping intervals, or all of them.")
 @click.option("--gap", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULT_GAP_S,
               help="An object that has no label for longer than this is another one afterwards.")
 @click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")

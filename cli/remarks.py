@@ -42,7 +42,7 @@ def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagn
 def show_remarks(query: Query, unseen: Iterable[Diagnostic], found: Sequence[Diagnostic]) -> None:
     """Print on standard error what is never compared or lacking, and a line for each thing that cannot be meant.
 
-    Of a program that is no file all is said at once.
+    All is said at once of a program that is no file.
 
     Args:
         query: The query.

@@ -21,7 +21,7 @@ __all__ = ["main"]
 
 _ERROR, _INTERRUPTED = 2, 130
 _ARENA_MAX = -8
-"""Of `mallopt`."""
+"""The number of a parameter of `mallopt`."""
 _LEAST_GB = 2
 """With less, libraries end the process by themselves while they load, and choose exit code 1."""
 

@@ -18,7 +18,7 @@ __all__ = ["Table", "TextStream", "fitted"]
 _INTERVAL_HEAD = ("RECORDING", "START", "SECONDS", "VERDICT", "OBJECTS", "FRAMES")
 _HEAD = ("FRAME", "RECORDING", "TIME", "VERDICT", "OBJECTS", "SENSOR")
 _VERDICT, _OBJECTS, _LAST = 3, 4, 5
-"""Of either table; of the last column, that of frames names sensors, and that of intervals frames."""
+"""Columns of either table; the last names sensors of a frame, or frames of an interval."""
 _BLOCK = 100
 """Rows that are aligned together."""
 _COLOURS = {"match": "green", "unknown": "yellow"}

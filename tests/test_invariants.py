@@ -151,6 +151,11 @@ def test_the_core_knows_no_dataset():
             assert not DATASETS.search(file.read_text()), named(file)
 
 
+def test_no_sentence_begins_with_of():
+    for file in FILES:
+        assert not re.search(r'"Of |[.;] Of [a-z`]', file.read_text()), named(file)
+
+
 def test_the_matcher_is_a_page():
     assert len((LIBRARY / "match" / "matcher.py").read_text().splitlines()) <= MOST_LINES
 

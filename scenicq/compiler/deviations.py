@@ -31,7 +31,7 @@ def leaves_the_plane(name: str, value: ModelValue) -> bool:
 def deviation(name: str, value: ModelValue, span: Span | None) -> ModelValue:
     """The one number in the plane that `(1, 1, 0)` of a position, or `(5 deg, 0, 0)` of an orientation, stands for.
 
-    Of `viewAngles` it is the first: the second one is the height of what is seen.
+    For `viewAngles` it is the first: the second one is the height of what is seen.
 
     Raises:
         ScenarioError: unsupported-construct, for different deviations along the axes, or out of the plane; wrong-type.

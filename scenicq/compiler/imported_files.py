@@ -13,8 +13,8 @@ from scenicq.syntax.walk import walk
 __all__ = ["ImportedFiles", "Loader", "ModuleFile", "absolute", "packages"]
 
 Loader = Callable[[str], Source | None]
-"""Gives the text of a file of the program's folder, by its path there; None if there is none. Of a folder, whose path
-ends with `/`, the text is empty."""
+"""Gives the text of a file of the program's folder, by its path there; None if there is none. The text of a
+folder, whose path ends with `/`, is empty."""
 
 _OWN = frozenset({"math", "scenic"})
 """Packages that no file stands in for."""

@@ -142,7 +142,7 @@ def evaluate(
         least_score: Score from which a prediction counts, but for average precision; all by default.
         missing: What a frame without predictions is: an error, a frame in which nothing was found, or left out.
         simulated: A CSV file of simulated runs; see `read_simulated`.
-        seed: Of the resamples: the same figures come from the same seed.
+        seed: Seed of the resamples: the same figures come from the same seed.
 
     Raises:
         DataError: A file cannot be read or does not fit the others; option-invalid for another distance, or a score

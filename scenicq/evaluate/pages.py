@@ -202,7 +202,7 @@ class _Pages:
         ]  # fmt: skip
 
     def _kind(self, each: ScenarioEvaluation, number: int) -> str:
-        """Of a label object, for the style."""
+        """The style of a label object."""
         counts = self._evaluation.detection.object_class[number] >= 0
         kind = "missed" if each.missed[number] else "found" if counts else "uncounted"
         return f"{kind} {_ASKED}" if each.mine[number] else kind

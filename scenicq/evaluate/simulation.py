@@ -47,7 +47,7 @@ def read_simulated(path: Path, seed: int = 0) -> Mapping[str, Share]:
     Args:
         path: With the columns `scenario`, and `failed` (1 or 0, true or false) or `score` (the share missed in that
             run, from 0 to 1).
-        seed: Of the resamples.
+        seed: Seed of the resamples.
 
     Raises:
         DataError: file-missing or file-invalid.

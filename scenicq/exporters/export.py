@@ -89,7 +89,7 @@ class Exporter:
     def add(self, result: Result) -> None:
         """Take a result; those that are no match are passed over, of several of one frame the first counts.
 
-        Of an interval all frames are taken, with the label objects that have the tracks of the roles there.
+        All frames of an interval are taken, with the label objects that have the tracks of the roles there.
         """
         if isinstance(result.verdict, Match) and result.interval is not None:
             for label, roles in frames_of(self.dataset, result):

@@ -99,7 +99,7 @@ def postorder(roots: Iterable[Node], *, beyond: Container[int] = ()) -> Iterator
 def transform(root: Node, step: Callable[[Node], Node], memo: dict[int, Node] | None = None) -> Node:
     """Rebuild an expression bottom-up, applying `step` to each node over its transformed children.
 
-    Of a choice whose index has become known, or one of a few known numbers, only the options in question are visited.
+    Only the options in question are visited where the index of a choice is known, or one of a few known numbers.
 
     Args:
         root: The expression.

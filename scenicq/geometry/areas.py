@@ -31,7 +31,7 @@ from scenicq.geometry.shapes import Bounds, Shape
 __all__ = ["area"]
 
 _CORNERS = 256
-"""Of the polygon that stands for a whole disc."""
+"""Corners of the polygon that stands for a whole disc."""
 
 
 def area(region: Region) -> float | None:

@@ -60,7 +60,7 @@ class Within:
 Guard: TypeAlias = Nearer | Off | Within
 
 HalfPlane: TypeAlias = tuple[float, float, float]
-"""Of a, b and c the points with a x + b y <= c, in metres."""
+"""The points with a x + b y <= c, from a, b and c, in metres."""
 
 
 def segment_distances(xy: NDArray[np.float64], segments: Segments) -> NDArray[np.float64]:

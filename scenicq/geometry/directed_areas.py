@@ -26,7 +26,7 @@ TIE = 1e-9
 ONE_HEADING = 1e-6
 """Radians by which a heading that was worked with may be off."""
 _DIGITS = 9
-"""Of a radian, to which headings are one."""
+"""Digits of a radian to which headings are one."""
 
 AreaPairs: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
 """Numbers of places and of the areas that belong to them, shapes (n,)."""
@@ -175,12 +175,12 @@ class DirectedAreas:
 
     @cached_property
     def _cells_of(self) -> dict[tuple[int, int], list[FieldCell]]:
-        """Of each area and segment that were asked for."""
+        """The cells of each area and segment that were asked for."""
         return {}
 
     @cached_property
     def _outlines(self) -> dict[int, list[Outline]]:
-        """Of each area that was asked for the convex pieces."""
+        """The convex pieces of each area that was asked for."""
         return {}
 
     def cells(self, area: int, bounds: Bounds, heading: float | None) -> Iterator[FieldCell]:

@@ -86,7 +86,7 @@ class OffLanes:
 
     @cached_property
     def _covered(self) -> dict[Bounds, bool]:
-        """Of each box of the grid that was asked for, whether areas cover it."""
+        """Whether areas cover each box of the grid that was asked for."""
         return {}
 
     def _is_covered(self, west: float, south: float, east: float, north: float) -> bool:

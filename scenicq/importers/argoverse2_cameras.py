@@ -65,7 +65,7 @@ def views_of(log: Path, times: Sequence[int], images: Images, report: Report) ->
 
 
 def nearest(images: list[tuple[int, str]], time: int) -> tuple[int, str]:
-    """Of the images of a camera the one nearest to a time."""
+    """The image of a camera that is nearest to a time."""
     after = bisect_left(images, (time, ""))
     return min(images[max(0, after - 1) : after + 1], key=lambda image: abs(image[0] - time))
 

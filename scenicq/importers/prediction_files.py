@@ -33,7 +33,7 @@ _Number = float | None
 """Null, or NaN as some programs write it, is checked with the other numbers, and told with the frame."""
 
 _compute: Any = import_module("pyarrow.compute")
-"""Of which no stubs know the functions."""
+"""A module whose functions no stubs know."""
 
 _HINT = (
     "known are nuScenes detection results (.json), Argoverse 2 detections (.feather), and labels of the interchange "

@@ -60,7 +60,7 @@ def sheet_section(tiles: Sequence[str], runs: int) -> str:
     """
     if not tiles:
         return ""
-    told = "Of each run the frame in which its objects are nearest to the ego."
+    told = "Each run is shown by the frame in which its objects are nearest to the ego."
     if runs > len(tiles):
         told += f" {runs - len(tiles):,} more runs are below."
     return element(

@@ -42,7 +42,7 @@ class RememberingSolver:
 
     @property
     def name(self) -> str:
-        """Of the solver that decides."""
+        """The name of the solver that decides."""
         return self._solver.name
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:

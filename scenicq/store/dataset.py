@@ -178,7 +178,7 @@ class Dataset:
     def labels(self, frames: Iterable[str] | None = None) -> Iterator[Label]:
         """Labels in order of recording, time and frame, read in batches: memory does not grow with the dataset.
 
-        Of chosen frames only the row groups that hold them are read, each once.
+        For chosen frames only the row groups that hold them are read, each once.
 
         Args:
             frames: Only these frames; names that the dataset lacks are ignored. All by default.

@@ -53,7 +53,7 @@ class MapIndex:
     def lanes(self, xy: NDArray[np.float64], near: Memberships) -> NDArray[np.int64]:
         """The number of the lane that contains each position, -1 for none, shape (n,).
 
-        Of several, as in intersections, it is that with the nearest centreline.
+        Where there are several, as in intersections, it is that with the nearest centreline.
         """
         chosen = (near.distance == 0) & self._is_lane[near.feature] if len(self._features) else np.zeros(0, dtype=bool)
         point, feature = near.point[chosen], near.feature[chosen]

@@ -21,7 +21,7 @@ _OWNERS = MappingProxyType({"ego": ("labels", "ego_"), "objects": ("objects", ""
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """Of how many egos or label objects a quantity is known.
+    """For how many egos or label objects a quantity is known.
 
     Attributes:
         own: From the label itself.

@@ -202,7 +202,7 @@ def _objects(columns: list[list[Any]], table: ArrowTable, prefix: str) -> list[L
 def _values(table: ArrowTable, name: str) -> list[Any]:
     """A column as Python values: null becomes None, JSON what it says; equal JSON texts share one value.
 
-    Of a column that was not read all is null.
+    A column that was not read is null everywhere.
     """
     is_json = name.endswith(("attributes", "params"))
     if name not in table.column_names:

@@ -39,7 +39,7 @@ _BLOCK = 1 << 24
 _PATIENCE_S = 60
 """Seconds that a request may take, with all that is tried again."""
 _SCHEME = "scenicq"
-"""Of addresses in SQL, whatever the real ones are."""
+"""The scheme of addresses in SQL, whatever the real ones are."""
 _INSTALL = {
     "s3": "`pip install 'scenicq[s3]'` adds it",
     "gs": "`pip install 'scenicq[s3]' gcsfs` adds it",

@@ -27,7 +27,7 @@ __all__ = ["Bound", "check_claims", "decoded_bytes", "feather_batches", "text_co
 _LEAST, _MOST_TIMES = 1 << 28, 200
 """Bytes that a packed file may always unpack to, and how many times its size beyond; labels pack to a tenth."""
 _VALUE_BYTES = 32
-"""Of a value once it is an object of Python, beside the characters of a text."""
+"""Bytes of a value once it is an object of Python, beside the characters of a text."""
 _MAGIC = b"ARROW1\0\0"
 _DICTIONARY_BATCH, _RECORD_BATCH = 2, 3
 

@@ -29,7 +29,7 @@ from scenicq.store.value_rules import TEXT_KEYS, is_json, longest_text, plain_ob
 __all__ = ["check_table", "invalid", "read_sound"]
 
 _MOST_BYTES = 1 << 32
-"""Of one file, decoded. A segment has a quarter of that at most, unless a recording is very long."""
+"""Bytes of one file, decoded. A segment has a quarter of that at most, unless a recording is very long."""
 _NOT_NEGATIVE = frozenset({"object_count", "first_object", "sensor_count", "first_sensor", "ordinal"})
 
 

@@ -244,7 +244,7 @@ class DatasetWriter:
         self._open = None
 
     def _hashes(self) -> NDArray[np.uint64]:
-        """Of the frames of all segments, in order; kept, as most datasets are asked for them twice."""
+        """The hash of the frames of all segments, in order; kept, as most datasets are asked for it twice."""
         segments = self.segments
         if self._hashed[0] != segments:
             numbers = sorted(self._segments)

@@ -43,7 +43,7 @@ _TOTAL = {
 }  # fmt: skip
 """Operations that have a value for all numbers."""
 _LARGEST_EXPONENT = 709.0
-"""Of e, to which it has a finite value."""
+"""The largest whole exponent to which e has a finite value."""
 _NEVER, _ALWAYS = Constant(False), Constant(True)
 
 

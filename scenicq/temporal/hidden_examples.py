@@ -2,7 +2,7 @@
 
 The matcher gives one example of values with which the label at the start matches. With it every condition has a value
 at every sample. The matcher is asked for bounds of the numbers and points among them that do not change over time;
-where these tell what a condition is (`enclosures`), it is certain. Of the others the matcher is asked for values with
+where these tell what a condition is (`enclosures`), it is certain. For the others the matcher is asked for values with
 which some turn out otherwise, many at once, then fewer. What no values turn is certain, however the variables come out.
 What some turn is assumed to hold and not to hold, one after the other from the first sample on, where the matcher has
 an example of all that is assumed, until the run is decided: so all that can become of it is found, each with values
@@ -62,7 +62,7 @@ _REACHES = (1.0, 4.0, 16.0)
 _CLOSE = 1 / 8
 """The part of the way to the examples that bounds are away from them, where nearer ones are looked for."""
 _SHARE = 0.2
-"""Of the time for one start, that one question about bounds may take."""
+"""The share of the time for one start that one question about bounds may take."""
 
 _Place = tuple[int, int]
 """The number of a condition and a sample."""

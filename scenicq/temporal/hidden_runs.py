@@ -242,7 +242,7 @@ class HiddenRuns:
 
 
 def _one_each(matches: Sequence[tuple[Run, *_Rest]], *, every: bool) -> list[tuple[Run, *_Rest]]:
-    """Of matches of one start, the longest first, one for each end, or the first alone."""
+    """The matches of one start, the longest first, one for each end, or the first alone."""
     found = {each[0].end: each for each in reversed(matches)}
     ordered = sorted(found.values(), key=lambda each: -each[0].end)
     return ordered if every else ordered[:1]

@@ -8,7 +8,7 @@ from typing import Literal
 __all__ = ["DEFAULT_GAP_S", "IntervalOptions", "Intervals"]
 
 Intervals = Literal["longest", "all"]
-"""Of overlapping intervals the longest, the earliest of equals; or all."""
+"""Which overlapping intervals are told: the longest, the earliest of equals; or all."""
 
 DEFAULT_GAP_S = 1.5
 """Seconds without a label after which a track's life ends."""

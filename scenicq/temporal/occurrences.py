@@ -44,7 +44,7 @@ class FormulaPart:
     """A formula without operators of time, and where it must hold.
 
     Attributes:
-        kind: Where: here; at all samples; at one; at the next; at the next, if there is one. Of `UNTIL` the formula
+        kind: Where: here; at all samples; at one; at the next; at the next, if there is one. For `UNTIL` the formula
             holds at one sample, and `before` at all before that; `NOT_UNTIL` is its negation.
         formula: The formula; negated if not `positive`.
         positive: See there.

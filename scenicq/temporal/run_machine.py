@@ -23,7 +23,7 @@ _MOST_WAYS = 1024
 _MOST_MODES = 256
 """In which one run may be at once."""
 _MOST_SITUATIONS = 20_000
-"""Of one program."""
+"""Situations of one program."""
 
 _OVER, _REJECTED = (-1, 0), (-2, 0)
 """A monitor that says nothing any more, and one that has rejected the run."""

@@ -45,7 +45,7 @@ class Observed(Protocol):
     def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
         """The values of a property of an object, nan where there is none: one column, or two of a vector.
 
-        Of what is no number, a list with None where there is none; None if no sample has it.
+        A list with None where there is none, for what is no number; None if no sample has it.
         """
         ...
 

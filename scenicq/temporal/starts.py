@@ -290,7 +290,7 @@ class StartSearch:
     def _in_closed_form(
         self, block: TrackBlock, members: Mapping[int, Members], size: int
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], dict[int, Members]]:
-        """Of each choice of label objects, whether it surely matches and whether it surely does not.
+        """Whether each choice of label objects surely matches, and whether it surely does not.
 
         Interchangeable objects are given back in the order of their tracks.
         """

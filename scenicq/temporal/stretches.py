@@ -44,7 +44,7 @@ class StartTable:
 
     @property
     def labels(self) -> Members:
-        """Of each start, its label."""
+        """The label of each start."""
         return self.block.label_of[next(iter(self.members.values()))]
 
     def chosen(self, which: NDArray[np.int64]) -> StartTable:

@@ -40,9 +40,9 @@ _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 T = TypeVar("T")
 Values: TypeAlias = "Value | FloatColumn | list[Value]"
-"""Of many labels: one each, or the one that all have."""
+"""Values of many labels: one each, or the one that all have."""
 RowTruth: TypeAlias = "bool | Sequence[bool]"
-"""Of many labels likewise."""
+"""Truth for many labels likewise."""
 
 
 @dataclass(slots=True, eq=False)

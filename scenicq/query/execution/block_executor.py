@@ -27,8 +27,8 @@ _TRIES = 3
 class BlockExecutor:
     """Decides blocks, in order whoever does it; a context manager.
 
-    A process that dies costs nothing but its block's time. Of a block that kills every process which takes it, the
-    frames that do so are found by halving, and are unknown.
+    A process that dies costs nothing but its block's time. Where a block kills every process which takes it,
+    halving finds the frames that do so, and they are unknown.
     """
 
     def __init__(

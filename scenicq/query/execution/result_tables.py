@@ -5,7 +5,7 @@ witness          map      place of a random variable -> its numbers: one, or the
 cause            struct   what, detail, place, reason; null in a match
 sensors          map      channel -> path
 
-Of intervals, `frames` is a struct of the first and the last frame and how many there are.
+For intervals, `frames` is a struct of the first and the last frame and how many there are.
 """
 
 # pyarrow has no type stubs.

@@ -4,7 +4,7 @@ A part of a tolerance (of positions, headings, speeds ...) is *widened by s metr
 times 20 degrees (the ratio of the query paper's experiments, 0.25 m and 5 degrees), any other number by s of its own
 unit. A frame's distance from matching is the least s by which all parts must be widened together: what matches at one s
 matches at every larger one, and bisection finds it. It is the least *widest* part of any tolerance under which the
-frame matches. Of what is advised, each part is then made as small as it can be; and each part that is enough alone is
+frame matches. Each part of the advice is then made as small as it can be; and each part that is enough alone is
 named with what it needs.
 """
 

@@ -6,7 +6,7 @@ necessary condition do not match, those with objects that meet the sufficient on
 matcher is asked.
 
 A condition is read off a group in which one constraint at most hangs on what its random variables come out as; the
-others must hold whatever that is. Of that one constraint the values that it allows must be known exactly: a point of a
+others must hold whatever that is. The values that this one constraint allows must be known exactly: a point of a
 region, or sums of ranges and choices, each used once. Whatever the columns lack is never proved.
 """
 
