@@ -3,6 +3,7 @@
 import contextlib
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -28,9 +29,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write golden files instead of comparing with them")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What is slow is slower still on a busy machine: only what hangs is to be stopped."""
+    """Share out the cases of `one_in`. What is slow is slower still on a busy machine: only what hangs is stopped."""
+    cases: Counter[str] = Counter()
     for item in items:
+        sampled = item.get_closest_marker("one_in")
+        if sampled is not None:
+            name = item.nodeid.partition("[")[0]
+            if cases[name] % sampled.args[0]:
+                item.add_marker(pytest.mark.slow)
+            cases[name] += 1
         if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(_HANGS_S))
 

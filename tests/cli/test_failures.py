@@ -149,6 +149,7 @@ def test_two_gigabytes_of_address_space_are_enough(way, command, crossroads, tmp
 @pytest.mark.parametrize(("limit", "most", "letter"), [
     ("RLIMIT_NPROC", 1, "u"), ("RLIMIT_NPROC", 4, "u"), ("RLIMIT_NPROC", 8, "u"), ("RLIMIT_NOFILE", 8, "n"),
 ])  # fmt: skip
+@pytest.mark.one_in(4)
 def test_what_runs_out_is_named_with_its_limit(limit, most, letter, way, command, crossroads):
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import itertools
 import json
 import os
 import re
@@ -121,14 +122,8 @@ def test_nor_does_one_in_a_process_of_somebody_else(program, crossroads):
     assert all("/" in frame for frame in frames)
 
 
-@pytest.mark.parametrize(
-    ("engine", "form"),
-    [
-        pytest.param(engine, form, marks=[pytest.mark.slow] if engine == "dask" and form != "parquet" else [])
-        for engine in ENGINES
-        for form in FORMATS
-    ],
-)
+@pytest.mark.parametrize(("engine", "form"), itertools.product(ENGINES, FORMATS))
+@pytest.mark.one_in(len(FORMATS) + 1)
 def test_results_are_the_same_bytes_where_libraries_print(engine, form, command, program, crossroads, quiet, noisy):
     if engine == "dask":
         pytest.importorskip("distributed")
@@ -166,6 +161,7 @@ COMMANDS = {
 
 
 @pytest.mark.timeout(1200)
+@pytest.mark.slow
 def test_every_command_prints_its_results_alone(command, program, crossroads, noisy, tmp_path):
     env, _ = noisy
     named = {"PROGRAM": program, "DATASET": crossroads, "SOURCE": SAMPLES / "crossroads"}
@@ -239,16 +235,6 @@ def outcome_with(stream, kind, words, folder):
     return done.returncode, done.stdout, None if done.stderr is None else done.stderr.decode()
 
 
-def cases():
-    """Each command with each odd stream; a few of them, each command and stream among them, are not slow."""
-    found = []
-    for number, what in enumerate(ALL_COMMANDS):
-        for place, (stream, kind) in enumerate(ODD):
-            marks = [] if place == number % len(ODD) else [pytest.mark.slow]
-            found.append(pytest.param(what, stream, kind, marks=marks))
-    return found
-
-
 def contents(folder):
     return sorted(str(each.relative_to(folder)) for each in folder.rglob("*"))
 
@@ -283,7 +269,8 @@ def usual(command, program, crossroads, tmp_path_factory):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize(("what", "stream", "kind"), cases())
+@pytest.mark.parametrize(("what", "stream", "kind"), [(what, *odd) for what in ALL_COMMANDS for odd in ODD])
+@pytest.mark.one_in(2 * len(ODD) + 1)
 def test_an_odd_stream_is_told_or_makes_no_difference(what, stream, kind, usual, tmp_path):
     start, words, run = usual
     code, data, told, files = run(what)

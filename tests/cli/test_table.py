@@ -189,6 +189,7 @@ def on_a_terminal(width, *words):
     ],
     ids=lambda value: value.stem if isinstance(value, Path) else None,
 )
+@pytest.mark.one_in(4)
 def test_uuids_fit_a_terminal(command, named_by_uuids, program, width, head):
     """With the installed command: no line is wider, every row is shown, and its names are found again."""
     lines = on_a_terminal(width, command, "match", program, named_by_uuids, "--near", "3")

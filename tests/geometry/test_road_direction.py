@@ -74,6 +74,7 @@ def test_values_agree_with_the_definition(field: RoadDirection, places: list[tup
         assert all(-math.pi < heading <= math.pi for heading in found)
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(fields(), st.integers(0, 2**32))
 def test_cells_cover_the_field(field: RoadDirection, seed: int) -> None:

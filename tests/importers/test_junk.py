@@ -52,6 +52,7 @@ def check_messages(error: DataError) -> None:
     assert all(diagnostic.message for diagnostic in error.diagnostics)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 @given(name=st.sampled_from(LINES * 3 + TABLES), draw=st.data())
 def test_junk_in_one_place(tmp_path: Path, name: str, draw: st.DataObject) -> None:
