@@ -41,6 +41,9 @@ def computed(run: Runner, node: ast.Expression, scope: Environment, compute: Cal
         try:
             value: ModelValue = compute()
         except NothingLeftError as error:
+            # Scenic refuses `Uniform()` where it stands: it is given nothing, whatever a scene has
+            if any(isinstance(each, ast.Call) and not each.arguments for each in walk(node)):
+                raise
             value = _Nothing(error)
     run.excluded.keep(value, found)
     return value

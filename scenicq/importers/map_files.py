@@ -46,7 +46,7 @@ def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict
         kept[name] = tuple(feature for feature in features if feature.id not in unsound)
         if not features:
             message = f"map `{name}` has no elements; its labels are kept without a road network"
-            report.kept("map", "map-missing", message, name=name)
+            report.assumed("map", "no elements", message)
         for kind, count in Counter(feature.kind for feature in kept[name]).items():
             if kind not in KNOWN_KINDS and region_name(kind) is None:
                 report.not_read(f"map elements of the kind `{kind}`, which no program can name", count)

@@ -22,7 +22,10 @@ def write(folder: Path, step_us: int, crs: str | None = None) -> Path:
         for n in range(5)
     ]  # fmt: skip
     (folder / "labels.jsonl").write_text("\n".join(map(json.dumps, rows)))
-    content: dict[str, Any] = {"type": "FeatureCollection", "features": []}
+    ring = [[-9, -9], [9, -9], [9, 9], [-9, -9]]
+    shape = {"type": "Polygon", "coordinates": [ring]}
+    features = [{"type": "Feature", "geometry": shape, "properties": {"id": "1", "kind": "drivable"}}]
+    content: dict[str, Any] = {"type": "FeatureCollection", "features": features}
     if crs is not None:
         content["crs"] = {"type": "name", "properties": {"name": crs}}
     (folder / "maps" / "m.geojson").write_text(json.dumps(content))
