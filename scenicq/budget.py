@@ -3,6 +3,9 @@
 Whoever decides labels says how long one may take (`limited`). Loops that can be long, in whatever folder, look at the
 clock (`look`), and what waits for a solver gives it what is left (`waiting`). Without a limit nothing is ever too long.
 
+What may be in vain has a share of its own (`Trials`): how often it may try, counted, so that all that one label asks
+for together costs little beside what decides it.
+
 Work is counted in processor seconds, our own as that of a worker process, so that a busy machine changes no verdict. A
 solver that is a command of somebody else is counted by the wall.
 """
@@ -16,7 +19,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar, Token
 from dataclasses import dataclass
 
-__all__ = ["TimeIsUp", "clock", "leave_out", "limited", "look", "uncounted", "waiting"]
+__all__ = ["TimeIsUp", "Trials", "clock", "leave_out", "limited", "look", "trials_left", "uncounted", "waiting"]
 
 
 class TimeIsUp(Exception):
@@ -97,6 +100,36 @@ def look() -> None:
     if left < 0:
         raise TimeIsUp
     limit.not_before = time.perf_counter() + left
+
+
+@dataclass(slots=True)
+class Trials:
+    """How often all that looks for something within the block may try in vain.
+
+    Attributes:
+        left: How often still.
+    """
+
+    left: float = math.inf
+    _token: Token[Trials | None] | None = None
+
+    def __enter__(self) -> Trials:
+        """Have what is in the block count on these."""
+        self._token = _TRIALS.set(self)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Go back to those of the block around."""
+        if self._token is not None:
+            _TRIALS.reset(self._token)
+
+
+_TRIALS: ContextVar[Trials | None] = ContextVar("_TRIALS", default=None)
+
+
+def trials_left() -> Trials:
+    """The trials of the block around; endless ones where there is none."""
+    return _TRIALS.get() or Trials()
 
 
 @contextmanager

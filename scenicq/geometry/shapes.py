@@ -240,6 +240,11 @@ def nearest_point(shape: Shape, x: float, y: float) -> XY:
     return float(coordinates[0, 0]), float(coordinates[0, 1])
 
 
+def nearest_of(geometries: NDArray[Any], others: NDArray[Any]) -> Coordinates:
+    """The points of non-empty shapes that are nearest to other ones, pair by pair, (n, 2)."""
+    return shapely.get_coordinates(shapely.shortest_line(geometries, others))[::2]
+
+
 def inner_point(shape: Shape) -> XY:
     """A point of a non-empty shape, inside where it has an inside."""
     found = shapely.get_coordinates(shapely.point_on_surface(shape))

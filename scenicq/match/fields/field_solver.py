@@ -20,8 +20,8 @@ from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_o
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.heading_propagation import LimitError, bisected, directed, propagated
-from scenicq.match.fields.probing import MUCH, probed
 from scenicq.match.fields.shared_variable import find_shared_value, joined
+from scenicq.match.fields.witness_search import THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import Tolerance
@@ -50,7 +50,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     start = BoxSet.start(ConstraintNetwork([item for part in parts for item in part], tolerance), {}).narrowed()
     if not start.size and len(parts) == 1:
         return Refuted(first)
-    witness = probed(start, tolerance) if start.size else None
+    witness = find_witness(start) if start.size else None
     if witness is not None:
         return witness
     if shared is None or len(parts) == 1:
@@ -69,7 +69,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
         # what a later part excludes of the shared number excludes ways of the earlier ones
         chosen = [_within(found, shared, limits) for found in chosen]
     except LimitError:
-        return Undecided(first, "nonlinear")
+        return _searched(start) or Undecided(first, "nonlinear")
     ways = [_ways(found, shared) for found in chosen]
     if not all(ways):
         return Refuted(first)
@@ -93,18 +93,29 @@ def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:
 def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
     """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
     todo: deque[HeadingAssignment] = deque()
-    doubt = Undecided(first, "nonlinear")
+    doubt, searched = Undecided(first, "nonlinear"), False
     try:
         for number, way in enumerate(_one_by_one(directed(start, _MANY_CASES))):
-            found = _tried(start, tolerance) if way is None else solved(way, tolerance)
+            found = _searched(start) if way is None else solved(way, tolerance)
+            searched = searched or way is None
             if isinstance(found, Satisfied):
                 return found
             if number == _MOST_WAYS:
-                return doubt
+                break
             if isinstance(found, Undecided) and way is not None:
                 todo.append(way)
+        else:
+            found = _halved(todo, first, tolerance)
+            if not isinstance(found, Undecided):
+                return found
     except LimitError:
-        return doubt
+        pass
+    return doubt if searched else _searched(start) or doubt
+
+
+def _halved(todo: deque[HeadingAssignment], first: Constraint, tolerance: Tolerance) -> Outcome:
+    """What comes of vague ways, divided."""
+    doubt = Undecided(first, "nonlinear")
     for _ in range(_MOST_HALVES):
         if not todo:
             return Refuted(first)
@@ -120,10 +131,10 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
     return doubt
 
 
-def _tried(start: BoxSet, tolerance: Tolerance) -> Satisfied | None:
+def _searched(start: BoxSet) -> Satisfied | None:
     """A witness of one part by more draws than at first."""
     narrowed = start.narrowed()
-    return probed(narrowed, tolerance, MUCH) if narrowed.size else None
+    return find_witness(narrowed, THOROUGH) if narrowed.size else None
 
 
 def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAssignment] | None:

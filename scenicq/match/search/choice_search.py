@@ -9,6 +9,7 @@ hidden place is a choice, too: that the place has the element is one more constr
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -20,10 +21,12 @@ from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     CompareOp,
     Constant,
+    DirectionAt,
     Identity,
     Node,
     Value,
 )
+from scenicq.forest.walk import postorder
 from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts
@@ -35,12 +38,15 @@ from scenicq.match.search.outcome_bounds import possible_outcomes
 from scenicq.match.search.outcome_tables import TooManyOutcomesError
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["decide_with_choices"]
+__all__ = ["Ask", "decide_with_choices"]
 
 _MOST_TRIES = 20_000
 """Outcomes of choices that are tried for one group of one label."""
 _DEEPEST = 16
 """Searches inside one another: of alternatives that are met only in what an alternative leads to."""
+
+_SEVERAL = 8
+"""Combinations of outcomes from which on a witness is looked for over all of them."""
 
 Decide = Callable[[list[Item]], Outcome]
 """Decides constraints that hold no choices."""
@@ -120,6 +126,9 @@ class _ChoiceSearch:
         excluded = self._narrow()
         if excluded is not None:
             return excluded
+        found = self._search_witness()
+        if found is not None:
+            return found
         values: dict[Identity, Value] = {}
         unsettled: Undecided | None = None
         for component in self.components:
@@ -139,6 +148,17 @@ class _ChoiceSearch:
         if self.doubt is not None:
             return self.doubt
         return Refuted(self.items[0][0]) if self.blamed is None else self.blamed[1]
+
+    def _search_witness(self) -> Satisfied | None:
+        """A witness over all outcomes together, where fields at hidden points make each of them costly to decide."""
+        if self.depth or math.prod(len(domain.rows) for domain in self.domains) < _SEVERAL:
+            return None
+        if not any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in self.items])):
+            return None
+        from scenicq.match.fields.witness_search import QUICK, search_witness  # noqa: PLC0415 - takes long to load
+
+        tables = [(domain.outcomes.variables, domain.outcomes.picks[domain.rows]) for domain in self.domains]
+        return search_witness(self.items, self.tolerance, QUICK, tables)
 
     # --- domains
 

@@ -10,21 +10,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from scenicq.budget import TimeIsUp, look
+from scenicq.budget import TimeIsUp, Trials, look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
-from scenicq.forest.nodes import Value
+from scenicq.forest.nodes import DirectionAt, Value
+from scenicq.forest.walk import postorder
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, condition_group
+from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.problem.radius import within_radius
-from scenicq.match.search.choice_search import decide_with_choices
+from scenicq.match.search.choice_search import Ask, decide_with_choices
 from scenicq.match.search.group_plan import GroupPlan
 
 __all__ = ["Asker", "GroupCache", "known_of", "surely", "translated"]
+
+
+_MOST_TRIALS = 400
+"""How often searches for witnesses may try in vain for one label: some seconds, a hundred draws or more at a time."""
 
 
 class Asker(Protocol):
@@ -44,12 +50,14 @@ class GroupCache:
         problem: The label and who may play whom.
         ask: The solver.
         lookups: What is known of the map.
+        trials: How often all searches for witnesses may try in vain.
     """
 
     options: MatchOptions
     problem: LabelProblem
     ask: Asker
     lookups: MapLookups
+    trials: Trials = field(default_factory=lambda: Trials(_MOST_TRIALS))
     _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
         default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
     )
@@ -90,19 +98,43 @@ class GroupCache:
     def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
         try:
             look()
-            items = self.items(group, assignment)
             if self.options.method == "smt":
-                return self.ask([items])
-            tolerance = self.options.tolerance
-            chosen = decide_with_choices(items, tolerance, lambda left: decide_decomposed(left, tolerance), self.ask)
-            if chosen is not None:
-                return chosen
-            outcome = decide_decomposed(items, tolerance)
-            return self.ask([items]) if isinstance(outcome, Undecided) else outcome
+                return self.ask([self.items(group, assignment)])
+            with self.trials:
+                likely = likely_group(group)
+                if likely is not None:
+                    found = self._decided(self.items(likely.group, assignment), self._searched)
+                    if isinstance(found, Satisfied):
+                        return likely.restored(found)
+                return self._decided(self.items(group, assignment), self._at_last)
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")
         except TimeIsUp:
             return Undecided(group.constraints[0], "timeout")
+
+    def _decided(self, items: list[Item], at_last: Ask) -> Outcome:
+        """What the cascade says of constraints, and where it says nothing, what is asked at last."""
+        tolerance = self.options.tolerance
+        chosen = decide_with_choices(items, tolerance, lambda left: decide_decomposed(left, tolerance), at_last)
+        if chosen is not None:
+            return chosen
+        outcome = decide_decomposed(items, tolerance)
+        return at_last([items]) if isinstance(outcome, Undecided) else outcome
+
+    def _searched(self, items: Sequence[Sequence[Item]]) -> Outcome:
+        """What a search for a witness finds; where fields are, there was one already."""
+        flat = [item for group in items for item in group]
+        doubt = Undecided(flat[0][0], "nonlinear")
+        if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in flat])):
+            return doubt
+        from scenicq.match.fields.witness_search import THOROUGH, search_witness  # noqa: PLC0415 - takes long to load
+
+        return search_witness(flat, self.options.tolerance, THOROUGH) or doubt
+
+    def _at_last(self, items: Sequence[Sequence[Item]]) -> Outcome:
+        """What nothing else decides: a search for a witness, then the solver."""
+        found = self._searched(items)
+        return found if isinstance(found, Satisfied) else self.ask(items)
 
 
 def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:

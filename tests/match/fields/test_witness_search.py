@@ -9,8 +9,8 @@ import pytest
 from hidden_roads import BEND, BENDS, ON_BEND
 from scenes import compiled, drawn, label_of
 
-from scenicq.match.fields import field_solver, heading_propagation
-from scenicq.match.fields.probing import LITTLE, MUCH
+from scenicq.match.fields import field_solver, heading_propagation, witness_search
+from scenicq.match.fields.witness_search import QUICK, THOROUGH
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, Tolerance
@@ -27,12 +27,13 @@ def found(monkeypatch):
     """What trials gave."""
     answers = []
 
-    def noted(start, tolerance, effort=LITTLE):
-        answers.append(probed(start, tolerance, effort))
+    def noted(start, effort=QUICK):
+        answers.append(search(start, effort))
         return answers[-1]
 
-    probed = field_solver.probed
-    monkeypatch.setattr(field_solver, "probed", noted)
+    search = field_solver.find_witness
+    monkeypatch.setattr(field_solver, "find_witness", noted)
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
     return answers
 
 
@@ -65,13 +66,18 @@ ON_LINES = {
 @pytest.mark.parametrize("name", ON_LINES)
 def test_trial_finds_most_witnesses(name, monkeypatch):
     text, tolerance, expected = ON_LINES[name]
-    probed, answers = field_solver.probed, []
+    answers = []
 
-    def noted(start, margins):
-        answers.append(probed(start, margins))
-        raise Tried
+    def noted(search):
+        def first(*given):
+            answers.append(search(*given))
+            raise Tried
 
-    monkeypatch.setattr(field_solver, "probed", noted)
+        return first
+
+    # over all outcomes of choices where there are some, else within the one that is left
+    monkeypatch.setattr(witness_search, "search_witness", noted(witness_search.search_witness))
+    monkeypatch.setattr(field_solver, "find_witness", noted(field_solver.find_witness))
     scenario = compiled(ON_BEND + text, BEND)
     matcher = Matcher(scenario, MatchOptions(tolerance=tolerance))
     for seed in range(20):
@@ -96,7 +102,8 @@ def test_with_and_without_trials_the_verdict_is_the_same(name, monkeypatch):
         ]
     options = MatchOptions(tolerance=EXACT)
     trying = [type(Matcher(scenario, options).match(label)) for label in labels]
-    monkeypatch.setattr(field_solver, "probed", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
     assert trying == [type(Matcher(scenario, options).match(label)) for label in labels]
     assert {Match, NoMatch} <= set(trying)
 
@@ -104,23 +111,24 @@ def test_with_and_without_trials_the_verdict_is_the_same(name, monkeypatch):
 def test_where_ways_are_many_more_draws_find_what_few_have_missed(monkeypatch):
     scenario = compiled(ON_BEND + AHEAD, BEND)
     matcher = Matcher(scenario, MatchOptions())
-    probed, propagated = field_solver.probed, heading_propagation.propagated
+    search, propagated = field_solver.find_witness, heading_propagation.propagated
     efforts, cases = [], []
     useful = [False, True]
 
-    def noted(start, tolerance, effort=LITTLE):
+    def noted(start, effort=QUICK):
         efforts.append(effort)
-        return probed(start, tolerance, effort) if effort is MUCH and useful[len(cases) - 1] else None
+        return search(start, effort) if effort is THOROUGH and useful[len(cases) - 1] else None
 
     def counted(some):
         cases[-1] += some.size
         return propagated(some)
 
-    monkeypatch.setattr(field_solver, "probed", noted)
+    monkeypatch.setattr(field_solver, "find_witness", noted)
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
     monkeypatch.setattr(heading_propagation, "propagated", counted)
     label = label_of(scenario, drawn(scenario, 1), random.Random(1))
     for _ in useful:
         cases.append(0)
         assert isinstance(matcher.match(label), Match)
-    assert efforts == [LITTLE, MUCH] * 2, "more draws are made once, and where cases were many"
+    assert efforts == [QUICK, THOROUGH] * 2, "more draws are made once, and where cases were many"
     assert 4 * cases[1] < cases[0], "a witness ends the search"

@@ -1,0 +1,192 @@
+"""Draws of the random variables of a group, evaluated side by side: what is missing of each, and where fields point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.budget import look
+from scenicq.forest.column_domain import ColumnDomain
+from scenicq.forest.columns import UNDEFINED, Column
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.interpret import OnMap, interpret, steps_of
+from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, Select
+from scenicq.forest.walk import children
+from scenicq.match.fields.contractor import BoxSet
+from scenicq.match.fields.hidden_values import HiddenValue
+from scenicq.match.fields.residuals import Residuals, residuals_of
+
+__all__ = ["Draws", "Trial", "TrialSpace"]
+
+_MOST_PLACES = 16_384
+"""Places at which the map is asked at once."""
+
+_Numbers = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class Draws:
+    """What is tried at once.
+
+    Attributes:
+        places: Coordinates of all random variables, (k, n).
+        shares: For each use of a field a share of one that tells which of several headings it has, (uses, n).
+    """
+
+    places: _Numbers
+    shares: _Numbers
+
+    def take(self, some: NDArray[np.intp]) -> Draws:
+        """Some of the draws, possibly several times."""
+        return Draws(self.places[:, some], self.shares[:, some])
+
+    def beside(self, other: Draws) -> Draws:
+        """These draws and others."""
+        return Draws(
+            np.concatenate([self.places, other.places], axis=1), np.concatenate([self.shares, other.shares], axis=1)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Draws with what they come out as.
+
+    Attributes:
+        draws: The draws, their coordinates within their ends.
+        residuals: What is missing of them.
+        headings: Where each use of a field points, (uses, n).
+    """
+
+    draws: Draws
+    residuals: Residuals
+    headings: _Numbers
+
+    def take(self, some: NDArray[np.intp]) -> Trial:
+        """Some of the draws."""
+        residuals = Residuals(self.residuals.each[:, some], self.residuals.missing[some])
+        return Trial(self.draws.take(some), residuals, self.headings[:, some])
+
+    def beside(self, other: Trial) -> Trial:
+        """These draws and others."""
+        mine, theirs = self.residuals, other.residuals
+        return Trial(
+            self.draws.beside(other.draws),
+            Residuals(np.concatenate([mine.each, theirs.each], axis=1), np.concatenate([mine.missing, theirs.missing])),
+            np.concatenate([self.headings, other.headings], axis=1),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Lazy(ColumnDomain):
+    """Values of draws, where fields are asked only in the draws in which they count.
+
+    Attributes:
+        wanted: In which, (n,), by the id of the use; the others in all.
+    """
+
+    wanted: Mapping[int, NDArray[np.bool_]] = field(default_factory=dict[int, "NDArray[np.bool_]"])
+
+    def on_map(self, node: OnMap, args: Sequence[Column]) -> Column:
+        """What a region or vector field says of points or of other regions."""
+        if id(node) in self.wanted:
+            status = np.where(self.wanted[id(node)], args[1].status, UNDEFINED)
+            args = (args[0], Column(args[1].data, status))
+        return ColumnDomain.on_map(self, node, args)
+
+
+class TrialSpace:
+    """What draws of one group are made of, and what they come out as.
+
+    Attributes:
+        network: The constraints.
+        hidden: The random variables.
+        low, high: Ends of all coordinates, (k, 1).
+        moving, whole: Which coordinates are numbers of any kind, and which whole ones.
+        fields: The uses of fields.
+    """
+
+    def __init__(self, start: BoxSet) -> None:
+        """Take the place of each random variable from a case."""
+        network = self.network = start.network
+        self.hidden: dict[Identity, HiddenValue] = {}
+        count = 0
+        for identity, leaf in network.leaves.items():
+            each = HiddenValue.within(leaf, count, start.ranges[identity][..., 0])
+            self.hidden[identity] = each
+            count = each.rows.stop
+        hidden = list(self.hidden.values())
+        self.low = np.concatenate([np.empty((0, 1)), *(each.low for each in hidden)])
+        self.high = np.concatenate([np.empty((0, 1)), *(each.high for each in hidden)])
+        rows = [(row, each.is_whole) for each in hidden for row in range(each.rows.start, each.rows.stop)]
+        self.moving = np.array([row for row, is_whole in rows if not is_whole], dtype=np.intp)
+        self.whole = np.array([row for row, is_whole in rows if is_whole], dtype=np.intp)
+        self._steps = steps_of(*(node for _, node, _ in network.items))
+        self.fields = [node for node, _ in self._steps if isinstance(node, DirectionAt)]
+        self._use = {id(node): number for number, node in enumerate(self.fields)}
+        self._only_below: dict[int, list[tuple[int, int]]] = {}
+        for select in [node for node, _ in self._steps if isinstance(node, Select)]:
+            if isinstance(select.index, Index) and any(not isinstance(option, Constant) for option in select.options):
+                row = self.hidden[select.index.identity].rows.start
+                for number in range(len(select.options)):
+                    for node in self._fields_below(select.index, number):
+                        if (row, number) not in (known := self._only_below.setdefault(node, [])):
+                            known.append((row, number))
+
+    def _fields_below(self, index: Index, number: int) -> list[int]:
+        """The uses of fields, by their ids, that count only where an option is chosen."""
+        todo: list[Node] = [node for _, node, _ in self.network.items]
+        seen: set[int] = set()
+        while todo:
+            node = todo.pop()
+            if id(node) not in seen:
+                seen.add(id(node))
+                below = children(node)
+                if isinstance(node, Select) and isinstance(node.index, Index) and node.index.identity is index.identity:
+                    below = below[: 1 + number] + below[2 + number :]
+                todo += below
+        return [node for node in self._use if node not in seen]
+
+    def run(self, draws: Draws) -> Trial:
+        """What draws come out as; their coordinates are cut to their ends.
+
+        Raises:
+            CannotEvaluate: Geometry cannot tell.
+        """
+        look()
+        count = draws.places.shape[1]
+        draws.places[self.whole] = np.clip(
+            np.round(draws.places[self.whole]), self.low[self.whole], self.high[self.whole]
+        )
+
+        def observed(node: Feature) -> Column:
+            raise CannotEvaluate(f"`{node.property}` is not observed")
+
+        def drawn(leaf: Leaf, args: Sequence[Column]) -> Column:
+            each = self.hidden[leaf.identity]
+            found = each.column(args, draws.places[each.rows])
+            data = found.data if isinstance(found.data, tuple) else (cast(_Numbers, found.data),)
+            held = np.stack([np.broadcast_to(axis, (count,)) for axis in data])
+            draws.places[each.rows] = np.where(np.isnan(held), draws.places[each.rows], held)
+            return found
+
+        def pick(node: DirectionAt, counts: NDArray[np.intp]) -> NDArray[np.intp]:
+            return (draws.shares[self._use[id(node)]] * counts).astype(np.intp)
+
+        with np.errstate(all="ignore"):
+            domain = _Lazy(observed, drawn, pick, _MOST_PLACES, wanted=self._wanted(draws.places))
+            known = interpret(self._steps, domain)
+            residuals = residuals_of(self.network.items, known, self.network.tolerance, count)
+        headings = [np.broadcast_to(cast(_Numbers, known[id(node)].data), (count,)) for node in self.fields]
+        return Trial(draws, residuals, np.stack([np.empty(count), *headings])[1:])
+
+    def _wanted(self, places: _Numbers) -> dict[int, NDArray[np.bool_]]:
+        """In which draws a field is asked for, (n,), by the id of its use, where choices leave it out in some."""
+        return {
+            node: reduce(np.logical_and, [places[row] == option for row, option in options])
+            for node, options in self._only_below.items()
+        }

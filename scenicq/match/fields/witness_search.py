@@ -1,0 +1,314 @@
+"""A witness by search: draws of the random variables, the best of which are led to what the label observes.
+
+A yes needs one witness, only a no needs the whole space. Draws lie where what is observed leaves the hidden variables,
+those of choices among the outcomes that are left. The best descend by damped Gauss-Newton steps on what is missing;
+fields point in each as in the draw that it came from. The next draws lie around the best (cross-entropy method) or
+anywhere. Every witness is replayed by plain evaluation. It refutes nothing; so all searches of one label have one
+budget (`scenicq.budget.Trials`), of which each may take a share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.budget import Trials, trials_left
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.nodes import Identity, Index, Leaf, PointIn, Value
+from scenicq.match.fields.constraint_network import ConstraintNetwork
+from scenicq.match.fields.contractor import BoxSet
+from scenicq.match.fields.damped_steps import damped_steps
+from scenicq.match.fields.trials import Draws, Trial, TrialSpace
+from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.evaluation import replay
+from scenicq.match.problem.outcome import Satisfied
+from scenicq.match.tolerance import SLACK, Tolerance
+
+__all__ = ["EXHAUSTIVE", "QUICK", "THOROUGH", "Effort", "OutcomeTable", "find_witness", "search_witness"]
+
+OutcomeTable = tuple[Sequence[object], NDArray[np.intp]]
+"""What choices may come out as: their identities, and by outcome which option each takes, -1 where none matters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much a search is worth.
+
+    Attributes:
+        draws: Values of each random variable that are tried at once.
+        best: How many of these descend, and have others drawn around them.
+        rounds: How often draws are made.
+        descents: Steps of each descent.
+        idle: Rounds in a row without progress of which the last is the last of a beginning.
+        starts: How often it begins, again only where little was missing.
+    """
+
+    draws: int
+    best: int
+    rounds: int
+    descents: int
+    idle: int
+    starts: int
+
+
+QUICK = Effort(96, 8, 6, 3, 1, 1)
+THOROUGH = Effort(384, 24, 4, 6, 2, 1)
+EXHAUSTIVE = Effort(384, 24, 24, 6, 3, 4)
+_CLOSER = 0.45
+"""The share of the spread of one round that the next one has."""
+_PROGRESS = 0.7
+"""A round that leaves more than this share of what is missing made no progress."""
+_ANEW = 0.15
+"""The share of draws near the best in which a choice, or the heading of a field, comes out anew."""
+_OTHER = 0.5
+"""The share of fields that have another heading than the first, where that comes out anew."""
+_ANYWHERE = 4
+"""One of so many draws after the first round lies anywhere."""
+_ALIKE = 0.02
+"""Radians within which a field points alike in two draws."""
+_CLOSE = 1.0
+"""Where less than so many metres were missing, the search begins again."""
+_SHARE = 4
+"""A search takes one of so many parts of the trials that are left at most."""
+_REPLAYED = 6
+"""Draws that are put to the test."""
+_STEP = 1e-5
+"""By how much a coordinate is moved to see what changes."""
+_JUMP = 1e3
+"""A change per unit above which a field has pointed another way."""
+_FEW, _NARROW = 4, 0.01
+"""Draws of the first round where no coordinate is wider than this."""
+
+_Numbers = NDArray[np.float64]
+_Indices = NDArray[np.intp]
+
+
+def find_witness(start: BoxSet, effort: Effort = QUICK, outcomes: Sequence[OutcomeTable] = ()) -> Satisfied | None:
+    """A witness of a group, or None if none was found.
+
+    Args:
+        start: One case: where the random variables can be.
+        effort: How much it is worth.
+        outcomes: What choices may come out as; others may come out as anything.
+    """
+    trials = trials_left()
+    search = _Search(start, effort, outcomes, trials)
+    found = None
+    with suppress(CannotEvaluate, _SpentError):
+        found = search.run()
+    if found is None:
+        trials.left -= search.tried
+    return found
+
+
+def search_witness(
+    items: Sequence[Item], tolerance: Tolerance, effort: Effort = QUICK, outcomes: Sequence[OutcomeTable] = ()
+) -> Satisfied | None:
+    """A witness of constraints, conditioned, or None if none was found; other arguments as of `find_witness`."""
+    start = BoxSet.start(ConstraintNetwork(items, tolerance), {}).narrowed()
+    return find_witness(start, effort, outcomes) if start.size else None
+
+
+class _SpentError(Exception):
+    """A search has tried as often as it may."""
+
+
+class _Search:
+    """A search of one group."""
+
+    def __init__(self, start: BoxSet, effort: Effort, outcomes: Sequence[OutcomeTable], trials: Trials) -> None:
+        space = self.space = TrialSpace(start)
+        self.tried = 0
+        self.most = trials.left / _SHARE
+        self.effort = effort
+        self.rng = np.random.default_rng(0)
+        self.tables = [
+            ([(column, space.hidden[variable]) for column, variable in enumerate(variables)
+              if isinstance(variable, Identity) and variable in space.hidden], picks)
+            for variables, picks in outcomes
+        ]  # fmt: skip
+        self.replayed = 0
+
+    def run(self) -> Satisfied | None:
+        """Search, as long as it is worth it."""
+        before, closest, idle, closer, starts = np.inf, np.inf, 0, 0, 0
+        draws, elite = self._anywhere(self._first_count()), None
+        for _ in range(self.effort.rounds):
+            tried = self._try(draws)
+            found = self._witness(tried)
+            best = self._best(tried)
+            if found is not None or best is None:
+                return found
+            elite = self._better(elite, best)
+            for _ in range(self.effort.descents if len(self.space.moving) else 0):
+                left = float(best.residuals.missing.min())
+                best = self._descended(best)
+                found = self._witness(best)
+                if found is not None:
+                    return found
+                elite = self._better(elite, best)
+                if float(best.residuals.missing.min()) > _PROGRESS * left:
+                    break
+            least = float(elite.residuals.missing.min())
+            idle, closer = (idle + 1 if least > _PROGRESS * before else 0), closer + 1
+            before, closest = min(before, least), min(closest, least)
+            if self.replayed >= _REPLAYED:
+                break
+            if idle == self.effort.idle:
+                starts += 1
+                if starts >= (self.effort.starts if closest < _CLOSE else 1):
+                    break
+                before, idle, closer, elite = np.inf, 0, 0, None
+            draws = self._near(elite.draws, _CLOSER**closer) if elite else self._anywhere(self.effort.draws)
+        return None
+
+    def _try(self, draws: Draws) -> Trial:
+        """What draws come out as.
+
+        Raises:
+            _SpentError: This search has had its share.
+        """
+        if self.tried >= self.most:
+            raise _SpentError
+        self.tried += 1
+        return self.space.run(draws)
+
+    # --- draws
+
+    def _first_count(self) -> int:
+        wide = bool((self.space.high - self.space.low > _NARROW).any()) or bool(self.space.fields)
+        return self.effort.draws if wide else _FEW
+
+    def _anywhere(self, count: int) -> Draws:
+        """Evenly over all that there is."""
+        parts = [each.drawn(self.rng, count) for each in self.space.hidden.values()]
+        shares = self.rng.random((len(self.space.fields), count))
+        # where lanes overlap, a generator takes the first
+        shares[:, ::2] = 0.0
+        shares[:, 1::4] *= self.rng.random(shares[:, 1::4].shape) < _OTHER
+        draws = Draws(np.concatenate([np.empty((0, count)), *parts]), shares)
+        self._choose(draws.places, np.arange(count))
+        return draws
+
+    def _choose(self, places: _Numbers, some: NDArray[np.intp]) -> None:
+        """Choices of some draws come out as any of the outcomes that are left."""
+        for variables, picks in self.tables:
+            if not (variables and len(picks)):
+                continue
+            rows = picks[self.rng.integers(len(picks), size=len(some))]
+            for column, variable in variables:
+                chosen = rows[:, column]
+                places[variable.rows.start, some[chosen >= 0]] = chosen[chosen >= 0]
+
+    def _near(self, best: Draws, spread: float) -> Draws:
+        """The best again, others around them, and some anywhere."""
+        count, first = self.effort.draws, best.places.shape[1]
+        near = best.take(np.arange(count - count // _ANYWHERE) % first)
+        size = near.places.shape[1]
+        width = np.where(np.isfinite(self.space.high - self.space.low), self.space.high - self.space.low, 1.0)
+        off = self.rng.standard_normal((len(self.space.moving), size)) * spread * width[self.space.moving]
+        # of every other draw only the heading of one field is another
+        still = np.zeros(size, dtype=np.bool_)
+        still[1::2] = True
+        still[:first] = True
+        off[:, still] = 0.0
+        near.places[self.space.moving] += off
+        for each in self.space.hidden.values():
+            if each.is_whole:
+                moved = self._some((size,), still)
+                near.places[each.rows, moved] = each.drawn(self.rng, size)[:, moved]
+        self._choose(near.places, np.flatnonzero(self._some((size,), still)))
+        anew = self._some(near.shares.shape, still)
+        if self.space.fields:
+            one = np.flatnonzero(still[first:]) + first
+            anew[self.rng.integers(len(self.space.fields), size=len(one)), one] = True
+        number = int(np.count_nonzero(anew))
+        near.shares[anew] = self.rng.random(number) * (self.rng.random(number) < _OTHER)
+        more = self._anywhere(count // _ANYWHERE)
+        return near.beside(more)
+
+    def _some(self, shape: tuple[int, ...], still: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """What comes out anew, in draws that do not stand still."""
+        return (self.rng.random(shape) < _ANEW) & ~still
+
+    def _best(self, tried: Trial) -> Trial | None:
+        """The best draws; None if none has a value."""
+        missing = tried.residuals.missing
+        order = np.argsort(missing, kind="stable")
+        order = order[np.isfinite(missing[order])]
+        some = self._unlike(tried, order)[: self.effort.best]
+        return tried.take(some) if len(some) else None
+
+    def _unlike(self, tried: Trial, order: _Indices) -> _Indices:
+        """Draws in an order, the first of those alone in which choices and fields come out the same."""
+        alike = np.concatenate([tried.draws.places[self.space.whole], np.round(tried.headings / _ALIKE)])[:, order]
+        if not len(alike):
+            return order
+        _, first = np.unique(alike, axis=1, return_index=True)
+        return order[np.sort(first)]
+
+    def _better(self, elite: Trial | None, trial: Trial) -> Trial:
+        """The best of two sets of draws."""
+        if elite is None:
+            return trial
+        both = elite.beside(trial)
+        best = self._best(both)
+        return best or elite
+
+    def _witness(self, tried: Trial) -> Satisfied | None:
+        """A witness among draws of which nothing is missing."""
+        missing = tried.residuals.missing
+        for number in np.flatnonzero(missing <= 0)[: _REPLAYED - self.replayed].tolist():
+            self.replayed += 1
+            values: dict[Identity, Value] = {
+                identity: _value(each.leaf, tried.draws.places[each.rows, number])
+                for identity, each in self.space.hidden.items()
+            }
+            pointing = dict(zip(map(id, self.space.fields), tried.headings[:, number].tolist(), strict=True))
+            if replay(list(self.space.network.items), values, self.space.network.tolerance, SLACK, pointing):
+                return Satisfied(values)
+        return None
+
+    # --- descent
+
+    def _descended(self, tried: Trial) -> Trial:
+        """Each draw after the best of some damped steps, also where that is worse: fields point elsewhere there."""
+        rows = cast(_Indices, np.arange(tried.draws.places.shape[1]))
+        each = np.where(np.isfinite(tried.residuals.each), tried.residuals.each, 0.0)
+        moves = damped_steps(self._slopes(tried), each, self._at_ends(tried.draws.places))
+        many = tried.draws.take(np.tile(rows, len(moves)))
+        many.places[self.space.moving] += np.concatenate(moves, axis=1)
+        after = self._try(many)
+        missing = after.residuals.missing.reshape(len(moves), -1)
+        best = cast(_Indices, np.where(np.isfinite(missing), missing, np.inf).argmin(axis=0))
+        chosen = best * len(rows) + rows
+        return after.take(chosen)
+
+    def _slopes(self, tried: Trial) -> _Numbers:
+        """How residuals change with each coordinate that moves, (n, residuals, coordinates)."""
+        places, count = tried.draws.places, tried.draws.places.shape[1]
+        moving = self.space.moving
+        many = tried.draws.take(np.tile(cast(_Indices, np.arange(count)), len(moving)))
+        step = np.where(places[moving] + _STEP > self.space.high[moving], -_STEP, _STEP)
+        for number, row in enumerate(moving.tolist()):
+            many.places[row, number * count : (number + 1) * count] += step[number]
+        after = self._try(many).residuals.each.reshape(-1, len(moving), count)
+        slopes = (after - tried.residuals.each[:, None]) / step
+        return np.where(np.isfinite(slopes) & (np.abs(slopes) < _JUMP), slopes, 0.0).transpose(2, 0, 1)
+
+    def _at_ends(self, places: _Numbers) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which coordinates are at their lower, or upper, ends, (coordinates, n)."""
+        own = places[self.space.moving]
+        return own <= self.space.low[self.space.moving] + SLACK, own >= self.space.high[self.space.moving] - SLACK
+
+
+def _value(leaf: Leaf, place: _Numbers) -> Value:
+    numbers: list[float] = place.tolist()
+    if isinstance(leaf, PointIn):
+        return numbers[0], numbers[1]
+    return float(round(numbers[0])) if isinstance(leaf, Index) else numbers[0]
