@@ -129,13 +129,15 @@ def _scratch() -> Generator[str]:
     """A folder for whatever Dask writes, which is gone at the end; that of a run that was killed goes with the next."""
     from dask import config  # noqa: PLC0415 - optional
 
-    for left in Path(tempfile.gettempdir()).glob(f"{_SCRATCH}*"):
-        with contextlib.suppress(OSError):
-            if time.time() - left.stat().st_mtime > _BEGINS_S:
-                with nobody_reads(left) as is_left:
-                    if is_left:
-                        shutil.rmtree(left, ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix=_SCRATCH, ignore_cleanup_errors=True) as folder:
+        # ages by the clock of the file system alone: nothing here hangs on the time that the machine is set to
+        begun = Path(folder).stat().st_mtime
+        for left in Path(tempfile.gettempdir()).glob(f"{_SCRATCH}*"):
+            with contextlib.suppress(OSError):
+                if begun - left.stat().st_mtime > _BEGINS_S:
+                    with nobody_reads(left) as is_left:
+                        if is_left:
+                            shutil.rmtree(left, ignore_errors=True)
         using = Reading(Path(folder))
         try:
             with config.set({"temporary-directory": folder}):
