@@ -13,6 +13,7 @@ from scenes import compiled, drawn, label_of
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.decide import solver_step
+from scenicq.match.fields import witness_search
 from scenicq.match.linear import linear_program
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -217,9 +218,16 @@ def test_a_requirement_that_is_only_probable_excludes_nothing():
     assert isinstance(verdict(text, frame(THERE)), Match)
 
 
+@pytest.fixture
+def no_search(monkeypatch):
+    """No search for witnesses, which finds one before a solver is asked."""
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
+
+
 # --- unknown never becomes no
 
 
+@pytest.mark.usefixtures("no_search")
 @pytest.mark.parametrize("method", ["auto", "smt", "monolithic"])
 @pytest.mark.parametrize("reason", ["timeout", "crash", "memory", "garbage"])
 def test_what_the_solver_does_not_decide_is_unknown_with_its_reason(method, reason):
@@ -231,12 +239,14 @@ def test_what_the_solver_does_not_decide_is_unknown_with_its_reason(method, reas
     assert solver.calls
 
 
+@pytest.mark.usefixtures("no_search")
 def test_without_a_solver_it_is_unknown(monkeypatch):
     # nor is a question made that nobody is asked: for fields at hidden points that takes seconds
     monkeypatch.setattr(solver_step, "encoded", None)
     assert verdict(NONLINEAR, frame(THERE)).reason == "no solver"
 
 
+@pytest.mark.usefixtures("no_search")
 def test_a_witness_that_does_not_replay_is_no_match():
     class Liar(Fixed):
         def check(self, problem, *, precision, timeout_s):
@@ -250,6 +260,7 @@ def test_a_witness_that_does_not_replay_is_no_match():
     assert solver.calls == 3
 
 
+@pytest.mark.usefixtures("no_search")
 def test_an_unknown_correspondence_does_not_hide_one_that_matches():
     # The first candidate is undecided, the second is right.
     text = "ego = new Car\nother = new Car offset by (Range(-1, 1), Range(5, 10))"
@@ -294,6 +305,7 @@ def test_what_geometry_cannot_tell_is_unknown(monkeypatch):
         assert found.reason == "unsupported: whether moons meet"
 
 
+@pytest.mark.usefixtures("no_search")
 def test_a_linear_program_without_an_answer_is_no_proof(monkeypatch):
     def fails(*_):
         raise linear_program.NotSolved
@@ -319,6 +331,7 @@ def test_the_budget_leaves_a_frame_unknown():
 HERE = str(Path(__file__).parent)
 
 
+@pytest.mark.usefixtures("no_search")
 @pytest.mark.parametrize(
     ("kind", "reason"), [("hang", "timeout"), ("garble", "garbage"), ("eat", "memory"), ("die", "crash")]
 )
@@ -333,6 +346,7 @@ def test_a_solver_that_misbehaves_harms_its_own_frames_only(kind, reason, monkey
     assert {each.reason for each in verdicts if isinstance(each, Unknown)} == {reason}
 
 
+@pytest.mark.usefixtures("no_search")
 def test_a_worker_that_is_killed_is_replaced(monkeypatch):
     monkeypatch.syspath_prepend(HERE)
     scenario = compiled(HEADER + NONLINEAR)

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from scenicq.match.fields import witness_search
 from scenicq.smt import pool, solver
 from scenicq_cli.main import cli
 
@@ -26,6 +27,14 @@ ego = new Car
 other = new Car offset along angle relative to ego.heading by (Range(-6, 6), Range(0, 14)),
     facing angle relative to ego.heading
 """
+
+
+@pytest.fixture(autouse=True, scope="module")
+def no_search():
+    """No search for witnesses, which finds one before a solver is asked."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(witness_search, "search_witness", lambda *_: None)
+        yield
 
 
 @pytest.fixture(scope="module")

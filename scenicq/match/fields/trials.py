@@ -21,7 +21,7 @@ from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.hidden_values import HiddenValue
 from scenicq.match.fields.residuals import Residuals, residuals_of
 
-__all__ = ["Draws", "Trial", "TrialSpace"]
+__all__ = ["Trial", "TrialDraws", "TrialSpace"]
 
 _MOST_PLACES = 16_384
 """Places at which the map is asked at once."""
@@ -30,7 +30,7 @@ _Numbers = NDArray[np.float64]
 
 
 @dataclass(eq=False)
-class Draws:
+class TrialDraws:
     """What is tried at once.
 
     Attributes:
@@ -41,13 +41,13 @@ class Draws:
     places: _Numbers
     shares: _Numbers
 
-    def take(self, some: NDArray[np.intp]) -> Draws:
+    def take(self, some: NDArray[np.intp]) -> TrialDraws:
         """Some of the draws, possibly several times."""
-        return Draws(self.places[:, some], self.shares[:, some])
+        return TrialDraws(self.places[:, some], self.shares[:, some])
 
-    def beside(self, other: Draws) -> Draws:
+    def beside(self, other: TrialDraws) -> TrialDraws:
         """These draws and others."""
-        return Draws(
+        return TrialDraws(
             np.concatenate([self.places, other.places], axis=1), np.concatenate([self.shares, other.shares], axis=1)
         )
 
@@ -62,7 +62,7 @@ class Trial:
         headings: Where each use of a field points, (uses, n).
     """
 
-    draws: Draws
+    draws: TrialDraws
     residuals: Residuals
     headings: _Numbers
 
@@ -151,7 +151,7 @@ class TrialSpace:
                 todo += below
         return [node for node in self._use if node not in seen]
 
-    def run(self, draws: Draws) -> Trial:
+    def run(self, draws: TrialDraws) -> Trial:
         """What draws come out as; their coordinates are cut to their ends.
 
         Raises:

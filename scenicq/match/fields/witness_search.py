@@ -23,13 +23,13 @@ from scenicq.forest.nodes import Identity, Index, Leaf, PointIn, Value
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.damped_steps import damped_steps
-from scenicq.match.fields.trials import Draws, Trial, TrialSpace
+from scenicq.match.fields.trials import Trial, TrialDraws, TrialSpace
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["EXHAUSTIVE", "QUICK", "THOROUGH", "Effort", "OutcomeTable", "find_witness", "search_witness"]
+__all__ = ["QUICK", "THOROUGH", "Effort", "OutcomeTable", "find_witness", "search_witness"]
 
 OutcomeTable = tuple[Sequence[object], NDArray[np.intp]]
 """What choices may come out as: their identities, and by outcome which option each takes, -1 where none matters."""
@@ -58,7 +58,6 @@ class Effort:
 
 QUICK = Effort(96, 8, 6, 3, 1, 1)
 THOROUGH = Effort(384, 24, 4, 6, 2, 1)
-EXHAUSTIVE = Effort(384, 24, 24, 6, 3, 4)
 _CLOSER = 0.45
 """The share of the spread of one round that the next one has."""
 _PROGRESS = 0.7
@@ -167,7 +166,7 @@ class _Search:
             draws = self._near(elite.draws, _CLOSER**closer) if elite else self._anywhere(self.effort.draws)
         return None
 
-    def _try(self, draws: Draws) -> Trial:
+    def _try(self, draws: TrialDraws) -> Trial:
         """What draws come out as.
 
         Raises:
@@ -184,14 +183,14 @@ class _Search:
         wide = bool((self.space.high - self.space.low > _NARROW).any()) or bool(self.space.fields)
         return self.effort.draws if wide else _FEW
 
-    def _anywhere(self, count: int) -> Draws:
+    def _anywhere(self, count: int) -> TrialDraws:
         """Evenly over all that there is."""
         parts = [each.drawn(self.rng, count) for each in self.space.hidden.values()]
         shares = self.rng.random((len(self.space.fields), count))
         # where lanes overlap, a generator takes the first
         shares[:, ::2] = 0.0
         shares[:, 1::4] *= self.rng.random(shares[:, 1::4].shape) < _OTHER
-        draws = Draws(np.concatenate([np.empty((0, count)), *parts]), shares)
+        draws = TrialDraws(np.concatenate([np.empty((0, count)), *parts]), shares)
         self._choose(draws.places, np.arange(count))
         return draws
 
@@ -205,7 +204,7 @@ class _Search:
                 chosen = rows[:, column]
                 places[variable.rows.start, some[chosen >= 0]] = chosen[chosen >= 0]
 
-    def _near(self, best: Draws, spread: float) -> Draws:
+    def _near(self, best: TrialDraws, spread: float) -> TrialDraws:
         """The best again, others around them, and some anywhere."""
         count, first = self.effort.draws, best.places.shape[1]
         near = best.take(np.arange(count - count // _ANYWHERE) % first)
