@@ -143,7 +143,9 @@ def wrapped(angles: Enclosure) -> Enclosure:
     """Angles in (-pi, pi]; all of these where the ends are not of one turn."""
     middle = (angles[0] + angles[1]) / 2
     found = angles - math.tau * np.round(np.where(np.isfinite(middle), middle / math.tau, 0.0))
-    return np.where((found[0] > -math.pi) & (found[1] <= math.pi), found, [[-math.pi], [math.pi]])
+    # straight behind is either end: which one is a matter of rounding, and of whose formula is taken
+    inside = (found[0] > -math.pi + ROUNDING) & (found[1] < math.pi - ROUNDING)
+    return np.where(inside, found, [[-math.pi], [math.pi]])
 
 
 def turns_near(a: Enclosure, within: Enclosure) -> Enclosure:

@@ -80,6 +80,16 @@ def test_what_leads_to_the_label_is_kept(case):
             assert (own[..., None] <= limits[..., 1, :] + slack[..., None]).all()
 
 
+@pytest.mark.parametrize("aside", [0.0, -0.0, 1e-300, -1e-300, 1.8e-56, -1.8e-56, 1e-17, -1e-17, 1e-12, -1e-12])
+def test_a_heading_straight_behind_may_be_at_either_end(aside):
+    """As a plain number it is half a turn one way or the other, whichever rounding makes of it."""
+    behind, factor = Constant((aside, -2.0)), Range(number(-2), number(2))
+    root = VectorSum(Scale(behind, factor), VectorOf(number(0), Bearing(behind)))
+    left = narrowed(root, evaluate(root, {factor.identity: -2.0}), "position")
+    assert left.size
+    assert (left.ranges[factor.identity][..., 0, :] <= -2.0 + 1e-5).all()
+
+
 INVERTED = {
     "itself": (A, 4.0, (4.0, 4.0)),
     "sum": (op("+", A, number(1), B), 7.0, (3.5, 4.0)),
