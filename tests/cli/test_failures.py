@@ -87,6 +87,7 @@ def test_too_few_files_never_mean_that_nothing_matched(command, tmp_path, files)
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of open files are those of Linux")
 @pytest.mark.parametrize("files", [6, 8, 12, 16])
+@pytest.mark.one_in(4)
 def test_a_query_with_too_few_files_never_says_that_nothing_matched(command, crossroads, files):
     code = (
         f"import os, resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files})); "
@@ -138,6 +139,7 @@ def _limited(limits, words, folder, dataset):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")
 @pytest.mark.parametrize("way", WAYS)
+@pytest.mark.one_in(4)
 def test_two_gigabytes_of_address_space_are_enough(way, command, crossroads, tmp_path):
     """As README.md says."""
     done = _limited([("RLIMIT_AS", 2 * 10**9)], [command, *WAYS[way]], tmp_path, crossroads)

@@ -119,6 +119,7 @@ def test_no_library_complains_when_the_process_ends(command, crossroads, scenari
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
 @pytest.mark.parametrize("buffered", ["", "1"])
 @pytest.mark.parametrize("words", ["match SCENARIO DATASET", "info DATASET", "--version"])
+@pytest.mark.one_in(4)
 def test_a_full_disk_is_told(command, crossroads, scenarios, words, buffered):
     named = {"SCENARIO": str(scenarios / "02_crossing_cars.scenic"), "DATASET": str(crossroads)}
     line = [command, *(named.get(word, word) for word in words.split())]

@@ -76,6 +76,7 @@ def by_loop(found: Detection, threshold: float, *, nearest_only: bool) -> list[i
 @pytest.mark.parametrize("at_once", [1, 7, 10_000])
 @pytest.mark.parametrize("protocol", [PLAIN, NEAREST])
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.one_in(4)
 def test_the_same_as_a_loop_in_pieces_of_any_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int, protocol: Protocol, seed: int
 ) -> None:
@@ -100,6 +101,7 @@ def test_the_same_as_a_loop_in_pieces_of_any_size(
 
 @pytest.mark.parametrize(("most", "count"), [(0, 0), (0, 5), (3, 0), (3, 5)])
 @pytest.mark.parametrize("recordings", [1, 2])
+@pytest.mark.one_in(4)
 def test_datasets_and_files_may_be_empty(tmp_path: Path, most: int, count: int, recordings: int) -> None:
     rng = np.random.default_rng(1)
     dataset = fleet(tmp_path / "d", rng, 2, most, recordings)

@@ -37,6 +37,7 @@ def _places(form):
 
 
 @pytest.mark.parametrize("form", STATEMENTS)
+@pytest.mark.one_in(4)
 def test_hard_values_in_every_place_of_every_statement(form):
     for line in _places(form):
         text = f"model scenic.domains.driving.model\nego = new Car\n{line}\n"
@@ -44,6 +45,7 @@ def test_hard_values_in_every_place_of_every_statement(form):
 
 
 @pytest.mark.parametrize("form", [*FORMS, *(f"{call}({{}})" for call in CALLS)])
+@pytest.mark.one_in(4)
 def test_hard_values_in_every_place_of_every_expression(form):
     for expression in _places(form):
         text = f"model scenic.domains.driving.model\nego = new Car\nrequire {expression} < 5\n"

@@ -98,6 +98,7 @@ def place_of(**changes: Any) -> Callable[[dict[str, Any]], object]:
         (lambda label: label.update(sensors={"CAM": 1}), "label", "`CAM` is not a text but a number"),
     ],
 )
+@pytest.mark.one_in(4)
 def test_an_unsound_record_is_left_out(
     source: Path, tmp_path: Path, change: Callable[[dict[str, Any]], object], what: str, told: str
 ) -> None:

@@ -72,6 +72,7 @@ def test_what_is_left_out_is_counted_and_nothing_else(format_: str, name: str, t
 
 
 @pytest.mark.parametrize(("format_", "name"), CASES)
+@pytest.mark.one_in(4)
 def test_each_field_is_what_the_list_says(format_: str, name: str, tmp_path: Path) -> None:
     listed = entries(name)
     document = full(format_)

@@ -58,6 +58,7 @@ def with_everything(line: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("columnar", [True, False])
 @pytest.mark.parametrize("alone", [True, False])
+@pytest.mark.one_in(4)
 def test_every_field_of_a_label(tmp_path, monkeypatch, columnar, alone):
     """Each value in place of each field, in a recording of its own or beside sound labels."""
     if not columnar:

@@ -96,6 +96,7 @@ def check_against_brute_force(name, seeds, solver):
 
 
 @pytest.mark.parametrize("name", SMALL)
+@pytest.mark.one_in(4)
 def test_brute_force_agrees(name, solver):
     check_against_brute_force(name, range(3), solver)
 

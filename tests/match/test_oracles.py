@@ -28,6 +28,7 @@ def solver():
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.one_in(4)
 def test_a_drawn_scene_matches_among_distractors(name, solver):
     scenario = compiled(HEADER + PROGRAMS[name])
     matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
@@ -38,6 +39,7 @@ def test_a_drawn_scene_matches_among_distractors(name, solver):
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.one_in(4)
 def test_the_witness_of_a_match_satisfies_the_program_in_plain_evaluation(name, solver):
     scenario = compiled(HEADER + PROGRAMS[name])
     matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
@@ -77,6 +79,7 @@ def test_a_verdict_does_not_hang_on_what_was_matched_before(solver):
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.one_in(4)
 def test_every_method_gives_the_same_verdict(name, solver):
     scenario = compiled(HEADER + PROGRAMS[name])
     seen = set()

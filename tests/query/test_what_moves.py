@@ -113,6 +113,7 @@ def conditions(which: int) -> list[str]:
 
 
 @pytest.mark.parametrize("way", WAYS)
+@pytest.mark.one_in(4)
 def test_frames_are_read_as_they_are_observed(moving, way):
     held = "".join(f"require ({each})\n" for each in conditions(0))
     assert verdicts(moving, held, WAYS[way]).count(Match) >= SAMPLES - 2
@@ -121,6 +122,7 @@ def test_frames_are_read_as_they_are_observed(moving, way):
 
 @pytest.mark.parametrize("place", OVER_TIME)
 @pytest.mark.parametrize("way", ["auto", "smt"])
+@pytest.mark.one_in(4)
 def test_samples_are_read_as_they_are_observed(moving, place, way):
     every = " and ".join(f"({each})" for each in conditions(0))
     assert Match in verdicts(moving, OVER_TIME[place].format(every), WAYS[way])
@@ -129,6 +131,7 @@ def test_samples_are_read_as_they_are_observed(moving, place, way):
 
 
 @pytest.mark.parametrize("way", WAYS)
+@pytest.mark.one_in(4)
 def test_a_frame_that_hangs_on_what_is_not_observed_is_unknown(still_unknown, way):
     for which in (0, 1):
         for word in (" and ", " or "):
@@ -138,6 +141,7 @@ def test_a_frame_that_hangs_on_what_is_not_observed_is_unknown(still_unknown, wa
 
 
 @pytest.mark.parametrize("place", OVER_TIME)
+@pytest.mark.one_in(4)
 def test_an_interval_that_hangs_on_what_is_not_observed_is_unknown(still_unknown, place):
     for which, word in ((0, " and "), (0, " or "), (1, " and "), (1, " or ")):
         condition = word.join(f"({each})" for each in conditions(which) if "ego" in each)
@@ -161,6 +165,7 @@ def test_an_interval_that_hangs_on_what_is_not_observed_is_unknown(still_unknown
         ("require len([o for o in (ego, c) if o.speed > 3 or o.position.x >= 0]) == 2", Match),
     ],
 )
+@pytest.mark.one_in(4)
 def test_unknown_only_where_it_makes_a_difference(still_unknown, way, text, verdict):
     found = verdicts(still_unknown, text + "\n", WAYS[way])
     assert set(found) - {NoMatch} == ({verdict} - {None})

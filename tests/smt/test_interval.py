@@ -38,6 +38,7 @@ def _inside(value: float, interval: Interval) -> bool:
 @pytest.mark.parametrize("operator", sorted(FORWARD))
 @settings(max_examples=300)
 @given(data=st.data())
+@pytest.mark.one_in(4)
 def test_functions_lose_nothing(operator: Operator, data: st.DataObject) -> None:
     point, box = data.draw(boxes(2 if operator in BINARY else 1))
     value = operate(operator, point)

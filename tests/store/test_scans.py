@@ -136,6 +136,7 @@ def test_nor_in_object_storage(name: str, bucket: Any, town: Path, other: Path, 
 
 
 @pytest.mark.parametrize("column", ["class", "map", "frame", "recording", "id", "heading", "ego_x", "first_object"])
+@pytest.mark.one_in(4)
 def test_answers_stay_the_same(column: str, town: Path, expected: tuple[Any, Any], tmp_path: Path) -> None:
     shutil.copytree(town, tmp_path / f"{column}=1" / "town")
     assert answers(tmp_path / f"{column}=1" / "town") == expected[1]
@@ -143,6 +144,7 @@ def test_answers_stay_the_same(column: str, town: Path, expected: tuple[Any, Any
 
 @pytest.mark.parametrize("name", [*PATTERNS, *ORDINARY])
 @pytest.mark.parametrize("deep", [False, True])
+@pytest.mark.one_in(4)
 def test_a_folder_is_no_pattern(
     name: str, deep: bool, town: Path, other: Path, expected: tuple[Any, Any], tmp_path: Path
 ) -> None:

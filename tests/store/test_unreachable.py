@@ -70,6 +70,7 @@ class NoCredentialsError(Exception):
         (RuntimeError("out of\nsorts"), "cannot be read: out of sorts"),
     ],
 )
+@pytest.mark.one_in(4)
 def test_what_a_store_says_at_any_request_is_told(
     raised: Exception, words: str, crossroads: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

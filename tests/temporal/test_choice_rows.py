@@ -65,6 +65,7 @@ def told(dataset: Dataset, text: str, method: str) -> list[tuple[str, str, str]]
         (OBJECTS + "k = Uniform(2, 9)\nrequire ego.position.x > k\nrequire always ego.position.x < k\n", set()),
     ],
 )
+@pytest.mark.one_in(4)
 def test_an_outcome_is_one_for_the_start_and_for_all_that_follows(dataset, text, frames, method):
     assert {first for first, _, _ in told(dataset, text, method)} == frames
 
@@ -144,6 +145,7 @@ def test_the_ego_is_called_ego_whatever_else_names_it(dataset, line, over_time):
     ],
 )
 @pytest.mark.parametrize("over_time", [False, True])
+@pytest.mark.one_in(4)
 def test_a_dict_is_indexed_by_what_is_random_or_observed(dataset, condition, frames, method, over_time):
     text = (
         f"{OBJECTS}k = Uniform(1, 2)\nname = Uniform('a', 'b')\nrequire {'always ' if over_time else ''}{condition}\n"

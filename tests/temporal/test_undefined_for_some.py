@@ -223,6 +223,7 @@ def check(dataset, trace, program: Program, told: Counter[str]) -> None:
         ("math.acos(spot.position.y - 50) > -1", "(22, 50), 0, 4, 4", Match),
     ],
 )
+@pytest.mark.one_in(4)
 def test_a_run_goes_on_where_what_would_end_it_has_no_value(dataset, condition, area, expected):
     """Where there is a direction everywhere, all runs end at once; else the last sample is reached."""
     text = f"""model scenic.domains.driving.model
@@ -238,6 +239,7 @@ require eventually ego.position.x > 7.1
 
 
 @pytest.mark.parametrize("number", range(6))
+@pytest.mark.one_in(4)
 def test_no_verdict_is_wrong_for_any_place_of_a_grid(dataset, trace, number):
     check(dataset, trace, random_program(random.Random(number)), Counter())
 

@@ -74,6 +74,7 @@ def labels(scenario, seed):
 
 @pytest.mark.parametrize("name", VALUES | PLACES)
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+@pytest.mark.one_in(4)
 def test_a_clear_answer_is_that_of_the_cascade(name, options):
     scenario = compiled(HEADER + (VALUES | PLACES)[name], STREET)
     said = {Satisfied: 0, Refuted: 0}
@@ -106,6 +107,7 @@ def test_a_clear_answer_is_that_of_the_cascade(name, options):
 
 @pytest.mark.parametrize("name", VALUES | PLACES)
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+@pytest.mark.one_in(4)
 def test_batches_find_what_labels_alone_find(name, options):
     scenario = compiled(HEADER + (VALUES | PLACES)[name], STREET)
     matcher = Matcher(scenario, options)

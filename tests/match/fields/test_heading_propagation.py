@@ -138,6 +138,7 @@ def test_a_curved_border_is_told_without_a_solver_however_close(offset):
 
 
 @pytest.mark.parametrize(("wide", "long"), [(0.1, 7.0), (1.0, 2.0), (2.0, 7.0), (3.0, 3.0)])
+@pytest.mark.one_in(4)
 def test_a_curved_border_is_told_without_a_solver_however_much_of_it_comes_into_question(wide, long):
     # the spot may be in a rectangle behind the ego, of which one corner comes closest to where it points ahead
     program = (

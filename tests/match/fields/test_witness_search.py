@@ -64,6 +64,7 @@ ON_LINES = {
 
 
 @pytest.mark.parametrize("name", ON_LINES)
+@pytest.mark.one_in(4)
 def test_trial_finds_most_witnesses(name, monkeypatch):
     text, tolerance, expected = ON_LINES[name]
     answers = []
@@ -88,6 +89,7 @@ def test_trial_finds_most_witnesses(name, monkeypatch):
 
 
 @pytest.mark.parametrize("name", BENDS)
+@pytest.mark.one_in(4)
 def test_with_and_without_trials_the_verdict_is_the_same(name, monkeypatch):
     scenario = compiled(ON_BEND + BENDS[name], BEND)
     labels = []

@@ -43,6 +43,7 @@ def solver():
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("radius", [None, 30.0])
+@pytest.mark.one_in(4)
 def test_a_search_finds_the_same(name, radius, solver, monkeypatch):
     scenario = compiled(HEADER + CASES[name])
     matcher = Matcher(scenario, MatchOptions(radius=radius), solver)

@@ -97,6 +97,7 @@ def with_candidates(scenario, options, found):
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("options", OPTIONS, ids=["plain", "box", "disc"])
+@pytest.mark.one_in(4)
 def test_the_same_is_found_together(name, options, solver):
     scenario = compiled(HEADER + CASES[name], STREET)
     matcher = Matcher(scenario, options, solver)

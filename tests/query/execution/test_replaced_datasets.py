@@ -79,6 +79,7 @@ def two(tmp_path: Path) -> tuple[Path, Path]:
 
 @pytest.mark.parametrize("replacement", REPLACEMENTS)
 @pytest.mark.parametrize("way", [by_blocks, by_shards, pytest.param(by_dask, marks=pytest.mark.slow)])
+@pytest.mark.one_in(4)
 def test_processes_read_the_dataset_that_was_asked_about_or_none(
     two: tuple[Path, Path],
     way: Callable[[Query], Iterator[Result]],
@@ -116,6 +117,7 @@ def test_one_process_finds_what_it_had_found_or_nothing(
 
 
 @pytest.mark.parametrize("replacement", REPLACEMENTS)
+@pytest.mark.one_in(4)
 def test_a_copy_is_the_same_dataset_or_refused(
     two: tuple[Path, Path], replacement: Callable[[Path, Path], None]
 ) -> None:

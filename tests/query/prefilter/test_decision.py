@@ -110,6 +110,7 @@ def check(dataset: Dataset, text: str, options: MatchOptions) -> tuple[int, int]
 
 @pytest.mark.parametrize("options", list(OPTIONS))
 @pytest.mark.parametrize("name", list(SINGLE | TIED))
+@pytest.mark.one_in(4)
 def test_what_sql_decides_has_a_proof(dataset, name, options):
     check(dataset, (SINGLE | TIED)[name], OPTIONS[options])
 

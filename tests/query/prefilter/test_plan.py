@@ -69,6 +69,7 @@ def found(dataset: Dataset, text: str, options: MatchOptions, *, prefilter: bool
 
 
 @pytest.mark.parametrize("name", ["ahead", "offset", "figure 3", "facing field", "shared heading", "crowd"])
+@pytest.mark.one_in(4)
 def test_the_prefilter_keeps_to_scopes(dataset, name):
     scenario = compile_scenario(Source("test.scenic", HEADER + PROGRAMS[name]), STREET)
     rng = random.Random(name)
@@ -92,6 +93,7 @@ def cases():
 
 
 @pytest.mark.parametrize(("name", "options"), list(cases()))
+@pytest.mark.one_in(4)
 def test_the_prefilter_loses_nothing(dataset, name, options):
     text = PROGRAMS[name]
     with_it, query = found(dataset, text, OPTIONS[options], prefilter=True)
@@ -110,6 +112,7 @@ def tied_cases():
 
 
 @pytest.mark.parametrize(("name", "options"), list(tied_cases()))
+@pytest.mark.one_in(4)
 def test_nothing_is_lost_between_objects_and_in_unions(tied, name, options):
     text = (TIED | RANDOM)[name]
     with_it, query = found(tied, text, OPTIONS[options], prefilter=True)
