@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from itertools import chain
 
 from scenicq.forest.components import connected_components
-from scenicq.forest.nodes import Constant, DirectionAt, Identity, Leaf, Range, TruncatedNormal, Value
-from scenicq.forest.walk import leaves, postorder
+from scenicq.forest.nodes import Constant, Identity, Leaf, Range, TruncatedNormal, Value
+from scenicq.forest.walk import leaves
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.hidden_distances import with_areas
 from scenicq.match.linear.affine_reach import ends
-from scenicq.match.problem.conditioned import Item, item_conjuncts
+from scenicq.match.problem.conditioned import Item, item_conjuncts, uses_field
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
@@ -48,7 +48,7 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
         found = decide_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance)
         sure = isinstance(found, Satisfied) and replay(items, found.values, tolerance, SLACK)
         return found if sure else Undecided(items[0][0], "nonlinear")
-    if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in left])):
+    if uses_field(left):
         from scenicq.match.fields.field_solver import decide_directions  # noqa: PLC0415 - takes long to load
 
         shared = _shared(left, used)

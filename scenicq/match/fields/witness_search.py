@@ -44,8 +44,7 @@ class Effort:
         best: How many of these descend, and have others drawn around them.
         rounds: How often draws are made.
         descents: Steps of each descent.
-        idle: Rounds in a row without progress of which the last is the last of a beginning.
-        starts: How often it begins, again only where little was missing.
+        idle: Rounds in a row without progress after which it ends.
     """
 
     draws: int
@@ -53,11 +52,10 @@ class Effort:
     rounds: int
     descents: int
     idle: int
-    starts: int
 
 
-QUICK = Effort(96, 8, 6, 3, 1, 1)
-THOROUGH = Effort(384, 24, 4, 6, 2, 1)
+QUICK = Effort(96, 8, 6, 3, 1)
+THOROUGH = Effort(384, 24, 4, 6, 2)
 _CLOSER = 0.45
 """The share of the spread of one round that the next one has."""
 _PROGRESS = 0.7
@@ -70,8 +68,6 @@ _ANYWHERE = 4
 """One of so many draws after the first round lies anywhere."""
 _ALIKE = 0.02
 """Radians within which a field points alike in two draws."""
-_CLOSE = 1.0
-"""Where less than so many metres were missing, the search begins again."""
 _SHARE = 4
 """A search takes one of so many parts of the trials that are left at most."""
 _REPLAYED = 6
@@ -135,9 +131,9 @@ class _Search:
 
     def run(self) -> Satisfied | None:
         """Search, as long as it is worth it."""
-        before, closest, idle, closer, starts = np.inf, np.inf, 0, 0, 0
+        before, idle = np.inf, 0
         draws, elite = self._anywhere(self._first_count()), None
-        for _ in range(self.effort.rounds):
+        for number in range(1, self.effort.rounds + 1):
             tried = self._try(draws)
             found = self._witness(tried)
             best = self._best(tried)
@@ -154,16 +150,11 @@ class _Search:
                 if float(best.residuals.missing.min()) > _PROGRESS * left:
                     break
             least = float(elite.residuals.missing.min())
-            idle, closer = (idle + 1 if least > _PROGRESS * before else 0), closer + 1
-            before, closest = min(before, least), min(closest, least)
-            if self.replayed >= _REPLAYED:
+            idle = idle + 1 if least > _PROGRESS * before else 0
+            before = min(before, least)
+            if self.replayed >= _REPLAYED or idle == self.effort.idle:
                 break
-            if idle == self.effort.idle:
-                starts += 1
-                if starts >= (self.effort.starts if closest < _CLOSE else 1):
-                    break
-                before, idle, closer, elite = np.inf, 0, 0, None
-            draws = self._near(elite.draws, _CLOSER**closer) if elite else self._anywhere(self.effort.draws)
+            draws = self._near(elite.draws, _CLOSER**number)
         return None
 
     def _try(self, draws: TrialDraws) -> Trial:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import cast
 
@@ -15,6 +15,7 @@ from scenicq.forest.nodes import (
     Compare,
     CompareOp,
     Constant,
+    DirectionAt,
     DiscreteRange,
     Feature,
     Identity,
@@ -29,10 +30,15 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import children, postorder
 
-__all__ = ["Item", "condition_group", "conditioned", "fact", "item_conjuncts", "options_of"]
+__all__ = ["Item", "condition_group", "conditioned", "fact", "item_conjuncts", "options_of", "uses_field"]
 
 Item = tuple[Constraint, Node, Value]
 """A constraint, what conditioning left of its expression, and the label's value if it is a comparison."""
+
+
+def uses_field(items: Iterable[Item]) -> bool:
+    """Whether constraints ask a vector field at a point that conditioning left unknown."""
+    return any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in items]))
 
 
 def condition_group(group: Group, observed: Observation, scope: Mapping[Identity, Value] | None = None) -> list[Item]:

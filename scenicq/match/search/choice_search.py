@@ -21,15 +21,13 @@ from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     CompareOp,
     Constant,
-    DirectionAt,
     Identity,
     Node,
     Value,
 )
-from scenicq.forest.walk import postorder
 from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import Slot
-from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts
+from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_field
 from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
@@ -151,9 +149,8 @@ class _ChoiceSearch:
 
     def _search_witness(self) -> Satisfied | None:
         """A witness over all outcomes together, where fields at hidden points make each of them costly to decide."""
-        if self.depth or math.prod(len(domain.rows) for domain in self.domains) < _SEVERAL:
-            return None
-        if not any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in self.items])):
+        several = not self.depth and math.prod(len(domain.rows) for domain in self.domains) >= _SEVERAL
+        if not several or not uses_field(self.items):
             return None
         from scenicq.match.fields.witness_search import QUICK, search_witness  # noqa: PLC0415 - takes long to load
 

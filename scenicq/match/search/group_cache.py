@@ -13,12 +13,11 @@ from typing import Protocol
 from scenicq.budget import TimeIsUp, Trials, look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
-from scenicq.forest.nodes import DirectionAt, Value
-from scenicq.forest.walk import postorder
+from scenicq.forest.nodes import Value
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import LabelProblem
-from scenicq.match.problem.conditioned import Item, condition_group
+from scenicq.match.problem.conditioned import Item, condition_group, uses_field
 from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Refuted, Satisfied, Undecided
@@ -125,7 +124,7 @@ class GroupCache:
         """What a search for a witness finds; where fields are, there was one already."""
         flat = [item for group in items for item in group]
         doubt = Undecided(flat[0][0], "nonlinear")
-        if any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in flat])):
+        if uses_field(flat):
             return doubt
         from scenicq.match.fields.witness_search import THOROUGH, search_witness  # noqa: PLC0415 - takes long to load
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
+from typing import TypeAlias, cast
 
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint, Group
@@ -68,6 +68,10 @@ class Failure:
         return self.outcome.constraint
 
 
+_Judged: TypeAlias = tuple[list[Slot], set[tuple[int, int]] | None]
+"""Objects with their candidates, and which of these are undecided; None in place of the latter where the ego is."""
+
+
 @dataclass(eq=False)
 class LabelSearch:
     """The search for correspondences of one label.
@@ -92,8 +96,8 @@ class LabelSearch:
     failure: Failure | None = None
     undecided: Failure | None = None
     _open: bool = field(default=False, repr=False)
-    _asked: list[tuple[MatchPlan, Mapping[int, tuple[int, ...]], Mapping[int, int]]] = field(
-        default_factory=list["tuple[MatchPlan, Mapping[int, tuple[int, ...]], Mapping[int, int]]"], repr=False
+    _asked: list[tuple[MatchPlan, _Judged | None, Mapping[int, int]]] = field(
+        default_factory=list["tuple[MatchPlan, _Judged | None, Mapping[int, int]]"], repr=False
     )
     _left: dict[MatchPlan, list[Failure]] = field(default_factory=dict["MatchPlan", "list[Failure]"], repr=False)
     _orders: set[frozenset[tuple[int, int]]] = field(default_factory=set[frozenset[tuple[int, int]]], repr=False)
@@ -116,9 +120,10 @@ class LabelSearch:
         Raises:
             Exhausted: The search takes more steps than it may.
         """
-        self._asked.append((plan, candidates, twins))
         monolithic = self.options.method == "monolithic"
-        for solution in self._monolithic(plan, candidates) if monolithic else self._modular(plan, candidates):
+        judged = None if monolithic else self._slots(plan, candidates)
+        self._asked.append((plan, judged, twins))
+        for solution in self._monolithic(plan, candidates) if monolithic else self._modular(plan, judged):
             if self._is_new(solution.assignment, twins):
                 yield solution
 
@@ -127,9 +132,9 @@ class LabelSearch:
 
         All matches come before. Errors are those of `solutions`.
         """
-        for plan, candidates, twins in self._asked if self._open else ():
+        for plan, judged, twins in self._asked if self._open else ():
             monolithic = self.options.method == "monolithic"
-            for failure in self._left.get(plan, ()) if monolithic else self._modular_open(plan, candidates):
+            for failure in self._left.get(plan, ()) if monolithic else self._modular_open(plan, judged):
                 if self._is_new(failure.assignment, twins):
                     yield plan, failure
 
@@ -176,25 +181,21 @@ class LabelSearch:
 
     # --- the query paper's algorithm 1
 
-    def _modular(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
-        judged = self._slots(plan, candidates)
+    def _modular(self, plan: MatchPlan, judged: _Judged | None) -> Iterator[Solution]:
         if judged is not None and judged[1] is not None:
             ego = {self.scenario.ego: self.problem.ego}
             for assignment in self._satisfying(plan, _without(judged[0], judged[1]), ego):
                 yield self._solution(plan, assignment)
 
-    def _modular_open(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Failure]:
-        judged = self._slots(plan, candidates)
+    def _modular_open(self, plan: MatchPlan, judged: _Judged | None) -> Iterator[Failure]:
         if judged is not None:
             ego = {self.scenario.ego: self.problem.ego}
             for assignment in self._search(plan, judged[0], ego, accept_unknown=True):
                 if (failure := self._first_open(plan, assignment)) is not None:
                     yield failure
 
-    def _slots(
-        self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]
-    ) -> tuple[list[Slot], set[tuple[int, int]] | None] | None:
-        """Objects with their candidates and which are undecided, None where the ego is; None where nobody is left."""
+    def _slots(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> _Judged | None:
+        """Objects with their candidates; None where nobody is left."""
         ego = {self.scenario.ego: self.problem.ego}
         answers = [self._judge(group, ego, 1) for group in plan.ego_only]
         if Consistency.NO in answers:
