@@ -7,7 +7,7 @@ option, and the results become one random choice again.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import cast
 
 from scenicq.compiler.coerce import kind_of_model, to_node
@@ -27,6 +27,7 @@ __all__ = [
     "make_choice",
     "map_choice",
     "nothing_to_choose",
+    "possible_values",
     "regions_apart",
 ]
 
@@ -128,11 +129,20 @@ def is_choice(value: ModelValue) -> bool:
     return isinstance(value, Choice)
 
 
+def possible_values(value: ModelValue) -> Iterator[ModelValue]:
+    """What a value may come out as: the options of a random choice, nested ones in their places, or it alone."""
+    stack = [value]
+    while stack:
+        each = stack.pop()
+        if isinstance(each, Choice):
+            stack += reversed(each.options)
+        else:
+            yield each
+
+
 def holds_instances(value: ModelValue) -> bool:
     """Whether a value is a random choice that may come out as a point or an object."""
-    if not isinstance(value, Choice):
-        return False
-    return any(isinstance(option, Instance) or holds_instances(option) for option in value.options)
+    return isinstance(value, Choice) and any(isinstance(each, Instance) for each in possible_values(value))
 
 
 def _check_outcomes(choices: list[Choice], span: Span) -> None:

@@ -11,7 +11,7 @@ from typing import cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random, plain_binary
-from scenicq.compiler.choices import distribute, is_choice
+from scenicq.compiler.choices import distribute, is_choice, possible_values
 from scenicq.compiler.coerce import kind_of_model
 from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
@@ -75,30 +75,21 @@ def _same_choice(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
         return None
     if not atoms[0] & atoms[1]:
         return False
-    codes: dict[ModelValue, float] = {atom: float(code) for code, atom in enumerate(dict.fromkeys(_options(left)))}
+    codes: dict[ModelValue, float] = {
+        atom: float(code) for code, atom in enumerate(dict.fromkeys(possible_values(left)))
+    }
     one, other = _numbered(left, codes, span), _numbered(right, codes, span)
     return build.compare(CompareOp.EQ, one, other, span)
 
 
-def _options(value: ModelValue) -> list[ModelValue]:
-    """What a random choice may come out as, those of nested choices included, in their order."""
-    found: list[ModelValue] = []
-    stack = [value]
-    while stack:
-        each = stack.pop()
-        if isinstance(each, Choice):
-            stack += reversed(each.options)
-        else:
-            found.append(each)
-    return found
-
-
 def _atoms(value: ModelValue) -> set[ModelValue] | None:
     """The elements that a value may be, or None where it may be something else."""
-    options = _options(value)
-    return (
-        set(options) if all(each is None or isinstance(each, NetworkElement | Maneuver) for each in options) else None
-    )
+    found = set[ModelValue]()
+    for each in possible_values(value):
+        if each is not None and not isinstance(each, NetworkElement | Maneuver):
+            return None
+        found.add(each)
+    return found
 
 
 def _numbered(value: ModelValue, codes: dict[ModelValue, float], span: Span) -> Node:

@@ -6,6 +6,7 @@ The names are those of Scenic's driving domain.
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import shapely
@@ -57,9 +58,7 @@ _ATTRIBUTES: dict[type, frozenset[str]] = {
     ),
     Lane: frozenset("adjacentLanes group isForward maneuvers predecessors road sections successors".split()),
     LaneGroup: frozenset("_opposite lanes opposite road".split()),
-    Road: frozenset(
-        "backwardLanes forwardLanes intersection is1Way laneGroups lanes sections signals".split(),
-    ),
+    Road: frozenset("backwardLanes forwardLanes intersection is1Way laneGroups lanes sections signals".split()),
     RoadSection: frozenset("backwardLanes forwardLanes lanes lanesByOpenDriveID road".split()),
     Intersection: frozenset("incomingLanes is3Way is4Way lanes maneuvers outgoingLanes roads signals".split()),
     Sidewalk: frozenset({"road"}),
@@ -81,12 +80,18 @@ def names_of(value: Network | NetworkElement | Maneuver | Signal) -> set[str]:
     if isinstance(value, Network):
         own = _NETWORK | LOOKUPS.keys() | METHODS | value.otherRegions.keys()
         return {"findPointIn", *own, *names_worked_out(value)}
-    own = {name for kind, names in _ATTRIBUTES.items() if isinstance(value, kind) for name in names}
+    own = _own_names(type(value))
     if isinstance(value, Signal):
-        return own
+        return set(own)
     if isinstance(value, Maneuver):
-        return own | _MANEUVER
-    return own | names_worked_out(value) | (METHODS if value.orientation is not None else set())
+        return {*own, *_MANEUVER}
+    return set(own) | names_worked_out(value) | (METHODS if value.orientation is not None else set())
+
+
+@cache
+def _own_names(kind: type) -> frozenset[str]:
+    """What a program may read of the values of a class as it stands."""
+    return frozenset(name for base, names in _ATTRIBUTES.items() if issubclass(kind, base) for name in names)
 
 
 def is_of_elements(name: str) -> bool:
@@ -140,7 +145,7 @@ def of_element(run: Runner, value: NetworkElement | Maneuver | Signal, name: str
         method = method_of(run, value, name)
         if method is not None:
             return method
-    if not any(isinstance(value, kind) and name in names for kind, names in _ATTRIBUTES.items()):
+    if name not in _own_names(type(value)):
         return MISSING
     try:
         found: Any = getattr(value, name)

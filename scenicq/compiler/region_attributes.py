@@ -12,6 +12,7 @@ from typing import cast
 from shapely.geometry import LineString
 
 from scenicq.compiler import operators
+from scenicq.compiler.choices import possible_values
 from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING
 from scenicq.compiler.values import Builtin, Choice, ModelValue, fail
@@ -28,14 +29,7 @@ __all__ = ["REGION_METHODS", "corner", "holds_regions", "of_region"]
 
 def holds_regions(choice: Choice) -> bool:
     """Whether each outcome of a random choice is a region."""
-    stack: list[ModelValue] = [choice]
-    while stack:
-        value = stack.pop()
-        if isinstance(value, Choice):
-            stack += value.options
-        elif kind_of_model(value) != "region":
-            return False
-    return True
+    return all(kind_of_model(each) == "region" for each in possible_values(choice))
 
 
 def of_region(value: Node, name: str, span: Span) -> ModelValue:
