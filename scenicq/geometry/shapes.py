@@ -194,14 +194,14 @@ def intersection(a: Shape, b: Shape) -> Shape:
     return _overlay(shapely.intersection, a, b)
 
 
-def shared(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+def pair_intersections(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
     """What each pair of geometries has in common."""
     return _overlay(shapely.intersection, a, b)
 
 
 def shared_areas(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
     """What each pair of polygons has in common, in square metres."""
-    return shapely.area(shared(a, b))
+    return shapely.area(pair_intersections(a, b))
 
 
 def intersections(geometries: Sequence[Shape], window: Shape) -> list[Shape]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -128,7 +128,9 @@ class _Log:
         self._tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
         self._known = specification("argoverse2")
         self._known.count_files(_files(log), report)
-        rows = read_feather(log / _BOXES, _BOX, {"num_interior_pts": "integer"}, count=self._count(_BOXES))
+        rows = read_feather(
+            log / _BOXES, _BOX, {"num_interior_pts": "integer"}, count=self._known.column_counter(_BOXES, report)
+        )
         self._poses = self._read_poses({time for time in rows["timestamp_ns"] if time is not None})
         for number in range(len(rows["timestamp_ns"])):
             try:
@@ -184,7 +186,11 @@ class _Log:
         )
 
     def _read_poses(self, wanted: set[int]) -> dict[int, Rigid]:
-        rows = read_feather(self._log / _POSES, {"timestamp_ns": "integer", **POSE}, count=self._count(_POSES))
+        rows = read_feather(
+            self._log / _POSES,
+            {"timestamp_ns": "integer", **POSE},
+            count=self._known.column_counter(_POSES, self._report),
+        )
         poses: dict[int, Rigid] = {}
         for number, time in enumerate(rows["timestamp_ns"]):
             if time in wanted and time not in poses:
@@ -222,9 +228,6 @@ class _Log:
             stems = [(file.stem, file.name) for file in camera.glob("*.jpg")]
             found[camera.name] = sorted((int(stem), name) for stem, name in stems if stem.isascii() and stem.isdigit())
         return found
-
-    def _count(self, table: str) -> Callable[[Sequence[str], int], object]:
-        return lambda names, rows: self._known.count_columns(table, names, self._report, rows)
 
     def _sensors(self, time: int, cameras: Mapping[str, list[tuple[int, str]]]) -> dict[str, str]:
         # A folder that is the log itself has no name of its own here.

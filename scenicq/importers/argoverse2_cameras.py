@@ -118,9 +118,8 @@ def _mounts(
 
 def _read(file: Path, columns: Mapping[str, str], report: Report) -> dict[str, Any]:
     """Columns of a file of the calibration; what is not read is counted."""
-    table = f"calibration/{file.name}"
-    known = specification("argoverse2")
-    return read_feather(file, columns, count=lambda names, rows: known.count_columns(table, names, report, rows))
+    counter = specification("argoverse2").column_counter(f"calibration/{file.name}", report)
+    return read_feather(file, columns, count=counter)
 
 
 def _count_nothing(names: Sequence[str], rows: int) -> None:

@@ -79,9 +79,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
     file = place.files[0]
     known = specification("argoverse2-forecasting")
     known.count_files((each.name for each in file.parent.iterdir()), report)
-    rows = read_parquet(
-        file, _COLUMNS, _OPTIONAL, count=lambda names, rows: known.count_columns(_TABLE, names, report, rows)
-    )
+    rows = read_parquet(file, _COLUMNS, _OPTIONAL, count=known.column_counter(_TABLE, report))
     steps: dict[int, list[LabelObject]] = {}
     for number in range(len(rows["track_id"])):
         try:

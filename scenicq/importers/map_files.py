@@ -34,7 +34,7 @@ def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict
     """The elements of maps that are at a place where maps can be.
 
     Args:
-        maps: Of a source.
+        maps: The maps of a source.
         report: Takes what is left out.
     """
     kept: dict[str, tuple[MapFeature, ...]] = {}
@@ -118,7 +118,6 @@ def _storable_of(features: Sequence[MapFeature], file: str, report: Report) -> I
 
 
 def _texts(feature: MapFeature) -> list[object]:
-
     # lines are numbers by now, and most of what there is
     properties = {key: value for key, value in feature.properties.items() if key not in LINES}
     return [feature.id, feature.kind, properties]

@@ -78,11 +78,11 @@ def _beside(lanes: Sequence[MapFeature], sign: float) -> dict[str, str]:
     travel = np.concatenate([_directions(line, _SAMPLES * line.length) for line in lines])
     aside = np.column_stack((-travel[:, 1], travel[:, 0])) * sign
     rays: Any = shapely.linestrings(np.stack((start, start + _REACH_M * aside), axis=1))
-    own_m = shapely.length(shapes.shared(rays, areas[owner]))
+    own_m = shapely.length(shapes.pair_intersections(rays, areas[owner]))
     ray, other = shapely.STRtree(areas).query(rays, predicate="intersects")
     kept = owner[ray] != other
     ray, other = ray[kept], other[kept]
-    away_m = shapely.distance(shapely.points(start[ray]), shapes.shared(rays[ray], areas[other]))
+    away_m = shapely.distance(shapely.points(start[ray]), shapes.pair_intersections(rays[ray], areas[other]))
     # Lanes that fork or merge overlap: they are not beside each other there.
     near = np.abs(away_m - own_m[ray]) <= _GAP_M
     votes: defaultdict[int, Counter[int]] = defaultdict(Counter)

@@ -42,8 +42,8 @@ def tell_order(name: str, times_us: Sequence[int], report: Report, *, numbered: 
     """Tell a clock that was set back.
 
     Args:
-        name: Of the recording.
-        times_us: Of its labels, as the source orders them.
+        name: The name of the recording.
+        times_us: The times of its labels, as the source orders them.
         report: Takes what is told.
         numbered: Whether the source numbers its labels, so that their order is no accident.
     """
@@ -62,7 +62,7 @@ def tell_recording(columns: RecordingColumns, report: Report) -> None:
     """Tell a rate that no recorder has, and tracks whose class changes.
 
     Args:
-        columns: Of the recording.
+        columns: The columns of the recording.
         report: Takes what is told.
     """
     times = columns.times_us

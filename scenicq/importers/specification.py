@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path, PurePosixPath
@@ -73,6 +73,10 @@ class Specification:
         """Count the columns of a table that are left out, with its rows."""
         for column in columns:
             self.count(f"{table}/{column}" if table else column, report, rows)
+
+    def column_counter(self, table: str, report: Report) -> Callable[[Iterable[str], int], None]:
+        """What counts the columns of a table that are left out, from all names and how many rows it has."""
+        return lambda columns, rows: self.count_columns(table, columns, report, rows)
 
     def count_rows(self, rows: Iterable[Mapping[str, Any]], report: Report, at: str) -> None:
         """Count the fields of records that are left out, those of records within them not.

@@ -11,7 +11,6 @@ import os
 import shlex
 import shutil
 import subprocess
-import sys
 import threading
 from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -25,9 +24,6 @@ from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem
 from scenicq.smt.pool import end_group
 from scenicq.smt.smtlib import read_reply, to_smtlib
-
-if sys.platform == "linux":
-    pass
 
 __all__ = ["SmtlibSolver"]
 

@@ -145,8 +145,8 @@ def check_path(folder: Path, code: str) -> None:
     """Refuse a folder whose path is no text: neither Arrow nor DuckDB open files in it.
 
     Args:
-        folder: Of a dataset.
-        code: Of the error.
+        folder: The folder of a dataset.
+        code: The code of the error.
 
     Raises:
         DataError: It is none, as where a path has bytes that are not UTF-8, or Python takes it for ASCII.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,22 +12,14 @@ from full_sources import FORMATS
 from scenicq.importers.ingest import ingest
 
 
-def waymo(folder: Path, change: Callable[[list[dict[str, Any]]], None]) -> None:
-    document = FORMATS["waymo"].document()
-    change(document["waymo"]["map_features:8"])
-    FORMATS["waymo"].write(document, folder)
-
-
-def interchange(folder: Path, change: Callable[[list[dict[str, Any]]], None]) -> None:
-    square = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 0.0]]
-    shape = {"type": "Polygon", "coordinates": [square]}
-    features = [{"type": "Feature", "geometry": shape, "properties": {"id": "1", "kind": "lane"}}]
-    change(features)
-    label = {"id": "f", "recording": "r", "timestamp_us": 1, "map": "town", "objects": []}
-    (folder / "maps").mkdir()
-    (folder / "dataset.json").write_text('{"interchange": 1, "angle": "heading", "classes": "scenic"}')
-    (folder / "labels.jsonl").write_text(json.dumps(label | {"ego": {"position": [4.0, 4.0], "heading": 0.0}}))
-    (folder / "maps" / "town.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+def write(format_: str, folder: Path, change: Callable[[list[dict[str, Any]]], object]) -> Path:
+    """Write a source that has everything, after a change of the elements of its map."""
+    document = FORMATS[format_].document()
+    path = {"waymo": ("waymo", "map_features:8"), "interchange": ("geojson", "features")}[format_]
+    change(document[path[0]][path[1]])
+    folder.mkdir()
+    FORMATS[format_].write(document, folder)
+    return folder
 
 
 def messages(folder: Path) -> list[str]:
@@ -36,19 +27,17 @@ def messages(folder: Path) -> list[str]:
     return [each.message for each in ingest(folder, folder.parent / "d" / "x").diagnostics]
 
 
-@pytest.mark.parametrize("write", [waymo, interchange])
-def test_a_map_without_elements(write, tmp_path):
-    (tmp_path / "s").mkdir()
-    write(tmp_path / "s", list.clear)
-    (message,) = [each for each in messages(tmp_path / "s") if "map" in each]
+@pytest.mark.parametrize("format_", ["waymo", "interchange"])
+def test_a_map_without_elements(format_, tmp_path):
+    source = write(format_, tmp_path / "s", list.clear)
+    (message,) = [each for each in messages(source) if "map" in each]
     assert message.endswith("has no elements; its labels are kept without a road network")
 
 
-@pytest.mark.parametrize("write", [waymo, interchange])
-def test_a_map_with_elements(write, tmp_path):
-    (tmp_path / "s").mkdir()
-    write(tmp_path / "s", lambda features: None)
-    assert not [each for each in messages(tmp_path / "s") if "no elements" in each or "no intersection" in each]
+@pytest.mark.parametrize("format_", ["waymo", "interchange"])
+def test_a_map_with_elements(format_, tmp_path):
+    source = write(format_, tmp_path / "s", lambda features: None)
+    assert not [each for each in messages(source) if "no elements" in each or "no intersection" in each]
 
 
 def test_lanes_of_which_none_lies_in_an_intersection(tmp_path):
@@ -58,6 +47,5 @@ def test_lanes_of_which_none_lies_in_an_intersection(tmp_path):
         for feature in features:
             feature.get("lane:3", {}).pop("interpolating:3", None)
 
-    (tmp_path / "s").mkdir()
-    waymo(tmp_path / "s", clear_flag)
-    assert len([each for each in messages(tmp_path / "s") if "no lane is `interpolating`" in each]) == 1
+    source = write("waymo", tmp_path / "s", clear_flag)
+    assert len([each for each in messages(source) if "no lane is `interpolating`" in each]) == 1

@@ -54,7 +54,7 @@ def roles_in(label: Label, result: Result) -> dict[str, str]:
     """The label object of each role that is observed in a frame, by the name of the role.
 
     Args:
-        label: Of the result's frame, or of any frame of its interval.
+        label: The label of the result's frame, or of any frame of its interval.
         result: Its verdict names objects where it is on a frame, tracks where it is on an interval.
     """
     verdict = result.verdict
