@@ -31,7 +31,10 @@ def bucket() -> Iterator[Any]:
     with pytest.MonkeyPatch.context() as patch:
         for name, value in variables.items():
             patch.setenv(name, value)
+        # a file system that fsspec has cached speaks to the server of the module before
+        s3fs.S3FileSystem.clear_instance_cache()
         files = s3fs.S3FileSystem(skip_instance_cache=True)
         files.mkdir("fleet")
         yield files
+    s3fs.S3FileSystem.clear_instance_cache()
     running.stop()
