@@ -19,7 +19,18 @@ from contextlib import contextmanager
 from contextvars import ContextVar, Token
 from dataclasses import dataclass
 
-__all__ = ["TimeIsUp", "Trials", "clock", "leave_out", "limited", "look", "trials_left", "uncounted", "waiting"]
+__all__ = [
+    "TimeIsUp",
+    "Trials",
+    "clock",
+    "leave_out",
+    "limited",
+    "look",
+    "time_is_up",
+    "trials_left",
+    "uncounted",
+    "waiting",
+]
 
 
 class TimeIsUp(Exception):
@@ -100,6 +111,15 @@ def look() -> None:
     if left < 0:
         raise TimeIsUp
     limit.not_before = time.perf_counter() + left
+
+
+def time_is_up() -> bool:
+    """Whether the time of the block around is used up."""
+    try:
+        look()
+    except TimeIsUp:
+        return True
+    return False
 
 
 @dataclass(slots=True)

@@ -130,14 +130,15 @@ class Matcher:
     ) -> Iterator[Verdict]:
         """The verdicts of labels: by first fit side by side, else each by a search of its own."""
         found: dict[int, Match] = {}
-        with suppress(TimeIsUp), limited(self.options.timeout_s * len(labels)):
+        time_for_all = limited(self.options.timeout_s * len(labels))
+        with suppress(TimeIsUp), time_for_all, limited(self.options.timeout_s * len(labels) / 2):
             for fit, rows in self.plans.first_fits(labels, given).items():
                 for batch in fit.fill(rows, self.options, lookups):
                     found.update(self._verdicts.matches(fit, batch))
         for number, label in enumerate(labels):
             verdict: Verdict | None = found.get(number)
             if verdict is None:
-                with limited(self.options.timeout_s):
+                with time_for_all, limited(self.options.timeout_s):
                     verdict = next(self._findings(label, lookups, reporter, given)).verdict
             yield verdict
 

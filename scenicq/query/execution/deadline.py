@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from time import monotonic
 
-__all__ = ["DeadlineError", "check_deadline"]
+__all__ = ["DeadlineError", "check_deadline", "time_left_s"]
 
 
 class DeadlineError(Exception):
@@ -23,3 +24,8 @@ def check_deadline(until: float | None) -> None:
     """
     if until is not None and monotonic() >= until:
         raise DeadlineError
+
+
+def time_left_s(until: float | None) -> float:
+    """Seconds until the time is over, below 0 afterwards; infinity without a limit."""
+    return math.inf if until is None else until - monotonic()

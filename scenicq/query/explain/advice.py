@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import math
 import re
-import time
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
@@ -20,14 +19,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenicq.budget import limited, time_is_up
 from scenicq.errors import Span
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
-from scenicq.match.verdict import Match
+from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.block_matcher import CompiledMap
+from scenicq.query.execution.deadline import time_left_s
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import MAP_LACKS, Query
 from scenicq.query.explain.nearest_miss import show_tolerance
@@ -68,8 +69,6 @@ _WIDER = (("position", 1.0), ("position", 4.0), ("heading", math.radians(20)), (
 """Parts of the tolerance that are tried, in metres and radians."""
 _WIDER_NUMBER = 0.5
 """Tolerance of speeds, sizes and other numbers that is tried."""
-_PATIENCE = 5
-"""Seconds that may pass for one of work: solvers work elsewhere, and others on the same machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,19 +145,6 @@ class Advice:
     without_map: int = 0
 
 
-class _Clock:
-    """Says when an amount of work is done."""
-
-    def __init__(self, budget_s: float) -> None:
-        self._work_end = time.process_time() + budget_s
-        self._end = time.monotonic() + _PATIENCE * budget_s
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the time is up."""
-        return time.process_time() > self._work_end or time.monotonic() > self._end
-
-
 @dataclass(frozen=True, slots=True)
 class _Sample:
     """The frames that changes are tried on.
@@ -181,10 +167,9 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
 
     Args:
         query: After its results were taken: the changes are tried in the order of what excluded most frames.
-        budget_s: Seconds of work that the changes may take; the first is tried in any case.
+        budget_s: Seconds of work that the changes may take, the solver's included; the first is tried in any case.
         brief: Whether only a few changes are tried, and of each only a few frames decided.
     """
-    clock = _Clock(budget_s)
     excluded = [each for each in query.funnel.excluded.most_common() if not each[0].startswith(MAP_LACKS)]
     without_map = query.funnel.excluded.total() - sum(frames for _, frames in excluded)
     worlds = {world.network.name: world for world in query.fitting() if query.blocks(world.network.name)}
@@ -201,21 +186,21 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
     few, decided = (_FEW_CHANGES, _FEW_DECIDED) if brief else (_MOST_CHANGES, _MOST_DECIDED)
     found: list[Outlook] = []
     complete = True
-    with ExitStack() as stack:
+    with ExitStack() as stack, limited(min(budget_s, time_left_s(query.options.until))):
         runs, maps = (_FEW_RUNS, _FEW_MAPS) if brief else (_MOST_RUNS, _MOST_MAPS)
         sample = _sample(query, worlds, stack, runs, maps)
         solver = stack.enter_context(LazySolver(query.options.solver))
         for number, change in enumerate(changes):
-            if number and (clock.is_over or number >= (few if found else _MOST_CHANGES)):
+            if number and (time_is_up() or number >= (few if found else _MOST_CHANGES)):
                 complete = False
                 break
-            outlook = _outlook(query.options.match, sample, change, clock, solver, decided)
+            outlook = _outlook(query.options.match, sample, change, solver, decided)
             if outlook.most > query.funnel.matches:
                 found.append(outlook)
         if not found and query.funnel.matches == 0:
             paired = _pairs(changes, _FEW_PAIRED if brief else _MOST_PAIRED)
-            for change in itertools.takewhile(lambda _: not clock.is_over, paired):
-                outlook = _outlook(query.options.match, sample, change, clock, solver, decided)
+            for change in itertools.takewhile(lambda _: not time_is_up(), paired):
+                outlook = _outlook(query.options.match, sample, change, solver, decided)
                 if outlook.most > 0:
                     found.append(outlook)
     found.sort(key=lambda each: (-each.least, -each.most))
@@ -339,27 +324,26 @@ def _changed_options(options: MatchOptions, changes: Sequence[ProgramChange]) ->
     return options
 
 
-def _outlook(
-    options: MatchOptions, sample: _Sample, change: ProgramChange, clock: _Clock, solver: LazySolver, most: int
-) -> Outlook:
+def _outlook(options: MatchOptions, sample: _Sample, change: ProgramChange, solver: LazySolver, most: int) -> Outlook:
     """Count the frames that a change leaves, and decide at most so many of them while there is time."""
     changes = change.both or (change,)
     options = _changed_options(options, changes)
-    left = matched = decided = 0
+    left = matched = decided = looked_at = 0
     for name, connection in sample.held.items():
         world = sample.worlds[name]
         world = CompiledMap.of(_changed(world.scenario, changes), world.network, options, prefilter=True)
         missed = run_plan(connection, world.plan)
         count = int(np.count_nonzero(missed < 0))
         left += count
-        if not count or decided >= most:
+        if not count or looked_at >= most or time_is_up():
             continue
         matcher = Matcher(world.scenario, options, solver)
-        labels = islice(candidates(connection, world.plan, motion=world.motion), most - decided)
+        labels = islice(candidates(connection, world.plan, motion=world.motion), most - looked_at)
         for verdict in matcher.match_all([(each.label, each.among) for each in labels]):
-            decided += 1
+            looked_at += 1
             matched += isinstance(verdict, Match)
-            if clock.is_over:
+            decided += not isinstance(verdict, Unknown)
+            if time_is_up():
                 break
     sampled = sample.frames < sample.total
     scale = sample.total / sample.frames if sampled and sample.frames else 1.0

@@ -6,18 +6,23 @@ import json
 import random
 import re
 import shutil
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from scenicq import budget
 from scenicq.errors import Source
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
+from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.explain import advice as advice_module
 from scenicq.query.explain import prefilter_counts
 from scenicq.query.explain.advice import advice
+from scenicq.smt.solver import NoAnswer
 from scenicq.store.dataset import open_dataset
 
 SAMPLES = Path(__file__).parents[3] / "sample_data"
@@ -34,8 +39,8 @@ def dataset(crossroads):
     return open_dataset(crossroads)
 
 
-def taken(dataset, text, tolerance="position=0.25,heading=5deg"):
-    options = QueryOptions(match=MatchOptions(tolerance=parse_tolerance(tolerance)), solver="portable")
+def taken(dataset, text, tolerance="position=0.25,heading=5deg", **match):
+    options = QueryOptions(match=MatchOptions(tolerance=parse_tolerance(tolerance), **match), solver="portable")
     query = Query(dataset, Source("p.scenic", text), options)
     list(query.results())
     return query
@@ -123,6 +128,40 @@ def test_without_time_one_change_is_tried(dataset):
     found = advice(query, budget_s=0.0)
     assert not found.complete
     assert len(found.outlooks) <= 1
+
+
+class _Hanging:
+    """A solver that takes all the time that it is given, on clocks of its own."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 0.0
+        for clock in ("thread_time", "perf_counter"):
+            monkeypatch.setattr(budget.time, clock, lambda: self.now_s)
+        monkeypatch.setattr(LazySolver, "check", self.check)
+
+    def check(self, problem: object, *, precision: float, timeout_s: float) -> NoAnswer:
+        self.now_s += timeout_s
+        return NoAnswer("timeout")
+
+
+@pytest.mark.parametrize("until_s", [None, 0.5])
+def test_what_takes_all_time_has_no_more_than_the_budget(until_s, dataset, monkeypatch):
+    """A label may take a minute, the advice not: neither in one label nor in all of them."""
+    text = (
+        "model scenic.domains.driving.model\nego = new Car\nother = new Car\nrequire (distance to other) < 1\nmutate\n"
+    )
+    solver = _Hanging(monkeypatch)
+    query = taken(dataset, text, timeout_s=60.0, method="smt")
+    assert query.funnel.unknowns * 60 <= solver.now_s + 1e-6
+    assert query.funnel.unknowns
+    if until_s is not None:
+        query.options = replace(query.options, until=time.monotonic() + until_s)
+    before_s = solver.now_s
+    found = advice(query, budget_s=2.0, brief=True)
+    assert 0 < solver.now_s - before_s <= (until_s or 2.0) + 1e-6
+    assert not found.complete
+    # what nobody decided may match
+    assert all(outlook.least < outlook.most for outlook in found.outlooks)
 
 
 def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroads, scenarios, tmp_path):
