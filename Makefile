@@ -87,8 +87,8 @@ else
 endif
 
 PROGRAMS ?= 3000
-conformance-random: $(READY) ## Match scenes that Scenic 3.1.1 draws from random programs on five towns (MAPS=folders of OpenDRIVE maps, PROGRAMS=, SEED=)
-	$(BIN)/python tests/conformance/random_scenes.py --maps $(MAPS) --programs $(PROGRAMS) --seed $(ONE)
+conformance-random: $(READY) ## Match scenes that Scenic 3.1.1 draws from random programs on five towns (MAPS=folders of OpenDRIVE maps, PROGRAMS=, SEED= (a fresh one))
+	$(BIN)/python tests/conformance/random_scenes.py --maps $(MAPS) --programs $(PROGRAMS) --seed $(FRESH)
 
 TRACES ?= 2
 conformance-time: $(READY) ## Match what Scenic 3.1.1 simulates over time (MAP=an OpenDRIVE file; or SCENIC=a checkout; TRACES= of each program)

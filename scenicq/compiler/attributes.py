@@ -31,7 +31,7 @@ from scenicq.geometry.elements import Lane, Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
 from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS
 
-__all__ = ["attribute", "part_of"]
+__all__ = ["PARTS", "attribute", "part_of"]
 
 _PLAIN: dict[type, frozenset[str]] = {
     str: frozenset("lower upper strip lstrip rstrip split startswith endswith replace title isdigit join".split()),
@@ -40,7 +40,7 @@ _PLAIN: dict[type, frozenset[str]] = {
     set: frozenset("add discard remove union intersection difference update copy".split()),
     tuple: frozenset("index count".split()),
 }
-_PARTS: dict[str, tuple[float, float]] = {
+PARTS: dict[str, tuple[float, float]] = {
     "front": (0.0, 0.5),
     "back": (0.0, -0.5),
     "left": (-0.5, 0.0),
@@ -50,16 +50,16 @@ _PARTS: dict[str, tuple[float, float]] = {
     "back left": (-0.5, -0.5),
     "back right": (0.5, -0.5),
 }
-_PART_NAMES = {"".join([part.split()[0], *(word.title() for word in part.split()[1:])]): part for part in _PARTS}
+_PART_NAMES = {"".join([part.split()[0], *(word.title() for word in part.split()[1:])]): part for part in PARTS}
 
 
 def part_of(part: str, target: ModelValue, span: Span) -> Instance:
     """`front of O`, `back left of O` and so on: an oriented point on the box (language paper, table 5)."""
     if not (isinstance(target, Instance) and target.oriented):
         raise fail("wrong-type", f"`{part} of` needs an object", span, f"this is {describe(target)}")
-    if part not in _PARTS:
+    if part not in PARTS:
         raise fail("unsupported-construct", f"`{part} of` is not supported: labels are matched in 2D", span)
-    right, ahead = _PARTS[part]
+    right, ahead = PARTS[part]
     size = [to_scalar(property_node(target, name, span), span) for name in ("width", "length")]
     x, y = (
         cast(Node, operators.binary("*", side, part, span)) for side, part in zip(size, (right, ahead), strict=True)
@@ -269,6 +269,21 @@ def _of_field(run: Runner, value: Node, name: str) -> ModelValue:
     return Builtin(name, follow_from)
 
 
+def _angle_with(value: Node, other: Node, span: Span) -> Node:
+    """How far a vector is turned from another, counter-clockwise."""
+    turned = build.minus(build.bearing(other, span), build.bearing(value, span), span)
+    return build.arithmetic(ArithmeticOp.WRAP, turned, span=span)
+
+
+def _dot(value: Node, other: Node, span: Span) -> Node:
+    """The scalar product."""
+    along_x, along_y = (
+        build.arithmetic(ArithmeticOp.MUL, build.coordinate(value, n), build.coordinate(other, n), span=span)
+        for n in (0, 1)
+    )
+    return build.add(along_x, along_y, span)
+
+
 def _of_node(value: Node, name: str, span: Span) -> ModelValue:
     match kind_of(value), name:
         case "vector", "x" | "y":
@@ -284,6 +299,10 @@ def _of_node(value: Node, name: str, span: Span) -> ModelValue:
             return Builtin(name, lambda span, other: operators.distance_to(other, value, span))
         case "vector", "angleTo" | "azimuthTo":
             return Builtin(name, lambda span, other: operators.angle_to(other, value, span))
+        case "vector", "angleWith":
+            return Builtin(name, lambda span, other: _angle_with(value, to_vector(other, span), span))
+        case "vector", "dot":
+            return Builtin(name, lambda span, other: _dot(value, to_vector(other, span), span))
         case "vector", "rotatedBy":
             return Builtin(name, lambda span, angle: build.rotate(value, to_heading(angle, span), span))
         case "vector", "offsetRotated" | "offsetLocally":

@@ -1,4 +1,7 @@
-"""Scenic's own expressions: which operator each stands for, over evaluated operands (language paper, figure 9)."""
+"""Scenic's own expressions: which operator each stands for, over evaluated operands (language paper, figure 9).
+
+Programs may also call operators as functions, by the names that Scenic's compiler gives them.
+"""
 
 # Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
 # pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -6,25 +9,131 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from scenicq.compiler import operators
-from scenicq.compiler.attributes import part_of
+from scenicq.compiler.attributes import PARTS, part_of
 from scenicq.compiler.choices import distribute
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.environment import Environment, Runner
 from scenicq.compiler.following import follow
-from scenicq.compiler.values import ModelValue, fail, lift
+from scenicq.compiler.values import Builtin, ModelValue, fail, lift
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.syntax import ast
 
-__all__ = ["construct"]
+__all__ = ["construct", "operator_functions"]
 
 
-def _apply(span: Span, function: Callable[..., ModelValue], *operands: ModelValue) -> ModelValue:
-    """Apply an operator as soon as its operands are known, to every outcome of random choices of objects."""
-    return lift(lambda *values: distribute(function, values, span), *operands)
+class _Operation(NamedTuple):
+    """An operator over evaluated operands.
+
+    Attributes:
+        operands: Names of the operands in the node, in the order of the meaning; one that is left out is the ego.
+        meaning: Takes the interpreter, the operands and the span.
+        look_ups: How many look-ups on the map it takes at most.
+        is_spread: Whether it applies to every outcome of random choices of objects.
+    """
+
+    operands: str
+    meaning: Callable[..., ModelValue]
+    look_ups: int = 0
+    is_spread: bool = True
+
+
+def _pure(function: Callable[..., ModelValue]) -> Callable[..., ModelValue]:
+    """The meaning of an operator that asks nothing of the interpreter."""
+    return lambda run, *values: function(*values)
+
+
+def _relative_position(target: ModelValue, origin: ModelValue, span: Span) -> ModelValue:
+    return build.vector_difference(to_vector(target, span), to_vector(origin, span), span)
+
+
+def _implies(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    return operators.combine("or", [operators.combine("not", [left], span), right], span)
+
+
+def _sight(combine: Callable[..., ModelValue]) -> _Operation:
+    def part(run: Runner, region: ModelValue, viewer: ModelValue, span: Span) -> ModelValue:
+        return combine(operators.existing(region, span), operators.visible_region(viewer, span), span)
+
+    return _Operation("region viewer", part)
+
+
+def _part(name: str) -> _Operation:
+    return _Operation("target", lambda run, target, span: part_of(name, target, span))
+
+
+_OPERATIONS: dict[type, _Operation] = {
+    ast.Deg: _Operation("value", _pure(operators.degrees), is_spread=False),
+    ast.VectorOperator: _Operation("x y", lambda run, x, y, span: to_vector((x, y), span), is_spread=False),
+    ast.FieldAt: _Operation("field position", _pure(operators.direction_at), look_ups=1),
+    ast.RelativeTo: _Operation("left right", _pure(operators.relative_to)),
+    ast.OffsetBy: _Operation("origin offset", _pure(operators.offset)),
+    ast.OffsetAlong: _Operation("origin direction offset", _pure(operators.along)),
+    ast.Follow: _Operation("field origin distance", follow, look_ups=100),
+    ast.RelativePosition: _Operation("target origin", _pure(_relative_position)),
+    ast.RelativeHeading: _Operation("target origin", _pure(operators.relative_heading)),
+    ast.ApparentHeading: _Operation("target origin", _pure(operators.apparent_heading)),
+    ast.DistanceOperator: _Operation("target origin", _pure(operators.distance_to), look_ups=1),
+    ast.DistancePast: _Operation("target origin", _pure(operators.distance_past)),
+    ast.Angle: _Operation("target origin", _pure(operators.angle_to)),
+    ast.CanSee: _Operation("viewer target", _pure(operators.can_see)),
+    ast.IntersectsOperator: _Operation("left right", _pure(operators.intersects)),
+    ast.Implies: _Operation("left right", _pure(_implies), is_spread=False),
+}
+_SEEN, _UNSEEN = _sight(operators.region_intersection), _sight(operators.region_difference)
+_FUNCTIONS: dict[str, tuple[_Operation, str]] = {
+    "FieldAt": (_OPERATIONS[ast.FieldAt], "field position"),
+    "RelativeTo": (_OPERATIONS[ast.RelativeTo], "left right"),
+    "OffsetAlong": (_OPERATIONS[ast.OffsetAlong], "origin direction offset"),
+    "Follow": (_OPERATIONS[ast.Follow], "field origin distance"),
+    "RelativePosition": (_OPERATIONS[ast.RelativePosition], "target origin"),
+    "RelativeHeading": (_OPERATIONS[ast.RelativeHeading], "target origin"),
+    "ApparentHeading": (_OPERATIONS[ast.ApparentHeading], "target origin"),
+    "DistanceFrom": (_OPERATIONS[ast.DistanceOperator], "target origin"),
+    "DistancePast": (_OPERATIONS[ast.DistancePast], "target origin"),
+    "AngleTo": (_OPERATIONS[ast.Angle], "target"),
+    "AngleFrom": (_OPERATIONS[ast.Angle], "origin target"),
+    "CanSee": (_OPERATIONS[ast.CanSee], "viewer target"),
+    "Intersects": (_OPERATIONS[ast.IntersectsOperator], "left right"),
+    "Implies": (_OPERATIONS[ast.Implies], "left right"),
+    "Visible": (_SEEN, "region"),
+    "NotVisible": (_UNSEEN, "region"),
+    "VisibleFromOp": (_SEEN, "region viewer"),
+    "NotVisibleFromOp": (_UNSEEN, "region viewer"),
+    **{part.title().replace(" ", ""): (_part(part), "target") for part in PARTS},
+}
+"""Operators by the names of their functions, and the operands that a function takes in its order."""
+
+
+def _apply(run: Runner, operation: _Operation, operands: Sequence[ModelValue], span: Span) -> ModelValue:
+    """Apply an operator as soon as its operands are known."""
+    run.budget.step(span, operation.look_ups * run.budget.LOOK_UP_STEPS)
+
+    def now(*values: ModelValue) -> ModelValue:
+        return operation.meaning(run, *values, span)
+
+    return lift(lambda *values: distribute(now, values, span) if operation.is_spread else now(*values), *operands)
+
+
+def operator_functions(run: Runner) -> dict[str, ModelValue]:
+    """The functions that programs may call in place of operators."""
+
+    def function(name: str, operation: _Operation, parameters: list[str]) -> Builtin:
+        def call(span: Span, *given: ModelValue) -> ModelValue:
+            values = dict(zip(parameters, given, strict=False))
+            missing = set(operation.operands.split()) - set(values)
+            if len(given) > len(parameters) or missing - {"origin", "viewer"}:
+                raise TypeError(f"{name}() takes {', '.join(parameters)}")
+            operands = [values[each] if each in values else run.ego(span) for each in operation.operands.split()]
+            return _apply(run, operation, operands, span)
+
+        return Builtin(name, call, lifted=False)
+
+    return {name: function(name, operation, taken.split()) for name, (operation, taken) in _FUNCTIONS.items()}
 
 
 def construct(
@@ -42,84 +151,13 @@ def construct(
         ScenarioError: Whatever is wrong with it.
     """
     span = node.span
-
-    def origin(part: ast.Expression | None) -> ModelValue:
-        return run.ego(span) if part is None else value(part)
-
     match node:
         case ast.New():
             return run.make_instance(node, scope)
-        case ast.Deg():
-            return lift(lambda v: operators.degrees(v, span), value(node.value))
-        case ast.VectorOperator():
-            return lift(lambda x, y: to_vector((x, y), span), value(node.x), value(node.y))
-        case ast.FieldAt():
-            run.budget.step(span, run.budget.LOOK_UP_STEPS)
-            return _apply(
-                span, lambda f, p: operators.direction_at(f, p, span), value(node.field), value(node.position)
-            )
-        case ast.RelativeTo():
-            return _apply(span, lambda a, b: operators.relative_to(a, b, span), value(node.left), value(node.right))
-        case ast.OffsetBy():
-            return _apply(span, lambda o, by: operators.offset(o, by, span), value(node.origin), value(node.offset))
-        case ast.OffsetAlong():
-            operands = value(node.origin), value(node.direction), value(node.offset)
-            return _apply(span, lambda o, d, by: operators.along(o, d, by, span), *operands)
-        case ast.Follow():
-            # a hundred look-ups at most
-            run.budget.step(span, 100 * run.budget.LOOK_UP_STEPS)
-            operands = value(node.field), origin(node.origin), value(node.distance)
-            return _apply(span, lambda f, o, d: follow(run, f, o, d, span), *operands)
         case ast.PartOf():
-            return _apply(span, lambda target: part_of(node.part, target, span), value(node.target))
-        case _:
-            return _measure(run, node, value, origin)
-
-
-def _measure(
-    run: Runner,
-    node: ast.Expression,
-    value: Callable[[ast.Expression], ModelValue],
-    origin: Callable[[ast.Expression | None], ModelValue],
-) -> ModelValue:
-    """Scalars, truth values and regions."""
-    span = node.span
-    match node:
-        case ast.RelativePosition():
-            return _apply(span, lambda t, o: build.vector_difference(to_vector(t, span), to_vector(o, span), span),
-                          value(node.target), origin(node.origin))  # fmt: skip
-        case ast.RelativeHeading():
-            return _apply(
-                span, lambda t, o: operators.relative_heading(t, o, span), value(node.target), origin(node.origin)
-            )
-        case ast.ApparentHeading():
-            return _apply(
-                span, lambda t, o: operators.apparent_heading(t, o, span), value(node.target), origin(node.origin)
-            )
-        case ast.DistanceOperator():
-            run.budget.step(span, run.budget.LOOK_UP_STEPS)
-            return _apply(span, lambda t, o: operators.distance_to(t, o, span), value(node.target), origin(node.origin))
-        case ast.DistancePast():
-            return _apply(
-                span, lambda t, o: operators.distance_past(t, o, span), value(node.target), origin(node.origin)
-            )
-        case ast.Angle():
-            return _apply(span, lambda t, o: operators.angle_to(t, o, span), value(node.target), origin(node.origin))
-        case ast.CanSee():
-            return _apply(span, lambda v, t: operators.can_see(v, t, span), value(node.viewer), value(node.target))
-        case ast.IntersectsOperator():
-            return _apply(span, lambda a, b: operators.intersects(a, b, span), value(node.left), value(node.right))
+            operation = _part(node.part)
         case ast.Visible() | ast.VisibleFrom():
-            viewer = run.ego(span) if isinstance(node, ast.Visible) else value(node.viewer)
-            combine = operators.region_difference if node.negated else operators.region_intersection
-
-            def part(region: ModelValue, seer: ModelValue) -> ModelValue:
-                return combine(operators.existing(region, span), operators.visible_region(seer, span), span)
-
-            return _apply(span, part, value(node.region), viewer)
-        case ast.Implies():
-            return lift(lambda a, b: operators.combine("or", [operators.combine("not", [a], span), b], span),
-                        value(node.left), value(node.right))  # fmt: skip
+            operation = _UNSEEN if node.negated else _SEEN
         case ast.InitialScenario():
             # the scene that is matched is the initial one
             run.dynamic("initial scenario", span)
@@ -128,6 +166,10 @@ def _measure(
             raise fail("unsupported-construct", f"`{span.text}` is not supported", span,
                        "does not describe one instant",
                        ("a scene is matched at one instant: state what holds then",))  # fmt: skip
+        case _ if type(node) in _OPERATIONS:
+            operation = _OPERATIONS[type(node)]
         case _:
             raise fail("unsupported-construct", f"`{span.text}` is not supported", span, "labels are matched in 2D",
                        ("use what has a meaning in the plane",))  # fmt: skip
+    parts: list[ast.Expression | None] = [getattr(node, name, None) for name in operation.operands.split()]
+    return _apply(run, operation, [run.ego(span) if part is None else value(part) for part in parts], span)

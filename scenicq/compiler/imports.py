@@ -9,6 +9,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 
 from scenicq.compiler.builtins import language_names
+from scenicq.compiler.constructs import operator_functions
 from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
 from scenicq.compiler.imported_files import ImportedFiles, Loader, absolute, packages
 from scenicq.compiler.interpreter import Interpreter
@@ -34,7 +35,8 @@ class Modules:
     def __init__(self, network: Network, version: int, initial: bool, loader: Loader | None) -> None:
         """Take the map, the version of Scenic, whether dynamic parts are ignored, and what reads files."""
         self.interpreter = Interpreter(version, initial, self._import, network)
-        names = language_names() | sequence_functions(self.interpreter) | root_classes(version)
+        functions = sequence_functions(self.interpreter) | operator_functions(self.interpreter)
+        names = language_names() | functions | root_classes(version)
         self.base = Environment(names)
         self._network = network
         self._files = ImportedFiles(loader, version)

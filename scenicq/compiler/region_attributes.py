@@ -6,7 +6,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import cast
 
 from shapely.geometry import LineString
@@ -18,9 +20,10 @@ from scenicq.compiler.elements import MISSING
 from scenicq.compiler.values import Builtin, Choice, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import Constant, Node, PointIn
+from scenicq.forest.bounds import scalar_bounds
+from scenicq.forest.nodes import ArithmeticOp, CompareOp, Constant, Node, PointIn, Select
 from scenicq.geometry.angles import heading_of
-from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, orientation_of
+from scenicq.geometry.regions import XY, PolygonSet, PolylineSet, Region, orientation_of
 from scenicq.geometry.road_direction import along_lines
 from scenicq.geometry.shapes import simple_parts
 
@@ -94,14 +97,44 @@ def _boundary(region: PolygonSet, span: Span) -> ModelValue:
     return build.constant(PolylineSet(lines, region.name, along_lines(lines, region.name)), span)
 
 
-def _point_along(region: PolylineSet, by: ModelValue, span: Span, *, normalized: ModelValue) -> ModelValue:
-    """The point at a distance along a single line, in metres or as a share of its length."""
-    distance = to_scalar(by, span)
-    if len(region.lines) != 1 or not isinstance(distance, Constant):
+def _point_along(region: PolylineSet, by: ModelValue, span: Span, *, normalized: ModelValue) -> Node:
+    """The point at a distance along a line, in metres or as a share of its length; from its end if negative."""
+    if len(region.pieces) != 1:
         raise fail("unsupported-construct", "this point along a line is not supported", span,
-                   "a random distance, or several lines", ("place something `on` the line",))  # fmt: skip
-    point = region.lines[0].interpolate(float(cast(float, distance.value)), normalized=bool(normalized))
-    return build.constant((float(point.x), float(point.y)), span)
+                   "several lines", ("place something `on` the line",))  # fmt: skip
+    line = cast(LineString, region.pieces[0]).simplify(0.0)
+    distance = to_scalar(by, span)
+    if normalized:
+        distance = build.arithmetic(ArithmeticOp.MUL, distance, build.constant(line.length, span), span=span)
+    if isinstance(distance, Constant):
+        point = line.interpolate(float(cast(float, distance.value)))
+        return build.constant((float(point.x), float(point.y)), span)
+    from_end = build.add(distance, build.constant(line.length, span), span)
+    low, high = scalar_bounds(distance)
+    if high < 0:
+        distance = from_end
+    elif low < 0:
+        is_negative = build.compare(CompareOp.LT, distance, build.constant(0.0, span), span)
+        distance = Select(is_negative, (distance, from_end), span=span)
+    return _sum_of_segments([(x, y) for x, y in line.coords], distance, span)
+
+
+def _sum_of_segments(corners: list[XY], distance: Node, span: Span) -> Node:
+    """The first corner and, along each segment, as much of the distance as falls on it."""
+    low, high = scalar_bounds(distance)
+    place, passed = build.constant(corners[0], span), 0.0
+    for (x, y), (u, v) in pairwise(corners):
+        length = math.dist((x, y), (u, v))
+        if low >= passed + length:
+            place = build.constant((u, v), span)
+        elif high > passed:
+            beyond = build.minus(distance, build.constant(passed, span), span)
+            share = build.arithmetic(ArithmeticOp.DIV, beyond, build.constant(length, span), span=span)
+            share = build.arithmetic(ArithmeticOp.MAX, share, build.constant(0.0, span), span=span)
+            share = build.arithmetic(ArithmeticOp.MIN, share, build.constant(1.0, span), span=span)
+            place = build.vector_sum(place, build.scale(build.constant((u - x, v - y), span), share, span), span)
+        passed += length
+    return place
 
 
 def _line(value: ModelValue) -> list[tuple[float, float]] | None:

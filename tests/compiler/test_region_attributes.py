@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
+import shapely
 from drawing import draw_scene
 
 from scenicq.forest.improvise import Scene
@@ -61,6 +62,24 @@ def test_it_has_what_the_option_has(question: str) -> None:
 def test_a_choice_of_many_takes_as_many_steps_as_one(method: str) -> None:
     many = "many = [lane for k in range(60) for lane in network.lanes]\nzone = Uniform(*Uniform(*many).group.lanes)\n"
     compiled(f"{MODEL}{many}new Object on zone.{method}(network.roads[0])\n")
+
+
+BENT = [(0.0, 0.0), (4.0, 0.0), (10.0, 0.0), (10.0, 10.0), (13.0, 14.0)]
+DISTANCES = (("Range(0, 9)", 1), ("Range(-40, 40)", 1), ("Range(-9, -2)", 1), ("Range(11, 90)", 1), ("Range(0, 1)", 25))
+"""Distances, and what they are multiplied by where they are shares of the length."""
+
+
+@pytest.mark.parametrize(("distance", "factor"), DISTANCES)
+def test_a_point_at_a_random_distance_is_where_shapely_puts_it(distance: str, factor: int) -> None:
+    share = ", normalized=True" if factor > 1 else ""
+    scenario = compiled(
+        f"{MODEL}path = PolylineRegion({BENT})\nD = {distance}\nend = path.pointAlongBy(D{share})\n"
+        "param far = D, x = end.x, y = end.y\n"
+    )
+    for seed in range(8):
+        params = scene_of(scenario, seed).params
+        point = shapely.LineString(BENT).interpolate(params["far"] * factor)  # type: ignore[operator]
+        assert (params["x"], params["y"]) == pytest.approx((point.x, point.y))
 
 
 SAME = {"a is b": True, "a == b": True, "a is not b": False, "a != b": False, "not (b == a)": False, "b is a": True}
