@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -20,6 +21,9 @@ import numpy as np
 
 from scenicq.budget import limited, look
 from scenicq.forest.build import constant
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.draws import draw_leaf
+from scenicq.forest.evaluate import evaluate_all
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     Compare,
@@ -28,10 +32,11 @@ from scenicq.forest.nodes import (
     Coordinate,
     Feature,
     Identity,
-    Index,
+    Leaf,
     Logic,
     LogicOp,
     Node,
+    Undefined,
     Value,
 )
 from scenicq.forest.scenario import Requirement, Scenario
@@ -45,7 +50,6 @@ from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.definedness import untrue
 from scenicq.temporal.enclosures import Bounds, certainly, unchanging
-from scenicq.temporal.hidden import UnclearVariable, inside, support
 from scenicq.temporal.runs import Run
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -137,6 +141,11 @@ class Examples:
     decide: Callable[[Mapping[int, Truth]], Run]
     found: list[Example] = field(default_factory=list[Example])
     _asked: int = 0
+    _alike: dict[int, list[int]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Find where a condition is the same question."""
+        self._alike = {number: self._first_alike(number) for number in self.conditions}
 
     def outcomes(self) -> list[ExampleOutcome] | None:
         """All that becomes of the run, of which some may be unknown; None without an example."""
@@ -167,7 +176,7 @@ class Examples:
                 if fit:
                     number, sample = place
                     more = {**known, number: known[number].copy()}
-                    more[number][sample] = truth
+                    more[number][[other == self._alike[number][sample] for other in self._alike[number]]] = truth
                     cases.append((more, further, fit))
                 elif answer is not False:
                     found.append(ExampleOutcome(run, examples[0]))
@@ -193,7 +202,7 @@ class Examples:
         if self._ask(None) is not True:
             return None
         base = self.found[0].truth
-        hanging = self._hanging()
+        hanging = [(number, sample) for number, sample in self._hanging() if self._alike[number][sample] == sample]
         open_ = {(n, k) for n, k in hanging if any(each.truth[n][k] != base[n][k] for each in self.found)}
         stack = [hanging] if hanging else []
         while stack:
@@ -226,7 +235,7 @@ class Examples:
                 stack += [block[: len(block) // 2], block[len(block) // 2 :]]
         certain = {number: truth.copy() for number, truth in base.items()}
         for number, sample in open_:
-            certain[number][sample] = UNKNOWN
+            certain[number][[other == sample for other in self._alike[number]]] = UNKNOWN
         return certain
 
     def _hanging(self) -> list[_Place]:
@@ -301,28 +310,34 @@ class Examples:
             return False
         if not isinstance(verdict, Match):
             return None
-        # by identity: several variables may share a place in the program
-        known = finding.values()
-        values: dict[Identity, Value] = {}
-        for leaf in leaves(*self.conditions.values()):
-            # of what the scene says nothing, any value does
-            value = known.get(leaf.identity, 0.0 if isinstance(leaf, Index) else None)
-            if value is None:
-                try:
-                    value = inside(*support(leaf))
-                except UnclearVariable:
-                    return None
-            values[leaf.identity] = value
+        values = _assignment(leaves(*self.conditions.values()), finding.values())
+        if values is None:
+            return None
         columns = self.columns.assigned(values)
         truth = {number: columns.truth_of(each) for number, each in self.conditions.items()}
         self.found.append(Example(values, verdict.witness, truth))
         return True
 
+    def _first_alike(self, number: int) -> list[int]:
+        """For each sample the first one, from the start on, at which a condition reads the same, all of it observed."""
+        found: dict[tuple[Value, ...], int] = {}
+        samples = range(len(self.columns.samples))
+        return [
+            sample if sample < self.first or not self._is_observed(number, sample)
+            else found.setdefault(self._observed(number, sample), sample)
+            for sample in samples
+        ]  # fmt: skip
+
+    def _observed(self, number: int, sample: int) -> tuple[Value, ...]:
+        """What a condition reads at a sample; None of what is not observed."""
+        nodes = postorder((self.conditions[number],))
+        return tuple(
+            self.columns.observed(each, sample) for each in nodes if isinstance(each, Feature) and each.current
+        )
+
     def _is_observed(self, number: int, sample: int) -> bool:
         """Whether all that a condition reads is observed at a sample."""
-        nodes = postorder((self.conditions[number],))
-        read = [each for each in nodes if isinstance(each, Feature) and each.current]
-        return all(self.columns.observed(each, sample) is not None for each in read)
+        return all(each is not None for each in self._observed(number, sample))
 
     def _that(self, number: int, sample: int, *, holds: bool) -> Node | None:
         """That a condition holds at a sample, or that it does not; None if that cannot be said."""
@@ -333,6 +348,22 @@ class Examples:
 
         here = transform(self.conditions[number], observed)
         return here if holds else untrue(here)
+
+
+def _assignment(variables: Sequence[Leaf], known: Mapping[Identity, Value]) -> Mapping[Identity, Value] | None:
+    """The value of each variable by identity, as several may share a place in the program; None where one has none."""
+
+    def value(leaf: Leaf, parameters: tuple[Value, ...]) -> Value:
+        # of what the scene says nothing, any value does
+        told = known.get(leaf.identity)
+        return draw_leaf(leaf, parameters, random.Random(0)) if told is None else told
+
+    try:
+        drawn = evaluate_all(tuple(variables), value)
+    except CannotEvaluate:
+        return None
+    found = {leaf.identity: drawn[id(leaf)] for leaf in variables}
+    return None if any(isinstance(each, Undefined) for each in found.values()) else found
 
 
 def _numbers_of(node: Node) -> list[Node]:

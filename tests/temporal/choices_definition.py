@@ -1,8 +1,9 @@
 """Choices over time straight from their definition: every outcome, every binding, every pair of samples.
 
 A program is drawn as data, of which the text is one reading and the plain functions here the other. All random
-variables have finitely many values that make a difference: outcomes of choices, and numbers a quarter apart. What is
-not observed of a condition at a sample may be either; of few such places every completion is tried. That is more than
+variables have finitely many values that make a difference: outcomes of choices, numbers a quarter apart, and of hidden
+points one in each piece into which the circles and lines of the conditions cut the plane (`arrangement`). What is not
+observed of a condition at a sample may be either; of few such places every completion is tried. That is more than
 what the speeds and places that are missing can make of all conditions together: `jointly` tries values of these.
 """
 
@@ -12,9 +13,18 @@ import itertools
 import math
 import random
 import re
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "oracle"))
+
+from arrangement import representatives
 from interval_definition import GAP_S, MONITORS, Formula, conditions, holds, monitored, text_of
 
 from scenicq.store.labels import Label, LabelObject, Recording
@@ -27,8 +37,9 @@ ALONG = [n / 8 for n in range(-104, 105)]
 _DRAW = random.Random(0)
 PLANE = [(x / 2, y / 2) for x in range(-18, 19, 2) for y in range(-18, 19, 2)]
 PLANE += [(_DRAW.uniform(-9, 9), _DRAW.uniform(-9, 9)) for _ in range(300)]
-Values = Mapping[str, float]
-"""The value of each random variable."""
+Values = Mapping[str, Any]
+"""The value of each random variable: a number, or many side by side where pieces of the plane are gone through."""
+TOLERANCE_M = 0.25
 
 
 @dataclass(frozen=True)
@@ -43,7 +54,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Moment:
-    """Time in seconds, and what is seen of each track; the ego is the track "ego"."""
+    """Time in seconds, and what is seen of each track; the ego is the track "ego", which may be absent, too."""
 
     time: float
     seen: dict[str, Seen]
@@ -61,7 +72,8 @@ def recording_of(name: str, trace: Trace) -> Recording:
 
     labels = [
         Label(
-            f"{name}-{number}", name, round(each.time * 1e6), "none", shown(each.seen["ego"], "ego", None),
+            f"{name}-{number}", name, round(each.time * 1e6), "none",
+            shown(each.seen["ego"], "ego", None) if "ego" in each.seen else LabelObject("ego", "", "", 0.0, 0.0),
             tuple(shown(seen, f"{track}{number}", track) for track, seen in each.seen.items() if track != "ego"),
         )
         for number, each in enumerate(trace)
@@ -78,6 +90,8 @@ def speed(trace: Trace, track: str, k: int) -> float | None:
         return math.hypot(*velocity)
     place = own.index(k)
     near = [m for m in own[max(place - 1, 0) : place + 2] if abs(trace[m].time - trace[k].time) <= 1.5]
+    if track == "ego":
+        near = [m for m in near if abs(m - k) <= 1]  # no difference crosses a label without an ego
     first, last = trace[near[0]], trace[near[-1]]
     if first is last:
         return None
@@ -108,11 +122,21 @@ class Situation:
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """An atom: its text, its value at a sample, None where it is not observed, and whether it reads two coordinates."""
+    """An atom.
+
+    Attributes:
+        text: Of the program.
+        value: Its value at a sample, None where it is not observed.
+        plane: Whether it reads two coordinates.
+        point: The hidden point that it reads.
+        curves: The circles, and the x of the lines, on which it changes with that point.
+    """
 
     text: str
-    value: Callable[[Situation, int], bool | None]
+    value: Callable[[Situation, int], Any]
     plane: bool = False
+    point: str = ""
+    curves: Callable[[Situation, int], tuple[list[tuple[float, float, float]], list[float]]] = lambda s, k: ([], [])
 
 
 @dataclass(frozen=True)
@@ -123,6 +147,10 @@ class Choice:
         name, text: Of the program.
         leaves: Values of each leaf, by name.
         value: The value, given those of the leaves: a number, the number of an option.
+        regions: The options where they are discs.
+        objects: The options where they are objects.
+        support: The middle and the radius of the disc, or the middle and the sides of the rectangle, where a hidden
+            point is; it has no leaves.
     """
 
     name: str
@@ -131,26 +159,38 @@ class Choice:
     value: Callable[[Values], float]
     regions: tuple[tuple[float, float, float], ...] = ()
     objects: tuple[str, ...] = ()
+    support: tuple[float, ...] = ()
+
+    @property
+    def number(self) -> bool:
+        """Whether its value is a number."""
+        return not (self.regions or self.objects or self.support)
+
+    def supports(self, x: Any, y: Any) -> Any:
+        """Whether a hidden point may be there."""
+        if len(self.support) == 3:
+            return np.hypot(x - self.support[0], y - self.support[1]) <= self.support[2]
+        u, v, width, length = self.support
+        return (abs(x - u) <= width / 2) & (abs(y - v) <= length / 2)
 
 
-def halves(low: float, high: float) -> tuple[float, ...]:
+def quarters(low: float, high: float) -> tuple[float, ...]:
     """Every value that makes a difference: what is compared with it are whole numbers and halves."""
     return tuple(low + n / 4 for n in range(round((high - low) * 4) + 1))
 
 
+def halved(values: Iterable[float]) -> tuple[float, ...]:
+    """Values and those between, for what is doubled or compared with another that is hidden."""
+    ends = sorted(values)
+    return tuple(sorted({*ends, *((a + b) / 2 for a, b in itertools.pairwise(ends))}))
+
+
 def random_choice(draw: random.Random, name: str, roles: list[str], earlier: list[Choice]) -> Choice:
     """Draw a random variable."""
-    numbers = [choice for choice in earlier if not choice.regions and not choice.objects]
-    kinds = [
-        "uniform",
-        "discrete",
-        "range",
-        "continuous",
-        "ranges",
-        "objects",
-        "regions",
-        *(["nested"] * 2 * bool(numbers)),
-    ]
+    numbers = [choice for choice in earlier if choice.number]
+    others = [choice for choice in earlier if choice.objects or choice.regions]
+    kinds = ["uniform", "discrete", "range", "continuous", "ranges", "objects", "regions", "point"]
+    kinds += ["nested"] * 2 * bool(numbers) + ["nested option"] * 2 * bool(others)
     some = draw.sample([-3, -1, 0, 1, 2, 4], draw.randint(2, 3))
     leaf = f"{name}.index"
     match draw.choice(kinds):
@@ -168,26 +208,63 @@ def random_choice(draw: random.Random, name: str, roles: list[str], earlier: lis
         case "continuous":
             low = draw.randint(-3, 1)
             high = low + draw.randint(1, 3)
-            return Choice(name, f"Range({low}, {high})", {leaf: halves(low, high)}, lambda v: v[leaf])
+            return Choice(name, f"Range({low}, {high})", {leaf: quarters(low, high)}, lambda v: v[leaf])
         case "ranges":
             ends = [(low := draw.randint(-3, 2), low + draw.randint(1, 2)) for _ in range(2)]
-            parts = {f"{name}.{n}": halves(*each) for n, each in enumerate(ends)}
+            parts = {f"{name}.{n}": quarters(*each) for n, each in enumerate(ends)}
             text = ", ".join(f"Range({low}, {high})" for low, high in ends)
             return Choice(name, f"Uniform({text})", {leaf: (0, 1), **parts}, lambda v: v[f"{name}.{int(v[leaf])}"])
         case "objects":
             who = tuple(draw.sample(["ego", *roles], draw.randint(1, len(roles) + 1)))
-            return Choice(name, f"Uniform({', '.join(who)})", {leaf: tuple(range(len(who)))}, lambda v: v[leaf],
+            weighted = ", ".join(f"{each}: {draw.choice([1, 2])}" for each in who)
+            never = [f"{each}: 0" for each in ["ego", *roles] if each not in who]
+            text = draw.choice([f"Uniform({', '.join(who)})", f"Discrete({{{', '.join([weighted, *never])}}})"])
+            return Choice(name, text, {leaf: tuple(range(len(who)))}, lambda v: v[leaf],
                           objects=who)  # fmt: skip
         case "regions":
             circles = tuple((draw.randint(-3, 3), draw.randint(-3, 3), draw.choice([2.5, 5])) for _ in range(2))
             text = ", ".join(f"CircularRegion(({x}, {y}), {r})" for x, y, r in circles)
             return Choice(name, f"Uniform({text})", {leaf: (0, 1)}, lambda v: v[leaf], regions=circles)
+        case "point":
+            x, y = draw.randint(-3, 3), draw.randint(-3, 3)
+            if draw.random() < 0.5:
+                disc = (x, y, draw.choice([1, 2, 4]))
+                return Choice(
+                    name, f"new Point in CircularRegion(({x}, {y}), {disc[2]})", {}, lambda v: 0, support=disc
+                )
+            width, length = draw.choice([2, 4]), draw.choice([2, 6])
+            text = draw.choice([
+                f"in RectangularRegion(({x}, {y}), 0, {width}, {length})",
+                f"at (Range({x - width // 2}, {x + width // 2}), Range({y - length // 2}, {y + length // 2}))",
+            ])  # fmt: skip
+            return Choice(name, f"new Point {text}", {}, lambda v: 0, support=(x, y, width, length))
+        case "nested option":
+            inner = draw.choice(others)
+            last = len(inner.objects or inner.regions)
+            if inner.objects:
+                who = draw.choice(["ego", *roles])
+                more: dict[str, Any] = {"objects": (*inner.objects, who)}
+            else:
+                x, y, r = draw.randint(-3, 3), draw.randint(-3, 3), draw.choice([2.5, 5])
+                who, more = f"CircularRegion(({x}, {y}), {r})", {"regions": (*inner.regions, (x, y, r))}
+            return Choice(
+                name, f"Uniform({inner.name}, {who})", {leaf: (0, 1), **inner.leaves},
+                lambda v: last if v[leaf] else inner.value(v), **more,
+            )  # fmt: skip
         case _:
             inner, factor = draw.choice(numbers), draw.choice([-2, 2, 3])
+            # three times what is a quarter of something is none
+            factor = factor if is_whole(itertools.chain(*inner.leaves.values())) else 2
+            finer = {each: v if is_whole(v) else halved(v) for each, v in inner.leaves.items()}
             return Choice(
-                name, f"Uniform({inner.name}, {factor} * {inner.name}, {some[0]})", {leaf: (0, 1, 2), **inner.leaves},
+                name, f"Uniform({inner.name}, {factor} * {inner.name}, {some[0]})", {leaf: (0, 1, 2), **finer},
                 lambda v: [1, factor, 0][int(v[leaf])] * inner.value(v) + some[0] * (v[leaf] == 2),
             )  # fmt: skip
+
+
+def is_whole(values: Iterable[float]) -> bool:
+    """Whether all are whole numbers."""
+    return all(float(each).is_integer() for each in values)
 
 
 def random_condition(draw: random.Random, roles: list[str], choices: list[Choice]) -> Condition:
@@ -229,6 +306,13 @@ def random_condition(draw: random.Random, roles: list[str], choices: list[Choice
             return None if p is None else p.x > number
 
         return Condition(f"({name}.position.x > {number})", of_option)
+    if choice.support:
+        return about_point(draw, choice, role, number)
+    if (numbers := [each for each in choices if each.number and each is not choice]) and draw.random() < 0.2:
+        other_number = draw.choice(numbers)
+        return Condition(
+            f"({name} > {other_number.name})", lambda s, k: choice.value(s.values) > other_number.value(s.values)
+        )
     match draw.choice(["alone", "x", "x", "speed"]):
         case "alone":
             return Condition(f"({name} > {number})", lambda s, k: choice.value(s.values) > number)
@@ -244,17 +328,77 @@ def random_condition(draw: random.Random, roles: list[str], choices: list[Choice
             )
 
 
-def random_formula(draw: random.Random, atom: Callable[[], Condition], depth: int) -> Formula:
-    """Draw a formula with an operator of time outside."""
-    kind = draw.choice(["always", "always", "eventually", "eventually", "next", "until", "and", "or", "not"])
-    parts = 2 if kind in ("and", "or", "until") else 1
+def about_point(draw: random.Random, choice: Choice, role: str, number: float) -> Condition:
+    """Draw an atom about a hidden point."""
+    name = choice.name
+    x, y = f"{name}.x", f"{name}.y"
+    match draw.choice(["near", "near", "place", "beside"]):
+        case "near":
+            reach = draw.choice([1.1, 2.1, 3.6])
+
+            def near(s: Situation, k: int) -> Any:
+                return (
+                    None if (p := s.seen(role, k)) is None else np.hypot(s.values[x] - p.x, s.values[y] - p.y) < reach
+                )
+
+            def circle(s: Situation, k: int) -> tuple[list[tuple[float, float, float]], list[float]]:
+                return ([] if (p := s.seen(role, k)) is None else [(p.x, p.y, reach)]), []
+
+            return Condition(f"((distance from {role} to {name}) < {reach})", near, True, name, circle)
+        case "place":
+            return Condition(
+                f"({name}.position.x > {number})", lambda s, k: s.values[x] > number, False, name,
+                lambda s, k: ([], [number]),
+            )  # fmt: skip
+        case _:
+            return Condition(
+                f"({role}.position.x <= {name}.position.x)",
+                lambda s, k: None if (p := s.seen(role, k)) is None else p.x <= s.values[x], False, name,
+                lambda s, k: ([], [] if (p := s.seen(role, k)) is None else [p.x]),
+            )  # fmt: skip
+
+
+def random_formula(draw: random.Random, atom: Callable[[], Condition], depth: int, *, inside: bool = False) -> Formula:
+    """Draw a formula with an operator of time outside, or any inside of one."""
+    kinds = ["always", "always", "eventually", "eventually", "next", "until", "and", "or", "not", "implies"]
+    kind = draw.choice(kinds)
+    parts = 2 if kind in ("and", "or", "until", "implies") else 1
+    within = inside or kind not in ("and", "or", "not", "implies")
     inner = [
-        random_formula(draw, atom, depth - 1) if depth and draw.random() < 0.5 else ("atom", atom())
+        random_formula(draw, atom, depth - 1, inside=within) if depth and draw.random() < 0.5 else ("atom", atom())
         for _ in range(parts)
     ]
-    if kind in ("and", "or", "not"):
+    if not within:
         inner = [("always", each) if each[0] == "atom" else each for each in inner]
     return kind, *inner
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where `a` is at the start: what is added to a hidden number or point, and whether from the ego."""
+
+    choice: Choice
+    across: float
+    ahead: float
+    from_ego: bool
+
+    @property
+    def text(self) -> str:
+        """In Scenic."""
+        name = self.choice.name
+        if self.choice.support:
+            return f"({name}.position.x + {self.across}, {name}.position.y + {self.ahead})"
+        return f"({'ego.position.x + ' if self.from_ego else ''}{name}, Range(-999, 999))"
+
+    def near(self, s: Situation, k: int) -> Any:
+        """Whether what is seen there is within tolerance."""
+        seen, ego, name = s.seen("a", k), s.seen("ego", k), self.choice.name
+        assert seen is not None
+        assert ego is not None
+        if self.choice.support:
+            x, y = s.values[f"{name}.x"] + self.across, s.values[f"{name}.y"] + self.ahead
+            return np.hypot(x - seen.x, y - seen.y) <= TOLERANCE_M
+        return abs(self.choice.value(s.values) + (ego.x if self.from_ego else 0) - seen.x) <= TOLERANCE_M
 
 
 @dataclass
@@ -271,6 +415,9 @@ class Program:
     after_s: float | None
     monitors: list[tuple[str, list[Condition]]]
     atoms: list[Condition] = field(default_factory=list[Condition])
+    place: Place | None = None
+    hopes: list[Condition] = field(default_factory=list[Condition])
+    by_steps: bool = False
 
     @property
     def terminates(self) -> bool:
@@ -282,17 +429,24 @@ class Program:
         """The program in Scenic."""
         anywhere = "new Object at (Range(-999, 999), Range(-999, 999)), facing"
         lines = [f"ego = {anywhere} Range(-180, 180) deg"]
-        if self.faces is not None:
-            lines.append(f"{self.faces.name} = {self.faces.text}")
+        # what an object is made of comes before it, and a choice among objects after them
+        late = [each for each in self.choices if each.objects]
+        lines += [f"{each.name} = {each.text}" for each in self.choices if each not in late]
         for role in self.roles:
             facing = self.faces.name if self.faces is not None and role == "a" else "Range(-180, 180)"
-            lines.append(f"{role} = {anywhere} {facing} deg")
-        lines += [f"{each.name} = {each.text}" for each in self.choices if each is not self.faces]
+            where = (
+                self.place.text if self.place is not None and role == "a" else "(Range(-999, 999), Range(-999, 999))"
+            )
+            lines.append(f"{role} = new Object at {where}, facing {facing} deg")
+        lines += [f"{each.name} = {each.text}" for each in late]
         lines += [f"require {each.text}" for each in self.start]
+        lines += [f"require[0.5] {each.text}" for each in self.hopes]
         lines += [f"require {text_of(each)}" for each in self.requirements]
         lines += [f"terminate when {each.text}" for each in self.ends]
         lines += [f"terminate simulation when {each.text}" for each in self.late_ends]
-        lines += [f"terminate after {self.after_s} seconds"] if self.after_s is not None else []
+        if self.after_s is not None:
+            after = f"{round(10 * self.after_s)} steps" if self.by_steps else f"{self.after_s} seconds"
+            lines.append(f"terminate after {after}")
         for number, (kind, atoms) in enumerate(self.monitors):
             body = MONITORS[kind][0].format(*(atom.text for atom in atoms))
             lines += [f"monitor M{number}():\n    {body}", f"require monitor M{number}()"]
@@ -300,11 +454,22 @@ class Program:
 
     def assignments(self) -> Iterator[Values]:
         """Every value of the leaves."""
-        leaves = {name: values for choice in self.choices for name, values in choice.leaves.items()}
+        leaves: dict[str, tuple[float, ...]] = {}
+        for choice in self.choices:
+            for name, values in choice.leaves.items():
+                # the finer ones of two that share a leaf
+                leaves[name] = max(values, leaves.get(name, ()), key=len)
+        if any(name in atom.text for atom in every_atom(self) for name in self.pairs()):
+            leaves = {name: values if is_whole(values) else halved(values) for name, values in leaves.items()}
         used = {name for choice in self.used() for name in choice.leaves}
         leaves = {name: values if name in used else values[:1] for name, values in leaves.items()}
         for values in itertools.product(*leaves.values()):
             yield dict(zip(leaves, values, strict=True))
+
+    def pairs(self) -> list[str]:
+        """What conditions say that compare two random numbers."""
+        names = [each.name for each in self.choices if each.number]
+        return [f"{one} > {other}" for one in names for other in names]
 
     def used(self) -> list[Choice]:
         """The random variables that something reads, or that one of these is made of."""
@@ -317,7 +482,7 @@ class Program:
 
     def tells_apart(self) -> bool:
         """Whether the program says something of `a` that it does not say of `b`, whatever alike choices are called."""
-        if len(self.roles) < 2 or self.faces is not None:
+        if len(self.roles) < 2 or self.faces is not None or self.place is not None:
             return True
 
         used = {choice.name for choice in self.used()}
@@ -356,8 +521,12 @@ def random_program(draw: random.Random) -> Program:
             atoms.append(random_condition(draw, roles, choices))
         return atoms[-1]
 
+    place = None
+    if draw.random() < 0.25 and (able := [each for each in choices if each.support or each.number]):
+        chosen = draw.choice([each for each in able if each.support] or able)
+        place = Place(chosen, draw.randint(-1, 2), draw.randint(-1, 1), draw.random() < 0.5)
     start = [atom() for _ in range(draw.choice([0, 1, 1, 2]))]
-    requirements = [random_formula(draw, atom, 1) for _ in range(draw.randint(0, 2))]
+    requirements = [random_formula(draw, atom, draw.choice([1, 1, 2])) for _ in range(draw.randint(0, 2))]
     ends = [atom() for _ in range(draw.choice([0, 0, 1]))]
     late_ends = [atom() for _ in range(draw.choice([0, 0, 0, 1]))]
     after_s = draw.choice([None, None, 0.5, 1.0])
@@ -365,25 +534,33 @@ def random_program(draw: random.Random) -> Program:
     monitors = [(kind, [atom() for _ in range(MONITORS[kind][1])]) for kind in kinds]
     if not (requirements or ends or late_ends or monitors) and after_s is None:
         after_s = 1.0
-    return Program(roles, faces, choices, start, requirements, ends, late_ends, after_s, monitors, atoms)
+    hopes = [random_condition(draw, roles, choices)] if draw.random() < 0.1 else []
+    return Program(
+        roles, faces, choices, start, requirements, ends, late_ends, after_s, monitors, atoms, place, hopes,
+        draw.random() < 0.3,
+    )  # fmt: skip
 
 
 def alike(program: Program) -> Program:
     """The program that says of `b` all that it says of `a`, too, where it has no choice of objects."""
-    if len(program.roles) < 2 or program.faces is not None or any(each.objects for each in program.choices):
+    only_a = program.faces is not None or program.place is not None
+    if len(program.roles) < 2 or only_a or any(each.objects for each in program.choices):
         return program
 
     def other(condition: Condition) -> Condition:
         swap = {"a": "b", "b": "a"}
         text = "".join(swap.get(word, word) for word in re.split(r"\b", condition.text))
 
-        def value(s: Situation, k: int) -> bool | None:
+        def exchanged(s: Situation) -> Situation:
             binding, speeds, places = (
                 {swap.get(role, role): each for role, each in of.items()} for of in (s.binding, s.speeds, s.places)
             )
-            return condition.value(replace(s, binding=binding, speeds=speeds, places=places), k)
+            return replace(s, binding=binding, speeds=speeds, places=places)
 
-        return replace(condition, text=text, value=value)
+        return replace(
+            condition, text=text, value=lambda s, k: condition.value(exchanged(s), k),
+            curves=lambda s, k: condition.curves(exchanged(s), k),
+        )  # fmt: skip
 
     def turned(formula: Formula) -> Formula:
         if formula[0] == "atom":
@@ -405,6 +582,7 @@ def random_trace(draw: random.Random) -> Trace:
     tracks = ["ego", "t", "u", "v"][: draw.randint(2, 4)]
     time, trace = 0.0, list[Moment]()
     gaps = draw.random() < 0.5
+    alone = draw.random() < 0.15
     places = {track: (draw.randint(-3, 5), draw.randint(-3, 5)) for track in tracks}
     for _ in range(draw.randint(1, 6)):
         seen = {
@@ -415,6 +593,8 @@ def random_trace(draw: random.Random) -> Trace:
             for track, (x, y) in places.items()
             if track == "ego" or not gaps or draw.random() < 0.65
         }  # fmt: skip
+        if alone and draw.random() < 0.25:
+            del seen["ego"]
         trace.append(Moment(time, seen))
         time += draw.choice([0.5, 0.5, 0.5, 1.0, 1.6 if gaps else 0.5])
         places = {t: (x + draw.randint(-3, 3), y + draw.randint(-2, 2)) for t, (x, y) in places.items()}
@@ -497,15 +677,22 @@ def expected(program: Program, trace: Trace, binding: dict[str, str], i: int, *,
         return right
     facing = trace[i].seen[binding["a"]].heading if program.faces is not None else None
     atoms = list({each.text: each for each in every_atom(program)}.values())
-    for values in program.assignments():
+    pieces = list(points(program, trace, binding, i, last, atoms, jointly=jointly))
+    before = set[tuple[bool | None, ...]]()
+    for values, point in itertools.product(program.assignments(), pieces):
+        situation = Situation(trace, binding, {**values, **point})
         if program.faces is not None and facing is not None and program.faces.value(values) != facing:
             continue
-        situation = Situation(trace, binding, values)
+        if program.place is not None and not program.place.near(situation, i):
+            continue
         known = {(each.text, k): each.value(situation, k) for each in atoms for k in range(i, last + 1)}
+        if (alike := tuple(known.values())) in before and not jointly:
+            continue
+        before.add(alike)
         parts = [[{(each, k): False}, {(each, k): True}] for (each, k), value in known.items() if value is None]
         if jointly:
             parts = [part for k in range(i, last + 1) for part in ways(situation, atoms, k, right)]
-        some: Iterator[Iterable[Mapping[Place, bool]]] = itertools.product(*parts)
+        some: Iterator[Iterable[Mapping[At, bool]]] = itertools.product(*parts)
         if math.prod(map(len, parts)) > (MOST_TOGETHER if jointly else 1 << MOST_GAPS):
             right.exact = False
             draw = random.Random(len(parts))
@@ -523,11 +710,50 @@ def expected(program: Program, trace: Trace, binding: dict[str, str], i: int, *,
     return right
 
 
-Place = tuple[str, int]
+At = tuple[str, int]
 """A condition by its text, and a sample."""
 
 
-def ways(situation: Situation, atoms: list[Condition], k: int, right: Expected) -> Iterator[list[dict[Place, bool]]]:
+def points(
+    program: Program, trace: Trace, binding: dict[str, str], i: int, last: int, atoms: list[Condition], *, jointly: bool
+) -> Iterator[Values]:
+    """Values of all hidden points, one of each piece within which nothing changes."""
+    nowhere = Situation(trace, binding, {})
+    found: list[list[Values]] = []
+    for choice in program.used():
+        if not choice.support:
+            continue
+        own = [(each, k) for each in atoms if each.point == choice.name for k in range(i, last + 1)]
+        circles, lines = [choice.support] if len(choice.support) == 3 else [], [n / 2 for n in range(-12, 13)]
+        rows: list[float] = []
+        if len(choice.support) == 4:
+            x, y, width, length = choice.support
+            lines += [x - width / 2, x + width / 2]
+            rows += [y - length / 2, y + length / 2]
+        for each, k in own:
+            rings, columns = each.curves(nowhere, k)
+            circles, lines = circles + rings, lines + columns
+        near = program.place if program.place is not None and program.place.choice is choice else None
+        if near is not None and (seen := trace[i].seen.get(binding["a"])) is not None:
+            circles = [*circles, (seen.x - near.across, seen.y - near.ahead, TOLERANCE_M)]
+        x, y = representatives(circles, lines, rows).T
+        keep = choice.supports(x, y)
+        x, y = x[keep], y[keep]
+        many = replace(nowhere, values={f"{choice.name}.x": x, f"{choice.name}.y": y})
+        told = [each.value(many, k) for each, k in own]
+        columns = [np.broadcast_to(each, x.shape) for each in told if each is not None]
+        columns += [near.near(many, i)] if near is not None else []
+        # what is not seen of a role may be anywhere beside it
+        columns += [np.floor(2 * x)] if jointly else []
+        columns += [np.zeros_like(x)]
+        table: NDArray[np.float64] = np.column_stack(columns).astype(float)
+        first = np.unique(table, axis=0, return_index=True)[1]
+        found.append([{f"{choice.name}.x": float(x[n]), f"{choice.name}.y": float(y[n])} for n in first])
+    for each in itertools.product(*found):
+        yield {name: value for values in each for name, value in values.items()}
+
+
+def ways(situation: Situation, atoms: list[Condition], k: int, right: Expected) -> Iterator[list[dict[At, bool]]]:
     """What speeds and places that are missing at a sample can make of the conditions that read them, apart."""
     open_ones = [each for each in atoms if each.value(situation, k) is None]
     roles = list(situation.binding)
@@ -554,7 +780,7 @@ def ways(situation: Situation, atoms: list[Condition], k: int, right: Expected) 
         yield vectors(own, [replace(situation, places={role: each}) for each in pool], k)
 
 
-def vectors(atoms: list[Condition], guessed: list[Situation], k: int) -> list[dict[Place, bool]]:
+def vectors(atoms: list[Condition], guessed: list[Situation], k: int) -> list[dict[At, bool]]:
     """The different values of conditions together."""
     found = {tuple(bool(each.value(guess, k)) for each in atoms) for guess in guessed} if atoms else {()}
     return [{(each.text, k): value for each, value in zip(atoms, values, strict=True)} for values in sorted(found)]

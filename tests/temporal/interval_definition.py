@@ -10,7 +10,7 @@ import itertools
 import math
 import random
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from scenicq.store.labels import Label, LabelObject, Recording
@@ -163,25 +163,104 @@ def holds(formula: Formula, truth: Truth, k: int, j: int) -> bool:
             )
 
 
-MONITORS = {
-    "ends": ("while True:\n        if {0}:\n            terminate\n        wait", 1),
-    "stages": ("while not {0}:\n        wait\n    while {1}:\n        wait\n    terminate", 2),
-    "demands": ("while True:\n        require {0}\n        wait", 1),
+Now = Callable[[int], bool]
+"""The value of each condition of a monitor, by its number, at the sample at which it runs."""
+Steps = Iterator[str]
+"""What a monitor does at each sample: "end", "reject", or "" where it waits."""
+
+
+def _ends(now: Now) -> Steps:
+    while True:
+        if now(0):
+            yield "end"
+        yield ""
+
+
+def _stages(now: Now) -> Steps:
+    while not now(0):
+        yield ""
+    while now(1):
+        yield ""
+    yield "end"
+
+
+def _demands(now: Now) -> Steps:
+    while True:
+        if not now(0):
+            yield "reject"
+        yield ""
+
+
+def _rounds(now: Now) -> Steps:
+    for each in range(3):
+        if each == 1 and now(0):
+            continue
+        if each and not now(1):
+            yield "reject"
+        yield ""
+    while now(0):
+        yield ""
+        if now(1):
+            break
+    else:
+        yield "end"
+
+
+def _cases(now: Now) -> Steps:
+    while True:
+        if now(0):
+            if not now(1):
+                yield "reject"
+        elif now(2):
+            yield "end"
+        yield ""
+
+
+def _waits(now: Now) -> Steps:
+    while not now(0):
+        yield ""
+    yield ""  # two steps are shorter than what lies between samples
+    if now(1):
+        return
+    if not now(2):
+        yield "reject"
+    yield "end"
+
+
+MONITORS: dict[str, tuple[str, int, Callable[[Now], Steps]]] = {
+    "ends": ("while True:\n        if {0}:\n            terminate\n        wait", 1, _ends),
+    "stages": ("while not {0}:\n        wait\n    while {1}:\n        wait\n    terminate", 2, _stages),
+    "demands": ("while True:\n        require {0}\n        wait", 1, _demands),
+    "rounds": (
+        "for each in range(3):\n        if each == 1 and {0}:\n            continue\n        require each == 0 or {1}\n"
+        "        wait\n    while {0}:\n        wait\n        if {1}:\n            break\n    else:\n        terminate",
+        2,
+        _rounds,
+    ),
+    "cases": (
+        "while True:\n        if {0}:\n            require {1}\n        elif {2}:\n            terminate\n        wait",
+        3,
+        _cases,
+    ),
+    "waits": (
+        "wait until {0}\n    wait for 2 steps\n    if {1}:\n        return\n    require {2}\n    terminate",
+        3,
+        _waits,
+    ),
 }
+"""The text of each monitor, how many conditions it has, and what it does."""
 
 
 def monitored(kind: str, atoms: list[Condition], truth: Truth, i: int, j: int) -> str:
     """What a monitor that starts at i does at j, if it has not done anything before: "end", "reject" or ""."""
-    stage = 0
-    for k in range(i, j + 1):
-        if kind == "demands" and not truth(atoms[0], k):
+    at = i
+    steps = MONITORS[kind][2](lambda number: truth(atoms[number], at))
+    for at in range(i, j + 1):
+        said = next(steps, "")
+        if said == "reject":
             return "reject"
-        if kind == "ends" and truth(atoms[0], k):
-            return "end" if k == j else "ended"
-        if kind == "stages":
-            stage = 1 if stage == 0 and truth(atoms[0], k) else stage
-            if stage and not truth(atoms[1], k):
-                return "end" if k == j else "ended"
+        if said == "end":
+            return "end" if at == j else "ended"
     return ""
 
 

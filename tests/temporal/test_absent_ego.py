@@ -4,6 +4,7 @@ import pytest
 
 from scenicq.compiler.default_street import street
 from scenicq.errors import Source
+from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
@@ -36,8 +37,10 @@ def dataset(tmp_path_factory) -> Dataset:
     return open_dataset(folder)
 
 
-def told(dataset: Dataset, text: str, **more: object) -> list[tuple[type, str, str]]:
-    options = QueryOptions(time=IntervalOptions(**more))
+def told(
+    dataset: Dataset, text: str, match: MatchOptions = MatchOptions(), prefilter: bool = True, **more: object
+) -> list[tuple[type, str, str]]:
+    options = QueryOptions(match, prefilter=prefilter, time=IntervalOptions(**more))
     found = Query(dataset, Source("absent.scenic", HEAD + text), options).results()
     return [(type(each.verdict), each.frame, each.interval.last) for each in found]
 
@@ -60,6 +63,16 @@ def test_what_stands_in_for_an_absent_ego_is_not_read(dataset, condition):
     kept = told(dataset, f"require always not ({condition})")
     assert (Match, "f0", "f2") in kept
     assert all(verdict is not Match or not (first <= "f3" <= last) for verdict, first, last in kept)
+
+
+@pytest.mark.parametrize(
+    ("match", "prefilter"), [(MatchOptions(), False), (MatchOptions(), True), (MatchOptions(exact=True), True)]
+)
+def test_a_plain_requirement_binds_where_another_label_has_no_ego(dataset, match, prefilter):
+    for condition, starts in (("ego.position.y > 9", ["f5", "f6"]), ("(distance to c) > 30", [])):
+        text = f"require {condition}\nterminate after 0.5 seconds\n"
+        found = told(dataset, text, match, prefilter, intervals="all")
+        assert [first for verdict, first, _ in found if verdict is Match] == starts
 
 
 def test_no_motion_crosses_a_label_without_an_ego(dataset):

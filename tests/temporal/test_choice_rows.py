@@ -88,6 +88,23 @@ def test_outcomes_that_do_not_hang_on_the_label_match_everywhere(dataset, text, 
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("text", "frames"),
+    [
+        ("require eventually (distance from ego to P) > 16\n", {f"goes-{n}" for n in range(4)}),
+        ("require always (distance from ego to P) < 0.5\nrequire eventually P.position.x > 0.6\n", set()),
+        ("require always P.position.x > 1\nrequire eventually P.position.x < 0\n", set()),
+        ("require always P.position.x > 4\n", set()),
+        ("require eventually ego.position.x - P.position.x > 19\n", {f"goes-{n}" for n in range(4)}),
+    ],
+)
+@pytest.mark.one_in(4)
+def test_a_point_of_which_the_start_says_nothing_is_one_for_all_that_follows(dataset, text, frames, method):
+    found = told(dataset, f"{OBJECTS}P = new Point in CircularRegion((0, 0), 3)\n{text}", method)
+    assert {(first, verdict) for first, _, verdict in found} == {(first, "Match") for first in frames}
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_discrete_outcomes_come_before_a_solver_in_frames(dataset, method):
     text = OBJECTS + "n = Discrete({1: 1, 1.25: 1, 2: 1})\nrequire n <= 1.25\nrequire n != 1\n"
     options = QueryOptions(match=MatchOptions(method=method))

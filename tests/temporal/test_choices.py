@@ -8,11 +8,14 @@ draws programs for so long and says what differs; every seed draws other ones.
 from __future__ import annotations
 
 import argparse
+import json
 import random
+import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from choices_definition import Program, Trace, alike, bindings, expected, random_program, random_trace, recording_of
 
-from scenicq.errors import Source
-from scenicq.match.options import MatchOptions
+from scenicq.errors import ScenarioError, Source
+from scenicq.match.options import MatchOptions, Method
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
@@ -43,35 +46,108 @@ class Found:
     undecided: set[tuple[str, int]] = field(default_factory=set)
 
 
-def found_by_query(folder: Path, program: Program, method: str) -> Found:
+@dataclass(frozen=True)
+class Way:
+    """How a query is asked: the method, and whether by the installed command."""
+
+    method: Method = "auto"
+    prefilter: bool = True
+    jobs: int = 1
+    installed: bool = False
+    longest: bool = False
+
+
+WAYS = (
+    Way(), Way("smt"), Way("monolithic"), Way(longest=True), Way(prefilter=False), Way("smt", prefilter=False),
+    Way("monolithic", longest=True),
+)  # fmt: skip
+ASKED = (
+    Way(installed=True), Way("smt", installed=True, prefilter=False), Way(installed=True, jobs=2),
+    Way("monolithic", installed=True, jobs=2), Way(installed=True, longest=True, prefilter=False),
+)  # fmt: skip
+"""Ways that take seconds for themselves."""
+
+
+def results(folder: Path, program: Program, way: Way) -> Iterator[tuple[str, str, dict[str, str], str, str]]:
+    """The first and last frame, who plays whom, the verdict, and why it is unknown."""
+    if way.installed:
+        (folder / "asked.scenic").write_text(program.text())
+        words = ["match", folder / "asked.scenic", folder, "--format", "jsonl", "--method", way.method, "--exit-zero"]
+        words += ["--intervals", "longest" if way.longest else "all", "--jobs", str(way.jobs)]
+        words += [] if way.prefilter else ["--no-prefilter"]
+        command = Path(sys.executable).with_name("scenicq")
+        run = subprocess.run([command, *words], capture_output=True, text=True, check=False)
+        if run.returncode and "impossible-requirement" not in run.stderr:
+            raise AssertionError((program.text(), way, run.returncode, run.stderr))
+        for line in map(json.loads, run.stdout.splitlines()):
+            frames, why = line["frames"], (line.get("cause") or {}).get("reason", "")
+            yield frames["first"], frames["last"], line["correspondence"], line["verdict"], why
+        return
+    options = QueryOptions(
+        match=MatchOptions(method=way.method), prefilter=way.prefilter, jobs=way.jobs,
+        time=IntervalOptions(intervals="longest" if way.longest else "all"),
+    )  # fmt: skip
+    try:
+        for each in Query(open_dataset(folder), Source("p.scenic", program.text()), options).results():
+            verdict, kinds = each.verdict, {Match: "match", Unknown: "unknown"}
+            why = verdict.reason if isinstance(verdict, Unknown) else ""
+            yield each.frame, each.interval.last, verdict.correspondence, kinds.get(type(verdict), "no_match"), why
+    except ScenarioError as error:
+        if error.diagnostics[0].code != "impossible-requirement":
+            raise
+
+
+def found_by_query(folder: Path, program: Program, way: Way) -> Found:
     """Every interval of a program."""
-    options = QueryOptions(match=MatchOptions(method=method), time=IntervalOptions(intervals="all"))
     found = Found()
-    for each in Query(open_dataset(folder), Source("p.scenic", program.text()), options).results():
-        start, end = (int(name.rpartition("-")[2]) for name in (each.frame, each.interval.last))
-        key = each.recording, tuple(sorted(each.verdict.correspondence.items())), start
-        if len(each.verdict.correspondence) <= len(program.roles):
-            found.undecided.add((each.recording, start))
-        elif isinstance(each.verdict, Match):
-            found.sure.setdefault(key, []).append(end)
-        elif isinstance(each.verdict, Unknown):
-            found.unknown.setdefault(key, set()).add(each.verdict.reason)
+    for first, last, roles, verdict, why in results(folder, program, way):
+        (recording, start), end = first.split("-"), last.rpartition("-")[2]
+        key = recording, tuple(sorted(roles.items())), int(start)
+        if len(roles) <= len(program.roles):
+            found.undecided.add((recording, int(start)))
+        elif verdict == "match":
+            found.sure.setdefault(key, []).append(int(end))
+        elif verdict == "unknown":
+            found.unknown.setdefault(key, set()).add(why)
     return found
 
 
-def compare(folder: Path, traces: dict[str, Trace], program: Program, method: str, seen: Counter[str]) -> None:
+def compare(folder: Path, traces: dict[str, Trace], program: Program, way: Way, seen: Counter[str]) -> None:
     """Compare every start of every binding; an assertion says what differs."""
-    found = found_by_query(folder, program, method)
+    found = found_by_query(folder, program, way)
     apart = program.tells_apart()
     for name, trace in traces.items():
         for binding in bindings(program, trace):
             if not apart and binding["a"] > binding["b"]:
                 continue
-            for i in range(len(trace)):
-                key = name, tuple(sorted(binding.items())), i
-                right = expected(program, trace, binding, i)
+            who = tuple(sorted(binding.items()))
+            every = {i: expected(program, trace, binding, i) for i in range(len(trace))}
+            if way.longest:
+                of_starts = {
+                    i: (found.sure.pop((name, who, i), []), found.unknown.pop((name, who, i), set())) for i in every
+                }
+                open_ones = any(unknown for _, unknown in of_starts.values()) or any(
+                    n == name for n, _ in found.undecided
+                )
+                if open_ones or not all(right.exact for right in every.values()):
+                    seen["not judged"] += len(trace)
+                    continue
+                right_ones = longest([(i, j) for i, right in every.items() for j in right.sure], trace)
+                told = sorted((i, j) for i, (sure, _) in of_starts.items() for j in sure)
+                assert told == right_ones, (program.text(), way, name, who, trace, told, right_ones)
+                assert told or not any(right.possible for right in every.values()), (
+                    program.text(),
+                    way,
+                    name,
+                    who,
+                    trace,
+                )
+                seen.update({"match": len(told), "no": len(trace) - len(told)})
+                continue
+            for i, right in every.items():
+                key = name, who, i
                 sure, unknown = found.sure.pop(key, []), found.unknown.pop(key, set())
-                told = (program.text(), method, key, trace, sure, unknown, right)
+                told = (program.text(), way, key, trace, sure, unknown, right)
                 assert len(set(sure)) == len(sure), told
                 if unknown - {"unobserved"} or (name, i) in found.undecided:
                     seen.update(f"undecided: {reason}" for reason in unknown or {"whole label"})
@@ -92,11 +168,17 @@ def compare(folder: Path, traces: dict[str, Trace], program: Program, method: st
                 elif not right.exact:
                     seen["not judged"] += 1
                 seen["match" if sure else "unknown" if unknown else "no"] += 1
-    assert not found.sure, (program.text(), method, found.sure)
-    assert not found.unknown, (program.text(), method, found.unknown)
+    assert not found.sure, (program.text(), way, found.sure)
+    assert not found.unknown, (program.text(), way, found.unknown)
 
 
-METHODS = ("auto", "auto", "smt", "monolithic")
+def longest(intervals: list[tuple[int, int]], trace: Trace) -> list[tuple[int, int]]:
+    """Of overlapping intervals the longest, the earliest of equals."""
+    found: list[tuple[int, int]] = []
+    for i, j in sorted(intervals, key=lambda each: (round(trace[each[0]].time - trace[each[1]].time, 6), each)):
+        if all(j < first or last < i for first, last in found):
+            found.append((i, j))
+    return sorted(found)
 
 
 def run(folder: Path, seed: int, programs: int, until: float = float("inf")) -> Counter[str]:
@@ -110,7 +192,9 @@ def run(folder: Path, seed: int, programs: int, until: float = float("inf")) -> 
         program = random_program(draw)
         if draw.random() < 0.3:
             program = alike(program)
-        compare(folder, traces, program, METHODS[number % len(METHODS)], seen)
+        compare(folder, traces, program, WAYS[(number + seed) % len(WAYS)], seen)
+        if number % 12 == 11:
+            compare(folder, traces, program, ASKED[(number // 12 + seed) % len(ASKED)], seen)
     return seen
 
 

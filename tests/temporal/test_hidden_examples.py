@@ -94,14 +94,6 @@ def test_what_is_cut_off_has_no_point_that_ends_it(found, crossroads):
         assert all(least <= 40 + TOLERANCE for least, _ in spans)
 
 
-def test_a_variable_of_which_the_first_frame_says_nothing_stays_unknown(crossroads):
-    program = PROGRAM.replace("at spot offset by (Range(-2, 2), 0)", "with regionContainedIn None")
-    options = QueryOptions(solver="portable", every=True)
-    results = list(Query(open_dataset(crossroads), Source("program.scenic", program), options).results())
-    assert {type(each.verdict) for each in results} == {Unknown}
-    assert {each.verdict.reason for each in results} == {"a hidden random point in a condition over time"}
-
-
 NESTED = """model scenic.domains.driving.model
 road = Uniform(*network.roads)
 lane = Uniform(*road.lanes)

@@ -203,7 +203,7 @@ class RecordingMatcher:
         """Starts that arrays have, those that the matcher has decided, and the labels that stay undecided."""
         block, labels, candidates = asked.block, asked.labels, asked.candidates
         arrays: Mapping[int, NDArray[np.int64]] = {}
-        sure = np.ones(len(labels), np.bool_)
+        sure = np.zeros(len(labels), np.bool_)
         codes, classes = block.categories()
         own: list[int] = np.unique(codes[block.ego(labels)]).tolist()
         if candidates is not None and all(classes[code] for code in own):
