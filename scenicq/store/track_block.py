@@ -27,13 +27,16 @@ __all__ = ["TrackBlock"]
 
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
+_CODED = ("class", "attributes")
+"""Columns of texts, of objects and egos, that are read as numbers of distinct ones."""
 
 
 class _Columns:
     """Columns of some rows of a file, each read when it is asked for."""
 
-    def __init__(self, file: StoreFile) -> None:
-        self._file = open_parquet(file)
+    def __init__(self, file: StoreFile, texts: Sequence[str]) -> None:
+        # few distinct texts, which the file has as a dictionary
+        self._file = open_parquet(file, read_dictionary=[*texts])
         metadata = self._file.metadata
         sizes = [metadata.row_group(group).num_rows for group in range(self._file.num_row_groups)]
         self._starts = np.cumsum([0, *sizes])
@@ -72,8 +75,8 @@ class TrackBlock:
             part: Number of the part.
             runs: Rows of the labels of each recording in their part, the last left out; in order.
         """
-        self._labels = _Columns(dataset.files("labels")[part])
-        self._objects = _Columns(dataset.files("objects")[part])
+        self._labels = _Columns(dataset.files("labels")[part], [f"ego_{name}" for name in _CODED])
+        self._objects = _Columns(dataset.files("objects")[part], [*_CODED, "track"])
         self.first_label, self._end = runs[0][0], runs[-1][1]
         self.runs = [(first - self.first_label, end - self.first_label) for first, end in runs]
         n = self._end - self.first_label
@@ -93,7 +96,7 @@ class TrackBlock:
         self._categories: tuple[NDArray[np.int64], list[str]] | None = None
         self._texts: dict[str, Any] = {}
         self._tracks: Integers | None = None
-        self._names: list[str] = []
+        self._named: tuple[NDArray[np.int64], list[str]] | None = None
 
     def __enter__(self) -> TrackBlock:
         """It is open."""
@@ -149,27 +152,27 @@ class TrackBlock:
     def tracks(self, members: Integers) -> Integers:
         """The tracks of members, as numbers: equal for those of one track, unlike for those of two recordings."""
         if self._tracks is None:
-            codes, self._names = _codes(self._objects_column("track"))
+            codes, names = self._names()
             recordings = self.recording_of[self.label_of[: self._m]]
-            known = recordings * len(self._names) + codes
+            known = recordings * len(names) + codes
             # a label object without a track is one of its own; so is the ego of a recording
-            alone = np.arange(self._m) + len(self.runs) * (len(self._names) + 1)
-            objects = np.where(codes < len(self._names), known, alone)
+            alone = np.arange(self._m) + len(self.runs) * (len(names) + 1)
+            objects = np.where(codes < len(names), known, alone)
             # so is what a label without an ego has in its place, which is a mere point to look from
             codes, classes = self.categories()
             there = np.array([*map(bool, classes), False])[codes[self._m :]]
-            nobody = int(alone[-1] + 1 if self._m else len(self.runs) * (len(self._names) + 1)) + np.arange(len(there))
-            egos = np.where(there, len(self.runs) * len(self._names) + self.recording_of, nobody)
+            nobody = int(alone[-1] + 1 if self._m else len(self.runs) * (len(names) + 1)) + np.arange(len(there))
+            egos = np.where(there, len(self.runs) * len(names) + self.recording_of, nobody)
             self._tracks = np.concatenate((objects, egos))
         return self._tracks[members]
 
     def tracked(self, members: Integers) -> bool:
         """Whether all these label objects have tracks with names."""
-        return bool((self.tracks(members) < len(self.runs) * (len(self._names) + 1)).all())
+        return bool((self.tracks(members) < len(self.runs) * (len(self._names()[1]) + 1)).all())
 
     def ranks(self, members: Integers) -> Integers:
         """The order of the tracks of members of one recording by name; all of them have one."""
-        names = np.array(self._names, dtype=object)
+        names = np.array(self._names()[1], dtype=object)
         order = np.empty(len(names) + 1, np.int64)
         order[np.argsort(names, kind="stable")] = np.arange(len(names))
         return order[self.tracks(members) % max(len(names), 1)]
@@ -187,10 +190,16 @@ class TrackBlock:
         """The track of a member by its name."""
         if self.is_ego(member):
             return ("ego", "")
-        track = self._text("track")[member].as_py()
-        if track is not None:
-            return ("track", track)
+        codes, names = self._names()
+        if codes[member] < len(names):
+            return ("track", names[int(codes[member])])
         return ("object", f"{self.frame(int(self.label_of[member]))}\n{self.id(member)}")
+
+    def _names(self) -> tuple[NDArray[np.int64], list[str]]:
+        """By label object the number of its track's name, and the names."""
+        if self._named is None:
+            self._named = _codes(self._objects_column("track"))
+        return self._named
 
     def id(self, member: int) -> str:
         """The id of a label object."""
@@ -229,7 +238,8 @@ class TrackBlock:
 
 def _codes(column: Any) -> tuple[NDArray[np.int64], list[str]]:
     """Numbers of distinct texts, and these; null has the number behind the last."""
-    encoded = column.dictionary_encode().unify_dictionaries().combine_chunks()
+    encoded = column if pa.types.is_dictionary(column.type) else column.dictionary_encode()
+    encoded = encoded.unify_dictionaries().combine_chunks()
     if isinstance(encoded, pa.ChunkedArray):
         encoded = encoded.chunk(0) if encoded.num_chunks else pa.array([], pa.string()).dictionary_encode()
     texts: list[str] = encoded.dictionary.to_pylist()

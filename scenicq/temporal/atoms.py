@@ -77,6 +77,7 @@ class AtomColumns:
         samples: The samples.
         assignment: Values of random variables.
         start: For each sample the first one of its run, at which what is not current is read; None where each is one.
+        given: Values of some nodes, by their ids.
         undecided: Samples at which more directions were allowed than were tried.
     """
 
@@ -84,6 +85,7 @@ class AtomColumns:
     samples: Observed
     assignment: Mapping[Identity, Value] = field(default_factory=dict["Identity", "Value"])
     start: NDArray[np.int64] | None = None
+    given: Mapping[int, Column] = field(default_factory=dict["int", "Column"])
     undecided: list[NDArray[np.bool_]] = field(default_factory=list["NDArray[np.bool_]"])
     _features: dict[tuple[int, str], Column | None] = field(default_factory=dict["tuple[int, str]", "Column | None"])
     _looked_up: dict[int, _LookedUp] = field(default_factory=dict["int", "_LookedUp"])
@@ -91,8 +93,16 @@ class AtomColumns:
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
         """The same with values of random variables; what is observed, and the map's answers about it, are shared."""
         return AtomColumns(
-            self.scenario, self.samples, assignment, self.start, self.undecided, self._features, self._looked_up
-        )
+            self.scenario, self.samples, assignment, self.start, self.given, self.undecided, self._features,
+            self._looked_up,
+        )  # fmt: skip
+
+    def assuming(self, given: Mapping[int, Column]) -> AtomColumns:
+        """The same with values of some nodes, by their ids; what is observed is shared."""
+        return AtomColumns(
+            self.scenario, self.samples, self.assignment, self.start, given, self.undecided, self._features,
+            self._looked_up,
+        )  # fmt: skip
 
     def expanded(self, condition: Node) -> Node:
         """A condition with the program's own value of what no label observes and what does not change."""
@@ -215,7 +225,7 @@ class AtomColumns:
         domain = ColumnDomain(self._observed, self._assigned, pick)
         with np.errstate(all="ignore"):
             if not self.assignment:
-                return interpret(steps_of(root), domain)[id(root)]
+                return interpret(steps_of(root, known=self.given), domain, self.given)[id(root)]
             if id(root) not in self._looked_up:
                 self._looked_up[id(root)] = self._look_up(root)
             asked = self._looked_up[id(root)]

@@ -1,16 +1,13 @@
-"""Random variables of the scene that conditions over time hang on: cells of values within which no condition changes.
+"""Random variables of the scene that conditions over time hang on, and comparisons that are affine in them.
 
 A variable is drawn once, so all samples see one value of it. A comparison that is affine in it changes its outcome at
-one value for each sample; between two neighbours of all these values every condition is constant. So a value of each
-cell (and each boundary) stands for all of it, and a run is decided for each by plain evaluation.
+one value for each sample, its cut (`hidden_conditions`).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,34 +29,17 @@ from scenicq.forest.nodes import (
     Scale,
     Select,
     TruncatedNormal,
-    Value,
     VectorOf,
     VectorSum,
 )
 from scenicq.forest.walk import children, leaves, postorder
 from scenicq.temporal.atoms import AtomColumns
 
-__all__ = ["Cell", "UnclearVariable", "affine_sides", "cells", "has_cells", "inside", "random_variables", "support"]
-
-_MOST_CELLS = 3000
-"""Combinations of values that are tried for one binding."""
+__all__ = ["UnclearVariable", "affine_sides", "comparisons_of", "has_cuts", "inside", "random_variables", "support"]
 
 
 class UnclearVariable(Exception):
-    """Values of a random variable cannot be cut into cells; the message says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """Values of random variables that stand for a box of them.
-
-    Attributes:
-        values: The value of each variable.
-        ranges: Between which values nothing changes, by variable; equal ends for a single value.
-    """
-
-    values: Mapping[Identity, Value]
-    ranges: Mapping[Identity, tuple[float, float]]
+    """Conditions on a random variable have no cuts; the message says why."""
 
 
 def random_variables(conditions: Iterable[Node]) -> list[Leaf]:
@@ -68,25 +48,6 @@ def random_variables(conditions: Iterable[Node]) -> list[Leaf]:
     for leaf in leaves(*conditions):
         found.setdefault(leaf.identity, leaf)
     return list(found.values())
-
-
-def cells(columns: AtomColumns, conditions: Sequence[Node]) -> Iterator[Cell]:
-    """Cells that cover all values of the random variables of conditions.
-
-    Args:
-        columns: What is observed.
-        conditions: Expanded conditions.
-
-    Raises:
-        UnclearVariable: A condition is not affine in a variable or hangs on two at once, or there are too many cells.
-    """
-    variables = random_variables(conditions)
-    cuts = [_cuts(columns, leaf, variables, conditions) for leaf in variables]
-    if math.prod(map(len, cuts)) > _MOST_CELLS:
-        raise UnclearVariable("too many values of random variables to tell apart")
-    for parts in itertools.product(*cuts):
-        ranges = {leaf.identity: part for leaf, part in zip(variables, parts, strict=True)}
-        yield Cell({identity: inside(*part) for identity, part in ranges.items()}, ranges)
 
 
 def _known(node: Node) -> float:
@@ -115,24 +76,7 @@ def support(leaf: Leaf) -> tuple[float, float]:
             raise UnclearVariable("a hidden random point in a condition over time")
 
 
-def _cuts(
-    columns: AtomColumns, leaf: Leaf, variables: Sequence[Leaf], conditions: Sequence[Node]
-) -> list[tuple[float, float]]:
-    """The values at which some condition may change, and the open ranges between them."""
-    low, high = support(leaf)
-    others = {each.identity for each in variables} - {leaf.identity}
-    found: set[float] = {end for end in (low, high) if math.isfinite(end)}
-    for node in _comparisons(leaf, conditions):
-        if any(each.identity in others for each in leaves(node)):
-            raise UnclearVariable("a comparison of two hidden random variables over time")
-        found.update(value for value in _changes(columns, leaf, node) if low <= value <= high)
-    ordered = sorted(found)
-    ends = [low, *ordered, high] if ordered else [low, high]
-    between = [(one, other) for one, other in itertools.pairwise(ends) if one < other]
-    return [*((value, value) for value in ordered), *between]
-
-
-def _comparisons(leaf: Leaf, conditions: Sequence[Node]) -> Iterator[Compare]:
+def comparisons_of(leaf: Leaf, conditions: Sequence[Node]) -> Iterator[Compare]:
     """The comparisons that hang on a variable."""
     for node in postorder(tuple(conditions)):
         if not any(_hangs_on(child, leaf) for child in children(node)):
@@ -183,10 +127,10 @@ def _affine(root: Node, leaf: Leaf) -> bool:
     return True
 
 
-def has_cells(condition: Node) -> bool:
-    """Whether values of the random variables of a condition can be cut into cells, by its form."""
+def has_cuts(condition: Node) -> bool:
+    """Whether the comparisons of a condition with random variables have cuts, by its form."""
     try:
-        found = [(leaf, list(_comparisons(leaf, [condition]))) for leaf in random_variables([condition])]
+        found = [(leaf, list(comparisons_of(leaf, [condition]))) for leaf in random_variables([condition])]
     except UnclearVariable:
         return False
     return all(
@@ -225,14 +169,6 @@ def affine_sides(
         unknown = left[1] | right[1]
     assert unknown is not None
     return sides[0], sides[1] - sides[0], unknown
-
-
-def _changes(columns: AtomColumns, leaf: Leaf, node: Compare) -> Iterator[float]:
-    """The values of a variable at which both sides of a comparison are equal, at some sample."""
-    at_0, slope, _ = affine_sides(columns, leaf, node)
-    with np.errstate(all="ignore"):
-        found = -at_0 / slope
-    yield from set(found[np.isfinite(found)].tolist())
 
 
 def inside(low: float, high: float) -> float:

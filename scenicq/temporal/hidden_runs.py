@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
-from typing import TypeVarTuple
+from typing import TypeVarTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.budget import TimeIsUp, limited, look
-from scenicq.forest.nodes import Compare, CompareOp, Constant, Leaf, Logic, LogicOp, Node, Value
+from scenicq.forest.nodes import Compare, CompareOp, Constant, Identity, Logic, LogicOp, Node, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import roots_of
 from scenicq.forest.temporal import Atom
@@ -19,12 +21,14 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
-from scenicq.temporal.hidden import Cell, UnclearVariable, cells, random_variables
+from scenicq.temporal.hidden import UnclearVariable, inside
+from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.hidden_examples import ExampleOutcome, Examples, Remembered, examine_start
-from scenicq.temporal.run_columns import RunColumns
+from scenicq.temporal.outcomes import place_of
+from scenicq.temporal.run_lanes import Pieces, follow_pieces, follow_runs
+from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.runs import Run, Runs
 from scenicq.temporal.stretches import Stretches
-from scenicq.temporal.thresholds import thresholds_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["Detail", "HiddenFound", "HiddenRuns", "Remembered"]
@@ -35,6 +39,8 @@ Detail = tuple[str, Mapping[str, WitnessValue]]
 
 _MOST_JOINT = 32
 """Starts of one binding that are matched again with values of random variables that the initial scene has, too."""
+_THIN = 1e-9
+"""Relative width of a piece of values below which rounding may decide: there, a run is followed again with a value."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -52,20 +58,40 @@ class HiddenFound:
     others: list[tuple[int, int, int]] = field(default_factory=list[tuple[int, int, int]])
     details: dict[tuple[int, int], Detail] = field(default_factory=dict["tuple[int, int]", Detail])
 
+    def put(self, start: int, number: int, found: Sequence[tuple[Run, Detail]]) -> None:
+        """Write down what became of a start, the best first.
+
+        Args:
+            start: Its number among all.
+            number: That in its table.
+            found: What became of it.
+        """
+        for run, detail in found:
+            self.details[number, run.end] = detail
+        self.runs.put(start, found[0][0])
+        self.others.extend((start, run.end, run.truth) for run, _ in found[1:])
+
+    def add(self, found: HiddenFound, start: int, place: int) -> None:
+        """Write down what became of some starts that follow each other, of which `start` and `place` are the first."""
+        found.runs.ends[:] += place
+        self.runs.replace(np.arange(start, start + len(found.runs.ends)), found.runs)
+        self.others.extend((start + number, place + end, truth) for number, end, truth in found.others)
+        self.details.update({(number, place + end): detail for (number, end), detail in found.details.items()})
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HiddenRuns:
     """What decides runs with hidden random variables.
 
     Attributes:
-        runs: What the program says about time.
+        machine: What the program says about time.
         scenario: The scenario.
         match: Options of the matcher.
         solver: Decides what is not decided otherwise.
         every: Whether all matches of a start are wanted, not only the longest.
     """
 
-    runs: RunColumns
+    machine: RunMachine
     scenario: Scenario
     match: MatchOptions
     solver: Solver | None
@@ -83,86 +109,93 @@ class HiddenRuns:
             expanded: Conditions over time.
             remember: The label of a start by its number.
         """
-        variables = random_variables(expanded)
-        shared = {leaf.identity for leaf in leaves(*roots_of(replace(self.scenario, dynamics=None)))}
-        joint = [leaf for leaf in variables if leaf.identity in shared]
-        known = None if joint else thresholds_of(self.runs, stretches, columns, expanded, variables)
-        found = HiddenFound(Runs.unknown(stretches.starts.copy()) if known is None else known.runs)
-        thin = np.ones(len(stretches.starts), np.bool_) if known is None else known.thin
-        numbers: list[int] = stretches.numbers.tolist()
-        if known is not None:
-            # where it ends hangs on no variable, so that a start has one end
-            ends: list[int] = known.runs.ends.tolist()
-            for number, end, value in zip(numbers, ends, known.values.tolist(), strict=True):
-                found.details[number, end] = "", {_place(variables[0]): value}
+        try:
+            with limited(self.match.timeout_s * (len(stretches.bounds) - 1)):
+                return self._by_values(stretches, columns, expanded, remember)
+        except (UnclearVariable, HiddenVariable, TimeIsUp):
+            pass
+        # what is unclear of one stretch is not so of all
+        found = HiddenFound(Runs.unknown(stretches.ends()))
         for places, mine in stretches.apart():
-            if not thin[mine].any():
-                continue
             one = stretches.some(np.arange(int(places.start), int(places.stop), dtype=np.int64))
-            own = AtomColumns(self.scenario, one.places, start=one.heads())
-            outcomes = list(self._of_binding(one, own, expanded, variables, joint, remember))
-            found.runs.put(mine, [each[0][0] for each in outcomes], places.start)
-            for start, each in zip(range(mine.start, mine.stop), outcomes, strict=True):
-                for run, detail in each:
-                    found.details[numbers[start], places.start + run.end] = detail
-                found.others.extend((start, places.start + run.end, run.truth) for run, _ in each[1:])
+            own = self._of_stretch(one, AtomColumns(self.scenario, one.places, start=one.heads()), expanded, remember)
+            found.add(own, int(mine.start), int(places.start))
         return found
 
-    def _of_binding(
-        self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node], variables: Sequence[Leaf],
-        joint: Sequence[Leaf], remember: Callable[[int], Remembered],
-    ) -> Iterator[list[tuple[Run, Detail]]]:  # fmt: skip
-        """The runs of one stretch, by cells of values: of each start the best, then other matches."""
-        numbers, starts = stretch.numbers.tolist(), stretch.starts.tolist()
+    def _of_stretch(
+        self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node],
+        remember: Callable[[int], Remembered],
+    ) -> HiddenFound:  # fmt: skip
+        """The runs of one stretch."""
         try:
             with limited(self.match.timeout_s):
-                best = list(self._over_cells(stretch, columns, expanded, joint, remember))
-        except UnclearVariable as error:
-            for start, number in enumerate(numbers):
+                return self._by_values(stretch, columns, expanded, remember)
+        except (UnclearVariable, HiddenVariable, TimeIsUp) as error:
+            unclear = error
+        reason = "timeout" if isinstance(unclear, TimeIsUp) else str(unclear) or "a hidden random variable over time"
+        found = HiddenFound(Runs.unknown(stretch.ends()))
+        for start, number in enumerate(cast("list[int]", stretch.numbers.tolist())):
+            if isinstance(unclear, UnclearVariable):
                 # what the initial scene says of the variables may be enough
-                one = replace(
-                    stretch, starts=stretch.starts[start : start + 1], numbers=stretch.numbers[start : start + 1]
-                )
-                yield self._by_examples(one, columns, expanded, remember(number), str(error))
-            return
-        except (HiddenVariable, TimeIsUp) as error:
-            reason = "timeout" if isinstance(error, TimeIsUp) else str(error) or "a hidden random variable over time"
-            for start in starts:
-                yield [(Run(start, len(stretch.labels) - 1, int(UNKNOWN)), (reason, {}))]
-            return
-        for outcomes in best:
-            found: list[tuple[Run, Detail]] = []
-            for run, cell, reason in outcomes:
-                values = {_place(leaf): cell.values[leaf.identity] for leaf in variables}
-                witness = {key: value for key, value in values.items() if isinstance(value, float)}
-                found.append((run, (reason, witness)))
-            yield found
-
-    def _over_cells(
-        self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node], joint: Sequence[Leaf],
-        remember: Callable[[int], Remembered],
-    ) -> Iterator[list[tuple[Run, Cell, str]]]:  # fmt: skip
-        """What cells make of each start: the best, then other matches if they are wanted."""
-        starts = stretch.starts.tolist()
-        found: list[list[tuple[Run, Cell]]] = [[] for _ in starts]
-        for cell in cells(columns, expanded):
-            look()
-            runs = self._in_cell(stretch, columns.assigned(cell.values), expanded)
-            for number, (mine, start) in enumerate(zip(found, starts, strict=True)):
-                mine.append((runs.run(number, start), cell))
-        matched_again = 0
-        for number, mine in zip(stretch.numbers.tolist(), found, strict=True):
-            ranked = sorted(mine, key=lambda each: (-each[0].truth, -each[0].end))
-            best, cell = ranked[0]
-            if not joint or best.truth == FALSE:
-                matches = [(run, own, "") for run, own in ranked if run.truth == TRUE]
-                yield _one_each(matches, every=self.every) or [(best, cell, "")]
-                continue
-            matched_again += 1
-            if matched_again > _MOST_JOINT:
-                yield [(replace(best, truth=int(UNKNOWN)), cell, "budget")]
+                one = stretch.beginning(start)
+                found.put(start, number, self._by_examples(one, columns, expanded, remember(number), reason))
             else:
-                yield self._jointly(remember(number), joint, ranked)
+                found.details[number, int(found.runs.ends[start])] = reason, {}
+        return found
+
+    def _by_values(
+        self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
+        remember: Callable[[int], Remembered],
+    ) -> HiddenFound:  # fmt: skip
+        """The runs by the values of hidden numbers."""
+        hidden = HiddenConditions(columns, expanded)
+        known: dict[int, Truth] = {}
+
+        def atom(each: Atom) -> Truth:
+            if each.number not in known:
+                known[each.number] = columns.truth_of(expanded[each.number])
+            return known[each.number]
+
+        pieces = follow_pieces(self.machine, stretches, atom, hidden)
+        self._confirm(pieces, stretches, columns, expanded, hidden)
+        runs, numbers = pieces.runs, cast("list[int]", stretches.numbers.tolist())
+        order = np.lexsort((*pieces.low.T[::-1], -runs.ends, -runs.truth.astype(np.int64), pieces.of))
+        shared = {leaf.identity for leaf in leaves(*roots_of(replace(self.scenario, dynamics=None)))}
+        joint = [place for place, leaf in enumerate(hidden.variables) if leaf.identity in shared]
+        firsts = np.flatnonzero(np.diff(pieces.of[order], prepend=-1))
+        found = HiddenFound(runs.some(order[firsts]))
+        if joint:
+            self._again(found, pieces, np.split(order, firsts[1:]), hidden, joint, stretches, remember)
+            return found
+        matches = order[runs.truth[order] == TRUE]
+        # one piece for each end
+        new = (np.diff(pieces.of[matches], prepend=-1) != 0) | (np.diff(runs.ends[matches], prepend=-1) != 0)
+        best = np.zeros(len(pieces.of), np.bool_)
+        best[order[firsts]] = True
+        for each in cast("list[int]", matches[new].tolist()):
+            start, end = int(pieces.of[each]), int(runs.ends[each])
+            if best[each] or self.every:
+                found.details[numbers[start], end] = "", _witness(hidden, pieces, each)
+            if not best[each] and self.every:
+                found.others.append((start, end, int(TRUE)))
+        return found
+
+    def _confirm(
+        self, pieces: Pieces, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
+        hidden: HiddenConditions,
+    ) -> None:  # fmt: skip
+        """Follow runs again with a value each where so few values match that rounding may decide."""
+        with np.errstate(invalid="ignore"):
+            thin = (pieces.high - pieces.low <= _THIN * (1 + np.abs(pieces.low))).any(axis=1)
+        for each in np.flatnonzero(thin & (pieces.runs.truth == TRUE)).tolist():
+            look()
+            start = int(pieces.of[each])
+            one = stretches.alone(start)
+            own = AtomColumns(self.scenario, one.places, _values(hidden, pieces, each), start=one.heads())
+            run = self._run(one, own, expanded, {})
+            first = int(stretches.starts[start]) - int(one.starts[0])
+            if run.truth != TRUE or run.end + first != pieces.runs.ends[each]:
+                pieces.runs.truth[each] = FALSE
 
     def _by_examples(
         self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: Remembered, unclear: str
@@ -205,40 +238,56 @@ class HiddenRuns:
                 values[each.number] = columns.truth_of(expanded[each.number])
             return values[each.number]
 
-        return self.runs.follow(one, atom).run(0, int(one.starts[0]))
+        return follow_runs(self.machine, one, atom).run(0, int(one.starts[0]))
 
-    def _in_cell(self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node]) -> Runs:
-        known: dict[int, Truth] = {}
-
-        def atom(each: Atom) -> Truth:
-            if each.number not in known:
-                known[each.number] = columns.truth_of(expanded[each.number])
-            return known[each.number]
-
-        return self.runs.follow(stretch, atom)
+    def _again(
+        self, found: HiddenFound, pieces: Pieces, groups: Sequence[NDArray[np.int64]], hidden: HiddenConditions,
+        joint: Sequence[int], stretches: Stretches, remember: Callable[[int], Remembered],
+    ) -> None:  # fmt: skip
+        """Match starts again with the values of random variables that the initial scene has, too."""
+        numbers = cast("list[int]", stretches.numbers.tolist())
+        stretch_of = np.searchsorted(stretches.bounds, stretches.starts, side="right")
+        asked: Counter[int] = Counter()
+        for group in groups:
+            start = int(pieces.of[group[0]])
+            best = pieces.runs.run(int(group[0]), int(stretches.starts[start]))
+            witness = _witness(hidden, pieces, int(group[0]))
+            if best.truth == FALSE:
+                found.put(start, numbers[start], [(best, ("", witness))])
+                continue
+            asked[int(stretch_of[start])] += 1
+            if asked[int(stretch_of[start])] > _MOST_JOINT:
+                unknown = replace(best, truth=int(UNKNOWN))
+                found.put(start, numbers[start], [(unknown, ("budget", witness))])
+                continue
+            again = self._jointly(remember(numbers[start]), pieces, group, hidden, joint, int(stretches.starts[start]))
+            found.put(start, numbers[start], again)
 
     def _jointly(
-        self, start: Remembered, joint: Sequence[Leaf], ranked: Sequence[tuple[Run, Cell]]
-    ) -> list[tuple[Run, Cell, str]]:
-        """The best runs whose values of random variables the initial scene has, too."""
-        undecided: tuple[Run, Cell, str] | None = None
-        found: list[tuple[Run, Cell, str]] = []
-        for (truth, _), group in groupby(ranked, key=lambda each: (each[0].truth, each[0].end)):
-            same = list(group)
+        self, start: Remembered, pieces: Pieces, group: NDArray[np.int64], hidden: HiddenConditions,
+        joint: Sequence[int], place: int,
+    ) -> list[tuple[Run, Detail]]:  # fmt: skip
+        """The best runs of a start, given its pieces in order."""
+        undecided: tuple[Run, Detail] | None = None
+        found: list[tuple[Run, Detail]] = []
+        ranked = [(pieces.runs.run(each, place), each) for each in cast("list[int]", group.tolist())]
+        for (truth, _), some in groupby(ranked, key=lambda each: (each[0].truth, each[0].end)):
+            same = list(some)
             if truth == FALSE or (found and (truth == UNKNOWN or not self.every)):
                 break
-            within = _within(joint, [cell for _, cell in same])
+            within = _within(hidden, pieces, joint, [each for _, each in same])
             finding = examine_start(self.scenario, self.match, self.solver, start, within)
             verdict = finding.verdict
             if isinstance(verdict, Match):
                 known = finding.values()
-                values = [known.get(leaf.identity) for leaf in joint]
-                held = next((each for each in same if _holds(each[1], joint, values)), same[0])
-                found.append((*held, ""))
+                values = [known.get(hidden.variables[variable].identity) for variable in joint]
+                held = next((each for each in same if _holds(pieces, each[1], joint, values)), same[0])
+                found.append((held[0], ("", _witness(hidden, pieces, held[1]))))
             if isinstance(verdict, Unknown) and undecided is None:
-                undecided = replace(same[0][0], truth=int(UNKNOWN)), same[0][1], verdict.reason
-        run, cell = ranked[-1]
-        return found or [undecided or (replace(run, truth=int(FALSE)), cell, "")]
+                witness = _witness(hidden, pieces, same[0][1])
+                undecided = replace(same[0][0], truth=int(UNKNOWN)), (verdict.reason, witness)
+        run, last = ranked[-1]
+        return found or [undecided or (replace(run, truth=int(FALSE)), ("", _witness(hidden, pieces, last)))]
 
 
 def _one_each(matches: Sequence[tuple[Run, *_Rest]], *, every: bool) -> list[tuple[Run, *_Rest]]:
@@ -248,29 +297,35 @@ def _one_each(matches: Sequence[tuple[Run, *_Rest]], *, every: bool) -> list[tup
     return ordered if every else ordered[:1]
 
 
-def _place(leaf: Leaf) -> str:
-    return leaf.span.mark if leaf.span else type(leaf).__name__
+def _values(hidden: HiddenConditions, pieces: Pieces, number: int) -> dict[Identity, Value]:
+    """A value of each hidden number in a piece."""
+    ends = zip(pieces.low[number].tolist(), pieces.high[number].tolist(), strict=True)
+    return {leaf.identity: inside(*each) for leaf, each in zip(hidden.variables, ends, strict=True)}
 
 
-def _within(joint: Sequence[Leaf], some: Sequence[Cell]) -> Node:
-    """That random variables have values of some cells."""
+def _witness(hidden: HiddenConditions, pieces: Pieces, number: int) -> dict[str, WitnessValue]:
+    """The same by their places in the program."""
+    values = _values(hidden, pieces, number)
+    return {place_of(leaf): cast("float", values[leaf.identity]) for leaf in hidden.variables}
+
+
+def _within(hidden: HiddenConditions, pieces: Pieces, joint: Sequence[int], some: Sequence[int]) -> Node:
+    """That random variables have values of some pieces."""
     options: list[Node] = []
-    for cell in some:
+    for each in some:
         bounds: list[Node] = []
-        for leaf in joint:
-            low, high = cell.ranges[leaf.identity]
-            # a cell of more than one value has not its ends
-            ops = (CompareOp.GE, CompareOp.LE) if low == high else (CompareOp.GT, CompareOp.LT)
-            for op, end in zip(ops, (low, high), strict=True):
+        for variable in joint:
+            ends = (pieces.low[each, variable], pieces.high[each, variable])
+            for op, end in zip((CompareOp.GE, CompareOp.LE), ends, strict=True):
                 if np.isfinite(end):
-                    bounds.append(Compare(op, leaf, Constant(float(end))))
+                    bounds.append(Compare(op, hidden.variables[variable], Constant(float(end))))
         options.append(Logic(LogicOp.AND, tuple(bounds)) if bounds else Constant(True))
     return options[0] if len(options) == 1 else Logic(LogicOp.OR, tuple(options))
 
 
-def _holds(cell: Cell, joint: Sequence[Leaf], values: Sequence[Value | None]) -> bool:
-    """Whether a witness has its values in a cell."""
+def _holds(pieces: Pieces, number: int, joint: Sequence[int], values: Sequence[Value | None]) -> bool:
+    """Whether a witness has its values in a piece."""
     return all(
-        isinstance(value, float) and cell.ranges[leaf.identity][0] <= value <= cell.ranges[leaf.identity][1]
-        for leaf, value in zip(joint, values, strict=True)
+        isinstance(value, float) and pieces.low[number, variable] <= value <= pieces.high[number, variable]
+        for variable, value in zip(joint, values, strict=True)
     )

@@ -3,7 +3,7 @@
 A binding gives each object of the scenario a track, for the whole interval. A start is a sample whose label matches
 the initial scene under a binding. All runs of a block are followed side by side, on columns over the samples in which
 all tracks of a binding live (`stretches`); where conditions hang on random variables of the scene, by the values of
-these for which they hold (`thresholds`), or once for each cell of values (`hidden_runs`).
+these for which they hold (`hidden_runs`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from scenicq.temporal.hidden_runs import Detail, HiddenFound, HiddenRuns, Rememb
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
 from scenicq.temporal.presence import by_presence
-from scenicq.temporal.run_columns import RunColumns
+from scenicq.temporal.run_lanes import follow_runs
+from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -90,18 +91,18 @@ class _Program:
 
     Attributes:
         scenario: The scenario with this outcome.
-        runs: What it says; None where it says nothing.
+        machine: What it says; None where it says nothing.
         apart: Whether what is read at the start of a run is another value for each.
     """
 
     scenario: Scenario
-    runs: RunColumns | None = field(init=False)
+    machine: RunMachine | None = field(init=False)
     apart: bool = field(init=False)
 
     def __post_init__(self) -> None:
         """Make ready."""
         scenario, dynamics = self.scenario, self.scenario.dynamics
-        self.runs = None if dynamics is None else RunColumns(dynamics)
+        self.machine = None if dynamics is None else RunMachine(dynamics)
         conditions = () if dynamics is None else dynamics.conditions
         self.apart = any(reads_start(expand(each, lambda f: steady_value(scenario, f))) for each in conditions)
 
@@ -178,10 +179,10 @@ class IntervalMatcher:
         self, program: _Program, stretches: Stretches, table: StartTable, columns: AtomColumns,
         expanded: Sequence[Node], remember: Callable[[int], Remembered],
     ) -> _Found:  # fmt: skip
-        assert program.runs is not None
+        assert program.machine is not None
         if random_variables(expanded):
             every = self.options.intervals == "all"
-            hidden = HiddenRuns(program.runs, program.scenario, self.match, self.solver, every)
+            hidden = HiddenRuns(program.machine, program.scenario, self.match, self.solver, every)
             return _found(stretches, table, columns, hidden.follow(stretches, columns, expanded, remember))
         known: dict[int, Truth] = {}
 
@@ -190,7 +191,7 @@ class IntervalMatcher:
                 known[each.number] = columns.truth_of(expanded[each.number])
             return known[each.number]
 
-        return _found(stretches, table, columns, HiddenFound(program.runs.follow(stretches, atom)))
+        return _found(stretches, table, columns, HiddenFound(follow_runs(program.machine, stretches, atom)))
 
     def _reported(
         self, parts: Sequence[_Found], table: StartTable, bindings: NDArray[np.int64]

@@ -20,7 +20,7 @@ from scenicq.forest.temporal import Atom, TemporalRequirement
 from scenicq.forest.walk import children, deciding_first, features, leaves, postorder, transform
 from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import WitnessValue
-from scenicq.temporal.hidden import has_cells
+from scenicq.temporal.hidden import has_cuts
 from scenicq.temporal.samples import MOVING
 
 __all__ = ["Outcome", "outcomes_of", "place_of", "steady_value"]
@@ -125,7 +125,7 @@ def _from_the_start(scenario: Scenario) -> Scenario:
         noisy = any(scenario.objects[index].mutated for index in read if index != PARAMS)
         said = written_out(each.condition) if plain and not noisy else each.condition
         own = {leaf.identity for leaf in leaves(said)}
-        if each.span is None or not (plain and not noisy and own and own <= hidden and has_cells(said)):
+        if each.span is None or not (plain and not noisy and own and own <= hidden and has_cuts(said)):
             left.append(each)
             continue
         requirements.append(TemporalRequirement(Atom(len(nodes)), each.span))

@@ -1,226 +1,286 @@
-"""All runs of many stretches side by side: each stays in its situation until a sample that leads elsewhere."""
+"""All runs of many stretches side by side: each stays in its situation until a sample that leads elsewhere.
+
+Runs that stand in one situation before one sample go on alike, so what becomes of them is found once. Where conditions
+hang on hidden numbers, a run is split into pieces by the values of these for which it goes on alike: at a sample whose
+cut lies within a piece, it falls in two. Pieces of one start that touch and stand alike again are joined.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import partial
-from typing import cast
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import look
 from scenicq.forest.temporal import Atom
-from scenicq.temporal.occurrences import next_at
-from scenicq.temporal.run_machine import Advance, RunMachine
-from scenicq.temporal.runs import SLACK_S, Runs
+from scenicq.temporal.grouping import distinct, groups, values_of
+from scenicq.temporal.hidden_conditions import HiddenConditions
+from scenicq.temporal.run_machine import RunMachine
+from scenicq.temporal.run_notes import Notes
+from scenicq.temporal.run_steps import Ahead, RunSteps
+from scenicq.temporal.runs import Runs
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["follow_lanes", "times_out"]
+__all__ = ["Pieces", "follow_pieces", "follow_runs"]
 
 Places = NDArray[np.int64]
+Numbers = NDArray[np.float64]
 _TIMED_AT_ONCE = 32
 """Runs at once, where each has situations of its own."""
-_MOST_COLUMNS = 64
-"""Situations of which it is remembered at which places they lead elsewhere."""
+_MOST_PIECES = 256
+"""Pieces of one run at once."""
 
 
-def follow_lanes(
-    machine: RunMachine, stretches: Stretches, atom: Callable[[Atom], Truth], which: NDArray[np.int64]
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """What became of runs by the values of hidden numbers.
+
+    Attributes:
+        of: The number of the start of each piece.
+        runs: What became of it.
+        low, high: Between which values of each variable, both included, shape (pieces, variables).
+    """
+
+    of: NDArray[np.int64]
+    runs: Runs
+    low: Numbers
+    high: Numbers
+
+
+def follow_runs(
+    machine: RunMachine, stretches: Stretches, atom: Callable[[Atom], Truth], which: NDArray[np.int64] | None = None
 ) -> Runs:
-    """What becomes of the runs from some starts.
+    """What becomes of the runs from starts.
 
     Args:
         machine: The program.
         stretches: Stretches with their starts.
         atom: The value of an atom at each place.
-        which: The numbers of these starts.
+        which: The numbers of these starts; None for all.
     """
+    if which is None:
+        which = np.arange(len(stretches.starts))
     runs = Runs.unknown(stretches.starts[which].copy())
     # a situation that waits for a time is of one run alone
     size = _TIMED_AT_ONCE if machine.timed else max(len(which), 1)
     for first in range(0, len(which), size):
         if machine.timed:
             machine.begin()
-        lanes = _Lanes(machine, stretches, atom, which[first : first + size])
-        lanes.run()
-        found = lanes.closed() if machine.dynamics.terminates else lanes.open()
-        runs.replace(np.arange(first, min(first + size, len(which))), found)
+        steps = RunSteps(machine, stretches, atom, which[first : first + size])
+        # each run has a time of its own, or what becomes of all that stand alike is the same
+        notes = _alone(steps) if machine.timed or steps.limited else _together(steps)
+        some = np.arange(len(steps.which))
+        runs.replace(np.arange(first, first + len(some)), _runs_of(steps, notes, some))
     return runs
 
 
-def times_out(stretches: Stretches, after_s: float) -> Places:
-    """For each start the first place at which so many seconds are over, the end of its stretch if there is none."""
-    found = stretches.ends() + 1
-    if math.isfinite(after_s):
-        for places, mine in stretches.apart():
-            seconds, own = stretches.seconds[places], stretches.starts[mine]
-            late = np.searchsorted(seconds, stretches.seconds[own] + after_s - SLACK_S) + places.start
-            found[mine] = np.maximum(late, own)
+def follow_pieces(
+    machine: RunMachine, stretches: Stretches, atom: Callable[[Atom], Truth], hidden: HiddenConditions
+) -> Pieces:
+    """What becomes of the runs from all starts, by the values of hidden numbers.
+
+    Args:
+        machine: The program.
+        stretches: Stretches with their starts.
+        atom: The value of an atom that hangs on no hidden number at each place.
+        hidden: The conditions that do.
+    """
+    every = np.arange(len(stretches.starts))
+    parts: list[Pieces] = []
+    size = _TIMED_AT_ONCE if machine.timed else max(len(every), 1)
+    for first in range(0, len(every), size):
+        if machine.timed:
+            machine.begin()
+        steps = RunSteps(machine, stretches, atom, every[first : first + size], hidden)
+        parts.append(_pieces(steps))
+    return Pieces(
+        np.concatenate([each.of for each in parts]), Runs.joined([each.runs for each in parts]),
+        np.concatenate([each.low for each in parts]), np.concatenate([each.high for each in parts]),
+    )  # fmt: skip
+
+
+def _together(steps: RunSteps) -> Notes:
+    """What became of all runs: what becomes of a run from a situation before a place is found once."""
+    n = len(steps.code)
+    last_at = np.repeat(steps.stretches.bounds[1:] - 1, np.diff(steps.stretches.bounds))
+    numbers: dict[int, NDArray[np.int32]] = {}
+    notes: list[Notes] = []
+    after: list[tuple[NDArray[np.int64], Places]] = []
+    count = 0
+
+    def met(situation: int, places: Places) -> Places:
+        """The places of a situation that have no number yet; they get one."""
+        nonlocal count
+        if situation not in numbers:
+            numbers[situation] = np.full(n, -1, np.int32)
+        mine = numbers[situation]
+        new = distinct(places[mine[places] < 0], n)
+        mine[new] = np.arange(count, count + len(new))
+        count += len(new)
+        return new
+
+    waiting = {0: met(0, steps.starts)}
+    while waiting:
+        look()
+        following: dict[int, list[Places]] = {}
+        for situation, at in waiting.items():
+            never = np.full(len(at), n + 1)
+            none = np.empty((len(at), 0))
+            last = last_at[at]
+            ahead = Ahead(np.full(len(at), situation), at, never, last, none, none)
+            step = steps.step(situation, ahead, steps.exit(situation, ahead))
+            notes.append(step.notes)
+            after.append((step.ahead.situation, step.ahead.at))
+            on = step.ahead.situation >= 0
+            for number in values_of(step.ahead.situation[on]):
+                following.setdefault(number, []).append(step.ahead.at[step.ahead.situation == number])
+        waiting = {}
+        for number, parts in following.items():
+            new = met(number, np.concatenate(parts))
+            if len(new):
+                waiting[number] = new
+    found = Notes.joined(notes)
+    situations, places = (np.concatenate([each[part] for each in after]) for part in (0, 1))
+    successor = np.full(count, -1)
+    for number in values_of(situations[situations >= 0]):
+        mine = situations == number
+        successor[mine] = numbers[number][places[mine]]
+    # each way is put together of two halves
+    while (on := np.flatnonzero(successor >= 0)).size:
+        later = successor[on]
+        found.put(on, found.some(on).then(found.some(later)))
+        successor[on] = successor[later]
+    return found.some(numbers[0][steps.starts].astype(np.int64))
+
+
+def _alone(steps: RunSteps) -> Notes:
+    """What became of runs, each with a time of its own."""
+    m = len(steps.which)
+    found = Notes.nothing(m)
+    owner, ahead = np.arange(m), steps.first()
+    while len(ahead):
+        look()
+        for situation, mine in groups(ahead.situation):
+            lanes = ahead.some(mine)
+            step = steps.step(situation, lanes, steps.exit(situation, lanes))
+            own = owner[mine][step.of]
+            found.put(own, found.some(own).then(step.notes))
+            ahead.situation[mine], ahead.at[mine] = step.ahead.situation, step.ahead.at
+        on = ahead.situation >= 0
+        owner, ahead = owner[on], ahead.some(on)
     return found
 
 
-@dataclass(eq=False)
-class _Lanes:
-    """One lane for each run; its place is the next one that it reads."""
+def _pieces(steps: RunSteps) -> Pieces:
+    """What became of the pieces of all runs."""
+    owner, ahead = np.arange(len(steps.which)), steps.first()
+    notes = Notes.nothing(len(owner))
+    stops = steps.exits(ahead)
+    over: list[tuple[NDArray[np.int64], Notes, Ahead]] = []
+    while len(ahead):
+        look()
+        # the pieces of a run go on together, so that those that stand alike again can be joined
+        next_stop = np.full(len(steps.which), np.iinfo(np.int64).max)
+        np.minimum.at(next_stop, owner, stops)
+        place = next_stop[owner]
+        ready = stops == place
+        parts: list[tuple[NDArray[np.int64], Notes, Ahead]] = []
+        for situation, chosen in groups(ahead.situation[ready]):
+            mine = np.flatnonzero(ready)[chosen]
+            step = steps.step(situation, ahead.some(mine), stops[mine], owner[mine])
+            parts.append((owner[mine][step.of], notes.some(mine[step.of]).then(step.notes), step.ahead))
+        rest = np.flatnonzero(~ready)
+        if len(rest):
+            waiting = ahead.some(rest)
+            seen = Notes.nothing(len(rest))
+            for situation, mine in groups(waiting.situation):
+                steps.note(seen, situation, mine, place[rest][mine])
+                steps.note_first(seen, situation, mine[waiting.at[mine] == steps.starts[owner[rest][mine]]])
+            waiting.at = place[rest] + 1
+            parts.append((owner[rest], notes.some(rest).then(seen), waiting))
+        owner = np.concatenate([each[0] for each in parts])
+        notes = Notes.joined([each[1] for each in parts])
+        ahead = Ahead.joined([each[2] for each in parts])
+        ended = ahead.situation < 0
+        over.append((owner[ended], notes.some(ended), ahead.some(ended)))
+        owner, notes, ahead = _merged(owner[~ended], notes.some(~ended), ahead.some(~ended))
+        many = np.bincount(owner, minlength=len(steps.which))[owner] > _MOST_PIECES
+        if many.any():
+            left = notes.some(many)
+            left.undecided[:] = True
+            left.possible = np.maximum(left.possible, ahead.at[many])
+            over.append((owner[many], left, ahead.some(many)))
+            owner, notes, ahead = owner[~many], notes.some(~many), ahead.some(~many)
+        stops = steps.exits(ahead)
+    of = np.concatenate([each[0] for each in over])
+    runs = _runs_of(steps, Notes.joined([each[1] for each in over]), of)
+    ended = Ahead.joined([each[2] for each in over])
+    return Pieces(steps.which[of], runs, ended.low, ended.high)
 
-    machine: RunMachine
-    stretches: Stretches
-    atom: Callable[[Atom], Truth]
-    which: NDArray[np.int64]
-    _columns: dict[int, Places] = field(default_factory=dict["int", Places])
 
-    def __post_init__(self) -> None:
-        """Begin, and find the places at which the same is true."""
-        stretches, which = self.stretches, self.which
-        n, m = len(stretches.labels), len(which)
-        self.starts, self.last = stretches.starts[which], stretches.ends()[which]
-        after_s = min(
-            (e.after_s for e in self.machine.dynamics.terminations if e.after_s is not None), default=math.inf
-        )
-        self.due = times_out(stretches, after_s)[which]
-        self.code = np.zeros(n, np.int64)
-        for number in self.machine.atoms:
-            values = self.atom(Atom(number))
-            if int(self.code.max(initial=0)) > 1 << 58:
-                self.code = np.unique(self.code, return_inverse=True)[1]
-            self.code = self.code * 3 + values
-        _, firsts, which_row = np.unique(self.code, return_index=True, return_inverse=True)
-        self.code = which_row.reshape(-1).astype(np.int64)
-        told: list[list[int]] = [self.atom(Atom(number))[firsts].tolist() for number in self.machine.atoms]
-        self.rows: list[dict[int, int]] = [
-            {number: values[row] for number, values in zip(self.machine.atoms, told, strict=True)}
-            for row in range(len(firsts))
-        ]
-        # places by what is known to be so there; -1 where nothing is
-        self.sure, self.possible, self.failed = (np.full(m, -1) for _ in range(3))
-        self.first_match = np.full(m, n)
-        self.situation = np.zeros(m, np.int64)
-        self.going = np.zeros(m, np.bool_)
-        self.undecided = np.zeros(m, np.bool_)
-        self.broken = np.full(m, None, dtype=object)
-        self.at_first = np.full(m, None, dtype=object)
+def _runs_of(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
+    """Notes as runs, given the number of the start of each."""
+    return _closed(steps, notes, of) if steps.machine.dynamics.terminates else _open(steps, notes, of)
 
-    def run(self) -> None:
-        """Follow all lanes to their ends."""
-        lanes, at = np.arange(len(self.which)), self.starts.copy()
-        while len(lanes):
-            of = self.situation[lanes]
-            following: list[tuple[NDArray[np.int64], Places]] = []
-            for number in np.unique(of).tolist():
-                mine = of == number
-                following += self._onwards(number, lanes[mine], at[mine])
-            lanes = np.concatenate([each for each, _ in following]) if following else lanes[:0]
-            at = np.concatenate([each for _, each in following]) if following else at[:0]
 
-    def _onwards(self, number: int, lanes: NDArray[np.int64], at: Places) -> list[tuple[NDArray[np.int64], Places]]:
-        """Lanes in one situation to the next place that leads elsewhere, and beyond it."""
-        there = np.minimum(np.minimum(self._leaves(number)[at], self.due[lanes]), self.last[lanes] + 1)
-        self._note(number, lanes[there > at], there[there > at] - 1)
-        self.at_first[lanes[(there > at) & (at == self.starts[lanes])]] = self.machine.situations[number].broken
-        out = there > self.last[lanes]
-        self.going[lanes[out]] = True
-        lanes, there = lanes[~out], there[~out]
-        kinds = (there if self.machine.timed else self.code[there]) * 2 + (self.due[lanes] == there)
-        following: list[tuple[NDArray[np.int64], Places]] = []
-        for kind in cast("list[int]", np.unique(kinds).tolist()):
-            some = kinds == kind
-            row, due = divmod(kind, 2)
-            if self.machine.timed:
-                here = row
-                row, later = int(self.code[here]), partial(self._later, here)
-                advance = self.machine.advance(number, self.rows[row], due=bool(due), here=here, later=later)
-            else:
-                advance = self.machine.advance(number, self.rows[row], due=bool(due))
-            own, place = lanes[some], there[some]
-            self._ends(advance, own, place)
-            if advance.situation is None:
-                continue
-            self.situation[own] = advance.situation
-            after = self.machine.situations[advance.situation]
-            if after.undecided:
-                self.undecided[own] = True
-                self.possible[own] = place
-                continue
-            self._note(advance.situation, own, place)
-            self.at_first[own[place == self.starts[own]]] = after.broken
-            if after.is_lost and not self.machine.dynamics.terminates:
-                continue
-            over = place == self.last[own]
-            self.going[own[over]] = True
-            following.append((own[~over], place[~over] + 1))
-        return following
+def _open(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
+    """Runs of a program without an end."""
+    runs = Runs.lost(steps.starts[of].copy())
+    for level, ends in ((UNKNOWN, notes.possible), (TRUE, notes.sure)):
+        held = ends >= 0
+        runs.truth[held], runs.ends[held] = level, ends[held]
+    runs.open_[:] = (notes.sure >= 0) & (notes.possible > notes.sure)
+    runs.undecided[:] = notes.undecided & (runs.truth == UNKNOWN)
+    lost = runs.truth == FALSE
+    runs.broken[lost] = steps.spans(notes.first_cause[lost])
+    return runs
 
-    def _leaves(self, number: int) -> Places:
-        """For each place the first one from there that leads elsewhere."""
-        if self.machine.timed:
-            return np.arange(len(self.code))
-        if number not in self._columns:
-            if len(self._columns) >= _MOST_COLUMNS:
-                self._columns.clear()
-            stays = Advance(number)
-            leads = [self.machine.advance(number, row, due=False) != stays for row in self.rows]
-            self._columns[number] = next_at(np.array(leads, dtype=np.bool_)[self.code])
-        return self._columns[number]
 
-    def _later(self, here: int, time_s: float) -> int:
-        """The first place of a stretch so many seconds after one, and at least the next one."""
-        end = int(self.stretches.bounds[np.searchsorted(self.stretches.bounds, here, side="right")])
-        seconds = self.stretches.seconds
-        found = here + int(np.searchsorted(seconds[here:end], float(seconds[here]) + time_s - SLACK_S))
-        return max(found, here + 1)
+def _closed(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
+    """Runs of a program that says when it ends."""
+    last = steps.last[of]
+    matches, cut = notes.sure >= 0, notes.going
+    several = notes.first_match < notes.sure
+    unclear = matches & (several | (notes.failed >= 0) | cut | notes.undecided) | notes.undecided
+    runs = Runs.lost(np.maximum(notes.sure, notes.failed))
+    runs.truth[matches] = TRUE
+    runs.truth[unclear] = UNKNOWN
+    # where the last end itself is not seen, the first one may still be it
+    early = unclear & cut & matches
+    runs.ends[early] = notes.first_match[early]
+    # it may end anywhere from there on
+    runs.ends[unclear & notes.undecided] = last[unclear & notes.undecided]
+    runs.undecided[:] = notes.undecided
+    lost = runs.truth == FALSE
+    runs.broken[lost] = steps.spans(notes.cause[lost])
+    over = lost & cut
+    runs.ends[over] = last[over]
+    situations = steps.machine.situations
+    lost_to = np.array([steps.cause(each.lost_to if each.is_lost else None) for each in situations], np.int64)
+    runs.broken[over] = steps.spans(lost_to[notes.situation[over]])
+    runs.cut_off[over] = True
+    return runs
 
-    def _note(self, number: int, lanes: NDArray[np.int64], places: Places) -> None:
-        """Write down that runs of a program without an end may end at some places, in a situation."""
-        truth = FALSE if self.machine.dynamics.terminates else self.machine.situations[number].truth
-        if truth != FALSE:
-            self.possible[lanes] = places
-        if truth == TRUE:
-            self.sure[lanes] = places
 
-    def _ends(self, advance: Advance, lanes: NDArray[np.int64], places: Places) -> None:
-        """Write down how runs may end at some places."""
-        if advance.may_match:
-            self.first_match[lanes] = np.minimum(self.first_match[lanes], places)
-            self.sure[lanes] = places
-        if advance.may_fail:
-            self.failed[lanes] = places
-            self.broken[lanes] = advance.broken
+def _merged(owner: NDArray[np.int64], notes: Notes, ahead: Ahead) -> tuple[NDArray[np.int64], Notes, Ahead]:
+    """Pieces with those joined that touch, are of one run, stand in one situation and were alike before.
 
-    def open(self) -> Runs:
-        """Runs of a program without an end."""
-        runs = Runs.lost(self.starts.copy())
-        for level, ends in ((UNKNOWN, self.possible), (TRUE, self.sure)):
-            held = ends >= 0
-            runs.truth[held], runs.ends[held] = level, ends[held]
-        runs.open_[:] = (self.sure >= 0) & (self.possible > self.sure)
-        runs.undecided[:] = self.undecided & (runs.truth == UNKNOWN)
-        lost = runs.truth == FALSE
-        runs.broken[lost] = self.at_first[lost]
-        return runs
-
-    def closed(self) -> Runs:
-        """Runs of a program that says when it ends."""
-        matches, cut = self.sure >= 0, self.going
-        several = self.first_match < self.sure
-        unclear = matches & (several | (self.failed >= 0) | cut | self.undecided) | self.undecided
-        runs = Runs.lost(np.maximum(self.sure, self.failed))
-        runs.truth[matches] = TRUE
-        runs.truth[unclear] = UNKNOWN
-        # where the last end itself is not seen, the first one may still be it
-        early = unclear & cut & matches
-        runs.ends[early] = self.first_match[early]
-        # it may end anywhere from there on
-        runs.ends[unclear & self.undecided] = self.last[unclear & self.undecided]
-        runs.undecided[:] = self.undecided
-        lost = runs.truth == FALSE
-        runs.broken[lost] = self.broken[lost]
-        over = lost & cut
-        runs.ends[over] = self.last[over]
-        for lane in np.flatnonzero(over).tolist():
-            situation = self.machine.situations[int(self.situation[lane])]
-            runs.broken[lane] = situation.lost_to if situation.is_lost else None
-        runs.cut_off[over] = True
-        return runs
+    Those of a run are all before the same place.
+    """
+    if len(owner) < 2 or ahead.low.shape[1] != 1:
+        return owner, notes, ahead
+    low, high = ahead.low[:, 0], ahead.high[:, 0]
+    order = np.lexsort((low, ahead.situation, owner))
+    touches = np.nextafter(high[order][:-1], np.inf) == low[order][1:]
+    for column in (owner, ahead.situation, *notes.columns()):
+        touches &= column[order][1:] == column[order][:-1]
+    if not touches.any():
+        return owner, notes, ahead
+    heads = np.concatenate(([True], ~touches))
+    ends = np.concatenate((~touches, [True]))
+    merged = ahead.some(order[heads])
+    merged.high[:, 0] = high[order[ends]]
+    return owner[order[heads]], notes.some(order[heads]), merged

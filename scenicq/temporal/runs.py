@@ -80,16 +80,23 @@ class Runs:
         found.truth[:] = FALSE
         return found
 
-    def put(self, where: slice, found: Sequence[Run], first: int) -> None:
-        """Write down what became of the runs of one stretch, which begins at place `first`."""
-        for place, run in zip(range(where.start, where.stop), found, strict=True):
-            self.ends[place], self.truth[place] = first + run.end, run.truth
-            self.broken[place], self.cut_off[place], self.open_[place] = run.broken, run.cut_off, run.open_
-            self.undecided[place] = run.undecided
+    @staticmethod
+    def joined(parts: Sequence[Runs]) -> Runs:
+        """Some runs, then others."""
+        return Runs(*(np.concatenate([getattr(part, name) for part in parts]) for name in Runs.__slots__))
+
+    def some(self, which: NDArray[np.int64]) -> Runs:
+        """Some of them, by their numbers."""
+        return Runs(*(getattr(self, name)[which] for name in Runs.__slots__))
+
+    def put(self, number: int, run: Run) -> None:
+        """Write down what became of one of them, by its number."""
+        self.ends[number], self.truth[number], self.broken[number] = run.end, run.truth, run.broken
+        self.cut_off[number], self.open_[number], self.undecided[number] = run.cut_off, run.open_, run.undecided
 
     def replace(self, which: NDArray[np.int64], found: Runs) -> None:
         """Write down what became of some of them, by their numbers."""
-        for name in ("ends", "truth", "broken", "cut_off", "open_", "undecided"):
+        for name in Runs.__slots__:
             getattr(self, name)[which] = getattr(found, name)
 
     def run(self, number: int, start: int) -> Run:

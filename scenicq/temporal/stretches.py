@@ -7,7 +7,7 @@ make a stretch: from the first start to the last sample of that life.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +104,16 @@ class Stretches:
             self.numbers[mine],
         )
 
+    def beginning(self, number: int) -> Stretches:
+        """The stretches with one start alone."""
+        return replace(self, starts=self.starts[number : number + 1], numbers=self.numbers[number : number + 1])
+
+    def alone(self, number: int) -> Stretches:
+        """The stretch of one start, with this start alone."""
+        place = int(np.searchsorted(self.bounds, int(self.starts[number]), side="right"))
+        first, end = int(self.bounds[place - 1]), int(self.bounds[place])
+        return self.beginning(number).some(np.arange(first, end))
+
     def apart(self) -> Iterator[tuple[slice, slice]]:
         """The places of each stretch, and which of the starts are its own."""
         firsts = np.searchsorted(self.starts, self.bounds)
@@ -153,18 +163,19 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[St
 
 
 class _Seen:
-    """Where some tracks are seen: a row of samples for each."""
+    """Where some tracks are seen: a row for each, of the samples from its first to its last."""
 
     def __init__(self, block: TrackBlock, wanted: Members, gap_s: float) -> None:
         self._wanted, mates = wanted, block.mates(wanted)
         label = block.label_of[mates]
         row = np.searchsorted(wanted, block.tracks(mates))
-        runs = np.array(block.runs, dtype=np.int64).reshape(-1, 2)
-        recording = np.zeros(len(wanted), np.int64)
-        recording[row] = block.recording_of[label]
-        sizes = runs[recording, 1] - runs[recording, 0]
-        # so that the label of a recording leads to its place in the row
-        self._base = np.cumsum(sizes) - sizes - runs[recording, 0]
+        self._first, self._last = np.full(len(wanted), len(block)), np.full(len(wanted), -1)
+        # label objects come in the order of labels, and behind them the egos of all
+        self._first[row[::-1]] = label[::-1]
+        self._last[row] = label
+        sizes = np.maximum(self._last - self._first + 1, 0)
+        # so that a label leads to its place in the row
+        self._base = np.cumsum(sizes) - sizes - self._first
         self._table = np.full(int(sizes.sum()), -1, dtype=np.int64)
         self._table[self._base[row] + label] = mates
         there = np.flatnonzero(self._table >= 0)
@@ -179,7 +190,11 @@ class _Seen:
 
     def members(self, tracks: Members, labels: Members) -> Members:
         """Who is of a track at a label; -1 where nobody is."""
-        return self._table[self._base[np.searchsorted(self._wanted, tracks)] + labels]
+        row = np.searchsorted(self._wanted, tracks)
+        within = (self._first[row] <= labels) & (labels <= self._last[row])
+        found = np.full(len(labels), -1)
+        found[within] = self._table[self._base[row[within]] + labels[within]]
+        return found
 
     def life_ends(self, tracks: Members, labels: Members) -> Members:
         """The last label of the life of a track that is seen at a label."""

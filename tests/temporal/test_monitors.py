@@ -16,7 +16,8 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest.nodes import Compare, Constant
 from scenicq.forest.walk import postorder
-from scenicq.temporal.run_columns import RunColumns
+from scenicq.temporal.run_lanes import follow_runs
+from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.runs import Runs
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
@@ -149,7 +150,7 @@ def test_monitors_do_what_their_text_says(seed: int) -> None:
         stretches = Stretches(None, np.array([0, n]), every, times, every, every)  # type: ignore[arg-type]
 
         def run(known: dict[int, np.ndarray], stretches: Stretches = stretches) -> Runs:
-            return RunColumns(dynamics).follow(stretches, lambda each: known[each.number])
+            return follow_runs(RunMachine(dynamics), stretches, lambda each: known[each.number])
 
         found = run(as_array)
         for start in range(n):

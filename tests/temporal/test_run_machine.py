@@ -8,57 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from test_ltlf import ATOMS, random_formula, recursive
-from test_run_columns import SOURCE, random_stretches
+from random_dynamics import random_dynamics
+from test_ltlf import ATOMS, recursive
+from test_run_lanes import random_stretches
 
-from scenicq.errors import Span
-from scenicq.forest.temporal import (
-    Atom,
-    Dynamics,
-    End,
-    Goto,
-    Monitor,
-    Reject,
-    TemporalRequirement,
-    Terminate,
-    Termination,
-    Test,
-    Wait,
-)
+from scenicq.forest.temporal import Dynamics, Goto, Reject, Terminate, Test, Wait
 from scenicq.temporal import progression, run_machine
-from scenicq.temporal.run_columns import RunColumns
+from scenicq.temporal.run_lanes import follow_runs
+from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 GAPS = 6
-
-
-def random_monitor(draw: random.Random) -> Monitor:
-    """A graph of steps; every circle holds a `Wait`."""
-    count = draw.randint(2, 7)
-    steps: list[object] = []
-    for number in range(count):
-        later = [draw.randint(number + 1, count) for _ in range(2)]
-        kind = draw.choices(["test", "wait", "goto", "terminate", "reject", "again"], [35, 25, 10, 10, 10, 10])[0]
-        steps.append(
-            {
-                "test": Test(Atom(draw.randrange(ATOMS)), *later), "wait": Wait(draw.randint(0, count)),
-                "goto": Goto(later[0]), "terminate": Terminate(Span(SOURCE, 1, 2)),
-                "reject": Reject(Span(SOURCE, 3, 4)), "again": Wait(0),
-            }[kind]
-        )  # fmt: skip
-    return Monitor(Span(SOURCE, 50, 51), (*steps, End()))
-
-
-def random_dynamics(draw: random.Random) -> Dynamics:
-    formulas = [random_formula(draw, 3) for _ in range(draw.randint(0, 2))]
-    ends = [
-        Termination(Span(SOURCE, 90, 91), Atom(draw.randrange(ATOMS)), simulation=draw.random() < 0.5)
-        for _ in range(draw.choice([0, 0, 1, 2]))
-    ]
-    ends += [Termination(Span(SOURCE, 92, 93), after_s=draw.choice([0.5, 1.0, 2.0]))] if draw.random() < 0.3 else []
-    monitors = [random_monitor(draw) for _ in range(draw.choice([0, 0, 1, 1, 2]))]
-    requirements = [TemporalRequirement(formula, Span(SOURCE, k, k + 1)) for k, formula in enumerate(formulas)]
-    return Dynamics((), tuple(requirements), tuple(ends), tuple(monitors))
 
 
 @dataclass
@@ -169,12 +129,12 @@ def compare(draw: random.Random, programs: int, *, limited: bool = False) -> int
     decided = 0
     for _ in range(programs):
         stretches, dynamics = random_stretches(draw), random_dynamics(draw)
-        columns = RunColumns(dynamics)
+        machine = RunMachine(dynamics)
         rows: list[list[int]] = []
         for places, _mine in stretches.apart():
             rows += random_rows(draw, places.stop - places.start)
         truth = np.array(rows, dtype=np.int8)
-        found = columns.follow(stretches, lambda atom, truth=truth: truth[:, atom.number])
+        found = follow_runs(machine, stretches, lambda atom, truth=truth: truth[:, atom.number])
         for places, mine in stretches.apart():
             own, seconds = rows[places], stretches.seconds[places].tolist()
             for number in range(mine.start, mine.stop):

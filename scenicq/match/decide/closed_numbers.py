@@ -143,9 +143,13 @@ def heading(item: Comparison) -> ClosedForm | None:
         allowed = None if flow is None else directions(get, lookups)
         for chosen, form, middle, half in choices:
             rest = seen - form.known(get) - middle
-            if isinstance(rest, np.ndarray):
+            if isinstance(rest, np.ndarray) and allowed is None:
+                column = cast(FloatColumn, rest)
+                whole = np.zeros(1) if math.isinf(half) else np.rint(column / math.tau)
+                off = cast(float, column - math.tau * whole)
+            elif isinstance(rest, np.ndarray):
                 rests: list[float] = cast(FloatColumn, rest).tolist()
-                each = [_STRAIGHT] * len(rests) if allowed is None else allowed
+                each = cast("list[tuple[float, ...]]", allowed)
                 offs = [_turn(*pair, half, margin.sure) for pair in zip(rests, each, strict=True)]
                 off = cast(float, np.array(offs))
             else:

@@ -1,0 +1,356 @@
+"""One step of many runs side by side: each stays in its situation until a sample that may lead elsewhere, and goes on.
+
+A run is a lane. Where conditions hang on hidden numbers, it is a lane for each piece of their values with which it goes
+on alike; at a sample whose cut lies within a piece, this falls in two.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.errors import Span
+from scenicq.forest.temporal import Atom
+from scenicq.temporal.first_exits import FirstExits, next_at
+from scenicq.temporal.grouping import alike, groups
+from scenicq.temporal.hidden_conditions import HiddenConditions
+from scenicq.temporal.run_machine import Advance, RunMachine
+from scenicq.temporal.run_notes import Notes
+from scenicq.temporal.runs import SLACK_S
+from scenicq.temporal.stretches import Stretches
+from scenicq.temporal.truth import FALSE, TRUE, Truth
+
+__all__ = ["Ahead", "LaneStep", "RunSteps"]
+
+Places = NDArray[np.int64]
+Numbers = NDArray[np.float64]
+_MOST_COLUMNS = 64
+"""Situations of which it is remembered at which places they lead elsewhere."""
+_MOST_CUTS = 6
+"""Cuts that a situation reads, of which it is worked out between which of them it stays."""
+
+
+@dataclass(slots=True)
+class Ahead:
+    """Lanes: where they are, and how far they may go.
+
+    Attributes:
+        situation: The number of the situation of each.
+        at: The next place that it reads.
+        due: The place at which its time is over.
+        last: The last place of its stretch.
+        low, high: Between which values of hidden numbers, shape (lanes, variables).
+    """
+
+    situation: NDArray[np.int64]
+    at: Places
+    due: Places
+    last: Places
+    low: Numbers
+    high: Numbers
+
+    def __len__(self) -> int:
+        """The number of lanes."""
+        return len(self.at)
+
+    def some(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Ahead:
+        """Some of them."""
+        return Ahead(*(getattr(self, name)[which] for name in self.__slots__))
+
+    @staticmethod
+    def joined(parts: list[Ahead]) -> Ahead:
+        """Some lanes, then others."""
+        return Ahead(*(np.concatenate([getattr(part, name) for part in parts]) for name in Ahead.__slots__))
+
+
+@dataclass(slots=True)
+class LaneStep:
+    """What one step makes of lanes.
+
+    Attributes:
+        of: The lane of each.
+        notes: What was seen on the way.
+        ahead: Where it goes on; in no situation (-1) where it is over.
+    """
+
+    of: NDArray[np.int64]
+    notes: Notes
+    ahead: Ahead
+
+
+@dataclass(eq=False)
+class RunSteps:
+    """A program over some stretches.
+
+    Attributes:
+        machine: The program.
+        stretches: The stretches.
+        atom: The value of an atom that hangs on no hidden number at each place.
+        which: The numbers of the starts of the runs.
+        hidden: The conditions that hang on hidden numbers, if there are any.
+    """
+
+    machine: RunMachine
+    stretches: Stretches
+    atom: Callable[[Atom], Truth]
+    which: NDArray[np.int64]
+    hidden: HiddenConditions | None = None
+    _exits: dict[int, Places | FirstExits] = field(default_factory=dict["int", "Places | FirstExits"])
+    _causes: list[Span | None] = field(default_factory=list["Span | None"])
+    _cause_numbers: dict[Span, int] = field(default_factory=dict["Span", int])
+
+    def __post_init__(self) -> None:
+        """Begin, and find the places at which the same is true of what hangs on no hidden number."""
+        stretches, which = self.stretches, self.which
+        self.starts, self.last = stretches.starts[which], stretches.ends()[which]
+        after_s = min(
+            (e.after_s for e in self.machine.dynamics.terminations if e.after_s is not None), default=math.inf
+        )
+        self.limited = math.isfinite(after_s)
+        self.due = _times_out(stretches, after_s)[which]
+        self._of = {} if self.hidden is None else self.hidden.of
+        known = [number for number in self.machine.atoms if number not in self._of]
+        code = np.zeros(len(stretches.labels), np.int64)
+        for number in known:
+            if int(code.max(initial=0)) > 1 << 20:
+                code = np.unique(code, return_inverse=True)[1].reshape(-1)
+            code = code * 3 + self.atom(Atom(number))
+        firsts, self.code = alike(code)
+        told: list[list[int]] = [self.atom(Atom(number))[firsts].tolist() for number in known]
+        self.rows: list[dict[int, int]] = [
+            {number: values[row] for number, values in zip(known, told, strict=True)} for row in range(len(firsts))
+        ]
+
+    # --- one step
+
+    def first(self) -> Ahead:
+        """The lanes as they begin."""
+        m = len(self.which)
+        low, high = (
+            (np.empty((m, 0)),) * 2
+            if self.hidden is None
+            else (np.tile(self.hidden.low, (m, 1)), np.tile(self.hidden.high, (m, 1)))
+        )
+        return Ahead(np.zeros(m, np.int64), self.starts.copy(), self.due, self.last, low, high)
+
+    def exits(self, ahead: Ahead) -> Places:
+        """The next place of each lane that may lead elsewhere, or lies behind the end."""
+        found = np.zeros(len(ahead), np.int64)
+        for situation, mine in groups(ahead.situation):
+            found[mine] = self.exit(situation, ahead.some(mine))
+        return found
+
+    def exit(self, number: int, ahead: Ahead) -> Places:
+        """The next place of lanes in one situation that may lead elsewhere, or lies behind the end."""
+        if self.machine.timed:
+            return ahead.at
+        if number not in self._exits:
+            if len(self._exits) >= _MOST_COLUMNS:
+                self._exits.clear()
+            self._exits[number] = self._leaves(number)
+        leaves = self._exits[number]
+        found = leaves.first(ahead.at, ahead.low, ahead.high) if isinstance(leaves, FirstExits) else leaves[ahead.at]
+        return np.minimum(np.minimum(found, ahead.due), ahead.last + 1)
+
+    def _leaves(self, number: int) -> Places | FirstExits:
+        """For each place the first one from there that leads elsewhere."""
+        reads = [each for each in self.machine.situations[number].reads if each in self._of]
+        if not reads:
+            stays = Advance(number)
+            leads = [self.machine.advance(number, row, due=False) != stays for row in self.rows]
+            return next_at(np.array(leads, dtype=np.bool_)[self.code])
+        assert self.hidden is not None
+        cuts = sorted({cut for each in reads for cut in self._of[each]})
+        variables = {self.hidden.cuts[cut].variable for cut in cuts}
+        if len(variables) > 1 or len(cuts) > _MOST_CUTS:
+            return np.arange(len(self.code))
+        ends = [self.hidden.cuts[cut].at for cut in cuts]
+        borders = np.sort(np.stack(ends), axis=0)
+        stays_between = [
+            self._stays(number, reads, {cut: end <= border for cut, end in zip(cuts, ends, strict=True)})
+            for border in (np.full(len(self.code), -np.inf), *borders)
+        ]
+        return FirstExits.between(borders, stays_between, variables.pop())
+
+    def _stays(self, number: int, reads: list[int], sides: dict[int, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        """At which places a situation leads to itself, with the sides of hidden numbers at each."""
+        code = self._codes(reads, slice(None), sides)
+        rows, which = alike(code)
+        stays = Advance(number)
+        told = [self._row(each, reads, 3 ** len(reads)) for each in cast("list[int]", code[rows].tolist())]
+        held = [self.machine.advance(number, each, due=False) == stays for each in told]
+        return np.array(held, dtype=np.bool_)[which]
+
+    def _codes(
+        self, reads: list[int], places: NDArray[np.int64] | slice, sides: dict[int, NDArray[np.bool_]]
+    ) -> NDArray[np.int64]:
+        """What is true at places, as numbers."""
+        code = self.code[places]
+        for number in reads:
+            assert self.hidden is not None
+            code = code * 3 + self.hidden.truth(number, places, sides)
+        return code
+
+    def _row(self, code: int, reads: list[int], size: int) -> dict[int, int]:
+        """The value of each atom, read off such a number."""
+        row, rest = divmod(code, size)
+        values = dict(self.rows[row])
+        for number in reversed(reads):
+            rest, values[number] = divmod(rest, 3)
+        return values
+
+    def _split(self, reads: list[int], ahead: Ahead, there: Places) -> tuple[
+        NDArray[np.int64], Ahead, Places, dict[int, NDArray[np.bool_]]
+    ]:  # fmt: skip
+        """Lanes cut where they read a cut within them, with the sides that they are on."""
+        of = np.arange(len(ahead))
+        cuts = sorted({cut for each in reads for cut in self._of[each]})
+        for cut in cuts:
+            assert self.hidden is not None
+            variable, at = self.hidden.cuts[cut].variable, self._cut(cut, ahead, there)
+            low, high = ahead.low[:, variable], ahead.high[:, variable]
+            within = np.flatnonzero((low < at) & (at <= high))
+            if len(within):
+                upper = ahead.some(within)
+                upper.low[:, variable] = at[within]
+                ahead.high[within, variable] = np.nextafter(at[within], -np.inf)
+                ahead = Ahead.joined([ahead, upper])
+                of, there = np.concatenate((of, of[within])), np.concatenate((there, there[within]))
+        sides = {
+            cut: ahead.low[:, self.hidden.cuts[cut].variable] >= self._cut(cut, ahead, there)
+            for cut in cuts if self.hidden is not None
+        }  # fmt: skip
+        return of, ahead, there, sides
+
+    def _cut(self, number: int, ahead: Ahead, there: Places) -> Numbers:
+        """A cut at places; behind the last one of a lane there is none."""
+        assert self.hidden is not None
+        at = self.hidden.cuts[number].at
+        return np.where(there > ahead.last, np.inf, at[np.minimum(there, len(at) - 1)])
+
+    def step(self, number: int, lanes: Ahead, there: Places, owner: NDArray[np.int64] | None = None) -> LaneStep:
+        """Lanes in one situation to the next place that leads elsewhere, and beyond it.
+
+        Args:
+            number: The situation.
+            lanes: The lanes.
+            there: These places.
+            owner: The run of each, if there are pieces.
+        """
+        reads = [each for each in self.machine.situations[number].reads if each in self._of]
+        of, ahead, there, sides = self._split(reads, lanes.some(np.arange(len(lanes))), there)
+        m = len(of)
+        notes = Notes.nothing(m)
+        notes.situation[:] = number
+        stayed = np.flatnonzero(there > ahead.at)
+        self.note(notes, number, stayed, there[stayed] - 1)
+        first = np.full(m, True) if owner is None else ahead.at == self.starts[owner[of]]
+        self.note_first(notes, number, stayed[first[stayed]])
+        ahead.situation = np.full(m, -1)
+        out = there > ahead.last
+        notes.going[out] = True
+        on = np.flatnonzero(~out)
+        if self.machine.timed:
+            kinds = there[on] * 3 ** len(reads)
+            kinds += self._codes(reads, there[on], _at(sides, on)) - self.code[there[on]] * 3 ** len(reads)
+        else:
+            kinds = self._codes(reads, there[on], _at(sides, on))
+        kinds = kinds * 2 + (ahead.due[on] == there[on])
+        for kind, chosen in groups(kinds):
+            mine = on[chosen]
+            code, due = divmod(kind, 2)
+            advance = self._advance(number, code, reads, due=bool(due), here=int(there[mine[0]]))
+            self._ends(notes, advance, mine, there[mine])
+            if advance.situation is None:
+                continue
+            notes.situation[mine] = advance.situation
+            after = self.machine.situations[advance.situation]
+            if after.undecided:
+                notes.undecided[mine] = True
+                notes.possible[mine] = there[mine]
+                continue
+            self.note(notes, advance.situation, mine, there[mine])
+            self.note_first(notes, advance.situation, mine[first[mine] & (there[mine] == ahead.at[mine])])
+            if after.is_lost and not self.machine.dynamics.terminates:
+                continue
+            ended = there[mine] == ahead.last[mine]
+            notes.going[mine[ended]] = True
+            ahead.situation[mine[~ended]] = advance.situation
+        ahead.at = there + 1
+        return LaneStep(of, notes, ahead)
+
+    def _advance(self, number: int, code: int, reads: list[int], *, due: bool, here: int) -> Advance:
+        size = 3 ** len(reads)
+        if not self.machine.timed:
+            return self.machine.advance(number, self._row(code, reads, size), due=due)
+        row = int(self.code[here]) * size + code % size
+        later = partial(self._later, here)
+        return self.machine.advance(number, self._row(row, reads, size), due=due, here=here, later=later)
+
+    def _later(self, here: int, time_s: float) -> int:
+        """The first place of a stretch so many seconds after one, and at least the next one."""
+        end = int(self.stretches.bounds[np.searchsorted(self.stretches.bounds, here, side="right")])
+        seconds = self.stretches.seconds
+        found = here + int(np.searchsorted(seconds[here:end], float(seconds[here]) + time_s - SLACK_S))
+        return max(found, here + 1)
+
+    def note(self, notes: Notes, number: int, lanes: NDArray[np.int64], places: Places) -> None:
+        """Write down that runs of a program without an end may end at some places, in a situation."""
+        notes.situation[lanes] = number
+        truth = FALSE if self.machine.dynamics.terminates else self.machine.situations[number].truth
+        if truth != FALSE:
+            notes.possible[lanes] = places
+        if truth == TRUE:
+            notes.sure[lanes] = places
+
+    def note_first(self, notes: Notes, number: int, lanes: NDArray[np.int64]) -> None:
+        """Write down what keeps runs of a program without an end from matching in a situation at their first sample."""
+        if not self.machine.dynamics.terminates:
+            notes.first_cause[lanes] = self.cause(self.machine.situations[number].broken)
+
+    def _ends(self, notes: Notes, advance: Advance, lanes: NDArray[np.int64], places: Places) -> None:
+        """Write down how runs may end at some places."""
+        if advance.may_match:
+            notes.first_match[lanes] = places
+            notes.sure[lanes] = places
+        if advance.may_fail:
+            notes.failed[lanes] = places
+            notes.cause[lanes] = self.cause(advance.broken)
+
+    def cause(self, span: Span | None) -> int:
+        """The number of what keeps runs from matching; -1 for nothing."""
+        if span is None:
+            return -1
+        if span not in self._cause_numbers:
+            self._cause_numbers[span] = len(self._causes)
+            self._causes.append(span)
+        return self._cause_numbers[span]
+
+    def spans(self, causes: NDArray[np.int64]) -> NDArray[np.object_]:
+        """Causes by their numbers."""
+        found = np.full(len(self._causes) + 1, None, dtype=object)
+        found[: len(self._causes)] = self._causes
+        return found[causes]
+
+
+def _at(sides: dict[int, NDArray[np.bool_]], which: NDArray[np.int64]) -> dict[int, NDArray[np.bool_]]:
+    return {cut: each[which] for cut, each in sides.items()}
+
+
+def _times_out(stretches: Stretches, after_s: float) -> Places:
+    """For each start the first place at which so many seconds are over, the end of its stretch if there is none."""
+    last = stretches.ends()
+    if not math.isfinite(after_s):
+        return last + 1
+    # whole numbers that grow from place to place, over all stretches
+    time_us = np.round(stretches.seconds * 1e6).astype(np.int64)
+    whole = int(time_us.max(initial=0)) + round(min(after_s, 1e6) * 1e6) + 2
+    first = np.repeat(np.arange(len(stretches.bounds) - 1), np.diff(stretches.bounds)) * whole
+    wanted = (first + time_us)[stretches.starts] + round(min(after_s, 1e6) * 1e6) - round(SLACK_S * 1e6)
+    return np.clip(np.searchsorted(first + time_us, wanted), stretches.starts, last + 1)
