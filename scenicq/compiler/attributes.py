@@ -129,7 +129,6 @@ _BESIDE = re.compile(
 _TURNS = "`angularSpeed` is how fast it turns, in radians a second"
 _SAID = {
     "yawrate": _TURNS, "angularvelocity": _TURNS, "turnrate": _TURNS, "accel": "`acceleration` is along the course",
-    "x": "`position.x` is along the map's axis", "y": "`position.y` is along the map's axis",
     "isparked": STANDS, "parked": STANDS, "isstopped": STANDS, "stopped": STANDS, "isstationary": STANDS,
     "ismoving": MOVES, "moving": MOVES,
     "category": "`new Bus` asks for a class", "type": "`new Bus` asks for a class",
@@ -256,7 +255,20 @@ def _of_instance(run: Runner, value: Instance, name: str, span: Span) -> ModelVa
         return Builtin(name, lambda span, other: operators.distance_to(other, value, span))
     if name == "angleTo":
         return Builtin(name, lambda span, other: operators.angle_to(other, value, span))
-    return next((cls.attributes[name] for cls in value.cls.ancestry() if name in cls.attributes), MISSING)
+    if name == "corners":
+        return _corners(value, span)
+    for cls in value.cls.ancestry():
+        if name in cls.attributes:
+            return cls.attributes[name]
+    return _of_node(to_vector(value, span), name, span)
+
+
+def _corners(value: Instance, span: Span) -> tuple[ModelValue, ...]:
+    """The corners of the box, counter-clockwise from the front right: those of its top, then those of its bottom."""
+    if value.index is None:
+        return (to_vector(value, span),)
+    around = ("front right", "front left", "back left", "back right")
+    return 2 * tuple(part_of(part, value, span).properties["position"] for part in around)
 
 
 def _of_field(run: Runner, value: Node, name: str) -> ModelValue:

@@ -64,7 +64,7 @@ def read(run: Runner, value: ModelValue) -> ModelValue:
 def _is_pure(node: ast.Expression, scope: Environment) -> bool:
     """Whether all that an expression does is to give its value: it makes nothing and changes nothing."""
     for each in walk(node):
-        if isinstance(each, ast.New | ast.Walrus | ast.Lambda):
+        if isinstance(each, ast.New | ast.Walrus):
             return False
         if isinstance(each, ast.Call) and isinstance(each.function, ast.Attribute) and each.function.name in _CHANGES:
             return False

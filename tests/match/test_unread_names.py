@@ -16,6 +16,8 @@ NAMED = {
     "network.laneAt(ego).group": "zone is not None",
     "network.roadAt(ego, reject='off').lanes": "len(zone) > 0",
     "[network.laneAt(ego, reject=True), 3]": "zone[1] == 3",
+    "list(filter(lambda lane: True, [network.laneAt(ego, reject=True)]))": "len(zone) == 1",
+    "sorted([network.laneAt(ego, reject=True)], key=lambda lane: 1)": "len(zone) == 1",
 }
 
 
@@ -27,6 +29,7 @@ def verdict(text: str):
 def test_a_name_that_nothing_reads(value):
     assert isinstance(verdict(f"zone = {value}\n"), Match)
     assert isinstance(verdict(f"zone = {value}\nother = zone\n"), Match)
+    assert isinstance(verdict(f"zone = {value}\nother = list(filter(lambda each: True, [zone]))\n"), Match)
     assert isinstance(verdict(f"def f():\n    zone = {value}\n    return 3\nrequire f() == 3\n"), Match)
 
 
