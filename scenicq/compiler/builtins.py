@@ -40,7 +40,7 @@ def _sequence(value: ModelValue, span: Span) -> list[ModelValue]:
 
 
 def _vector(span: Span, x: ModelValue, y: ModelValue, z: ModelValue = 0) -> ModelValue:
-    return to_vector((x, y, z), span)
+    return to_vector((x, y), span) if z in (0, 0.0) else (x, y, z)
 
 
 def _local_path(span: Span, path: ModelValue) -> ModelValue:

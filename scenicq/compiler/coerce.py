@@ -27,6 +27,7 @@ from scenicq.syntax.phrases import condition_hint
 __all__ = [
     "OBSERVABLE",
     "PARTIAL",
+    "apart_from_height",
     "kind_of_model",
     "property_node",
     "read_over_time",
@@ -34,6 +35,7 @@ __all__ = [
     "to_field",
     "to_heading",
     "to_node",
+    "to_place",
     "to_region",
     "to_scalar",
     "to_vector",
@@ -202,6 +204,21 @@ def to_vector(value: ModelValue, span: Span | None) -> Node:
     if isinstance(value, Choice):
         return Select(value.index, tuple(to_vector(option, span) for option in value.options), span=span)
     raise _need(value, "a vector", span)
+
+
+def to_place(value: ModelValue, span: Span | None) -> Node:
+    """Where an object is put: a vector without its height, since objects of the plane have none."""
+    if isinstance(value, Instance):
+        value = property_node(value, "position", span)
+    flat, _ = apart_from_height(value)
+    return to_vector(flat, span)
+
+
+def apart_from_height(value: ModelValue) -> tuple[ModelValue, ModelValue]:
+    """A vector of the plane, and the height of one that is written with three coordinates, else 0."""
+    if isinstance(value, tuple | list) and len(parts := cast("list[ModelValue]", value)) == 3:
+        return (parts[0], parts[1]), parts[2]
+    return value, 0.0
 
 
 def to_region(value: ModelValue, span: Span | None) -> Node:

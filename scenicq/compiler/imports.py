@@ -13,9 +13,18 @@ from scenicq.compiler.constructs import operator_functions
 from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
 from scenicq.compiler.imported_files import ImportedFiles, Loader, absolute, packages
 from scenicq.compiler.interpreter import Interpreter
-from scenicq.compiler.models import is_dynamic, is_package, libraries_of, library_text, network_names, plain_module
+from scenicq.compiler.models import (
+    is_dynamic,
+    is_package,
+    libraries_of,
+    library_text,
+    network_names,
+    plain_module,
+    unsupported_module,
+)
 from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
+from scenicq.compiler.unread import NoValue
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
 from scenicq.errors import Diagnostic, Note, ScenarioError, Span
 from scenicq.geometry.network import Network
@@ -76,9 +85,20 @@ class Modules:
                 scope.names.update(_public(self.load(node.name, node.name_span)))
             case ast.Import():
                 for alias in node.aliases:
-                    self._import_module(alias, scope)
+                    if (error := self._unsupported(alias.path, alias.span)) is not None:
+                        scope.set(alias.name or alias.path.partition(".")[0], NoValue(error))
+                    else:
+                        self._import_module(alias, scope)
             case ast.ImportFrom():
-                self._import_from(node, scope)
+                error = None if node.level else self._unsupported(node.module, node.span)
+                if error is None:
+                    return self._import_from(node, scope)
+                for alias in node.aliases:
+                    scope.set(alias.name or alias.path, NoValue(error))
+
+    def _unsupported(self, name: str, span: Span) -> ScenarioError | None:
+        """What is wrong with reading a name that comes from one of Python's modules; a file of that name goes first."""
+        return None if self._is_there(name) else unsupported_module(name, span)
 
     def _import_module(self, alias: ast.ImportAlias, scope: Environment) -> None:
         module = self.load(alias.path, alias.span)

@@ -307,7 +307,9 @@ class Interpreter:
                 self.dynamic("require monitor" if isinstance(node, ast.RequireMonitor) else node.kind, node.span)
                 if isinstance(node, ast.DynamicDefinition) and node.name:
                     scope.set(node.name, None)
-            case ast.Delete() | ast.Raise() | ast.Try() | ast.WithStatement() | ast.UnsupportedStatement():
+            case ast.Try():
+                self.run((*node.body, *node.orelse, *node.final), scope)  # what fails is an error all the same
+            case ast.Delete() | ast.Raise() | ast.WithStatement() | ast.UnsupportedStatement():
                 word = node.span.text.split()[0].rstrip(":")
                 raise fail("unsupported-construct", f"`{word}` is not supported", node.span, "not needed for a scene",
                            ("write what the scene needs with assignments, `if`, `for` and functions",))  # fmt: skip

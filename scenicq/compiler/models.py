@@ -15,7 +15,7 @@ from importlib import resources
 from scenicq.compiler.builtins import mathematics
 from scenicq.compiler.elements import MANEUVER_TYPES
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
-from scenicq.errors import Source, Span
+from scenicq.errors import ScenarioError, Source, Span
 from scenicq.forest import build
 from scenicq.geometry.elements import (
     Intersection,
@@ -43,6 +43,7 @@ __all__ = [
     "library_texts",
     "network_names",
     "plain_module",
+    "unsupported_module",
 ]
 
 _LIBRARIES: dict[str, tuple[str, ...]] = {
@@ -140,15 +141,29 @@ def _ignored(span: Span, *_: ModelValue, **__: ModelValue) -> ModelValue:
     return None
 
 
+def unsupported_module(name: str, span: Span) -> ScenarioError | None:
+    """What is said of the names of a module of Python that programs cannot use; None for any other module."""
+    if name in _OF_PYTHON or name.partition(".")[0] not in sys.stdlib_module_names:
+        return None
+    return fail("unsupported-construct", f"Python's module `{name}` is not supported", span, "not imported",
+                ("of Python's modules only `math` is known: write what the scene needs in Scenic",))  # fmt: skip
+
+
+_OF_PYTHON = frozenset({"math", "sys"})
+
+
 def plain_module(name: str, span: Span) -> Module:
     """A module that does not depend on the map.
 
     Raises:
-        ScenarioError: unknown-model; unsupported-construct, for modules of Python and of shapes in space.
+        ScenarioError: unknown-model; unsupported-construct, for modules of shapes in space.
     """
     match name:
         case "math":
             return Module("math", mathematics())
+        case "sys":
+            # programs put the folders of simulators there; what is imported does not depend on it
+            return Module("sys", {"path": []})
         case _ if name == _ROADS:
             return Module(name, dict(_ROAD_TYPES))
         case _ if name in _MAPS:
@@ -157,9 +172,6 @@ def plain_module(name: str, span: Span) -> Module:
         case _ if name in _IN_SPACE:
             raise fail("unsupported-construct", f"`{name}` is not supported: labels are matched in 2D", span,
                        "shapes in space", ("give objects a `width` and a `length` instead of a shape",))  # fmt: skip
-        case _ if name.partition(".")[0] in sys.stdlib_module_names:
-            raise fail("unsupported-construct", f"Python's module `{name}` is not supported", span, "not imported",
-                       ("of Python's modules only `math` is known: write what the scene needs in Scenic",))  # fmt: skip
         case _:
             close = get_close_matches(name, sorted(_LIBRARIES), 1, 0.6)
             nearest = (f"`{close[0]}` is the nearest that is known",) if close else ()

@@ -10,6 +10,7 @@ import math
 
 from scenicq.compiler.absent import absent_parts, listed
 from scenicq.compiler.coerce import (
+    apart_from_height,
     kind_of_model,
     property_node,
     to_boolean,
@@ -41,12 +42,10 @@ from scenicq.forest.nodes import (
     RegionIntersection,
     RegionUnion,
     Select,
+    Undefined,
 )
-from scenicq.geometry.regions import (
-    DifferenceOf,
-    IntersectionOf,
-    UnionOf,
-)
+from scenicq.geometry.regions import DifferenceOf, IntersectionOf, PolylineSet, UnionOf
+from scenicq.geometry.road_direction import along_lines
 
 __all__ = [
     "along",
@@ -92,6 +91,31 @@ def _is_vector(value: ModelValue) -> bool:
     return kind_of_model(value) == "vector" or isinstance(value, Instance)
 
 
+def _is_polyline(value: ModelValue) -> bool:
+    """Whether a value is a polyline, or a region that is one in every outcome."""
+    todo = [value]
+    while todo:
+        match todo.pop():
+            case Select() as choice:
+                todo += choice.options
+            case RegionUnion() as union:
+                todo += union.parts
+            case Constant(value=PolylineSet() | Undefined()):
+                pass
+            case _:
+                return False
+    return True
+
+
+def _joined_lines(left: ModelValue, right: ModelValue, span: Span) -> Node:
+    """The lines of one polyline, then those of another."""
+    sets = [each.value for each in (left, right) if isinstance(each, Constant) and isinstance(each.value, PolylineSet)]
+    if len(sets) < 2:
+        return region_union(left, right, span)
+    lines, name = sets[0].lines + sets[1].lines, f"{sets[0].name} + {sets[1].name}"
+    return build.constant(PolylineSet(lines, name, along_lines(lines, name)), span)
+
+
 def binary(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
     """Python's arithmetic where at least one side is an expression."""
     if _is_vector(left) or _is_vector(right):
@@ -105,6 +129,8 @@ def binary(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelVal
             one = build.arithmetic(ArithmeticOp.DIV, build.constant(1.0), to_scalar(right, span), span=span)
             return build.scale(to_vector(left, span), one, span)
         raise fail("wrong-type", f"`{op}` has no meaning for a vector", span, "on a vector")
+    if op == "+" and _is_polyline(left) and _is_polyline(right):
+        return _joined_lines(left, right, span)
     if op not in _BINARY:
         raise fail("unsupported-construct", f"`{op}` is not supported on random values", span, "on a random value")
     return build.arithmetic(_BINARY[op], to_scalar(left, span), to_scalar(right, span), span=span)
@@ -168,20 +194,30 @@ def _is_offset(value: ModelValue) -> bool:
 
 def offset(origin: ModelValue, by: ModelValue, span: Span) -> ModelValue:
     """`O offset by V`: in the frame of an oriented point, else plain addition."""
-    if isinstance(origin, Instance) and origin.oriented:
-        position = build.offset_local(to_vector(origin, span), to_heading(origin, span), to_vector(by, span), span)
-        return oriented(position, to_heading(origin, span))
-    return build.vector_sum(to_vector(origin, span), to_vector(by, span), span)
+    (start, base), (away, height) = apart_from_height(origin), apart_from_height(by)
+    if isinstance(start, Instance) and start.oriented:
+        position = build.offset_local(to_vector(start, span), to_heading(start, span), to_vector(away, span), span)
+        return oriented(_raised(position, base, height, span), to_heading(start, span))
+    return _raised(build.vector_sum(to_vector(start, span), to_vector(away, span), span), base, height, span)
 
 
-def along(origin: ModelValue, direction: ModelValue, by: ModelValue, span: Span) -> Node:
+def along(origin: ModelValue, direction: ModelValue, by: ModelValue, span: Span) -> ModelValue:
     """`V offset along D by V`, where D is a heading or a field taken at the origin."""
-    start = to_vector(origin, span)
-    heading = direction_at(direction, start, span) if is_field(direction) else to_heading(direction, span)
-    return build.offset_local(start, heading, to_vector(by, span), span)
+    (start, base), (away, height) = apart_from_height(origin), apart_from_height(by)
+    place = to_vector(start, span)
+    heading = direction_at(direction, place, span) if is_field(direction) else to_heading(direction, span)
+    return _raised(build.offset_local(place, heading, to_vector(away, span), span), base, height, span)
 
 
-def oriented(position: Node, heading: Node) -> Instance:
+def _raised(place: Node, base: ModelValue, height: ModelValue, span: Span) -> ModelValue:
+    """A vector of the plane at a height; one that is high is written with three coordinates."""
+    if base in (0, 0.0) and height in (0, 0.0):
+        return place
+    up = build.add(to_scalar(base, span), to_scalar(height, span), span)
+    return build.coordinate(place, 0, span), build.coordinate(place, 1, span), up
+
+
+def oriented(position: ModelValue, heading: Node) -> Instance:
     """An oriented point."""
     return oriented_point({"position": position, "heading": heading})
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import cast
 
 from scenicq.errors import Span
 from scenicq.forest import build
+from scenicq.forest.compute import fold
 from scenicq.forest.nodes import (
+    CompareOp,
     Constant,
     DirectionAt,
+    Distance,
     Node,
     Range,
     RegionDifference,
@@ -19,7 +22,7 @@ from scenicq.forest.nodes import (
     Select,
     Undefined,
 )
-from scenicq.geometry.regions import PolygonSet, Region, orientation_of
+from scenicq.geometry.regions import PolygonSet, Region, UnionOf, orientation_of
 
 __all__ = ["is_always_there", "orientation"]
 
@@ -31,6 +34,8 @@ def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
     any.
     """
     match region:
+        case Constant(value=UnionOf() as union):
+            return _of_union([build.constant(part, span) for part in union.parts], point, span)
         case Constant():
             field = orientation_of(cast(Region, region.value))
             if field is not None:
@@ -39,7 +44,9 @@ def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
             return _any_heading(span) if undirected else None
         case Select():
             return _chosen_orientation(region, point, span)
-        case RegionIntersection() | RegionUnion():
+        case RegionUnion():
+            return _of_union(region.parts, point, span)
+        case RegionIntersection():
             found = (orientation(part, point, span) for part in region.parts)
             return next((heading for heading in found if heading is not None), None)
         case RegionDifference():
@@ -74,6 +81,27 @@ def is_always_there(region: Node, may_lack: Callable[[Node], bool]) -> bool:
     return True
 
 
+def _of_union(parts: Sequence[Node], point: Node, span: Span | None) -> Node | None:
+    """That of the first part with a direction that holds the point, and of the nearest where numbers are rounded."""
+    headings = [(part, heading) for part in parts if (heading := orientation(part, point, span)) is not None]
+    if not headings:
+        return None
+    others, found = headings.pop()
+    for part, heading in reversed(headings):
+        if _field(heading) is None or _field(heading) != _field(found):
+            away = [fold(Distance(each, point, span=span)) for each in (part, others)]
+            found = Select(build.compare(CompareOp.LE, away[0], away[1], span), (found, heading), span=span)
+        others = fold(RegionUnion((part, others), span=span))
+    return found
+
+
+def _field(heading: Node) -> int | None:
+    """What identifies the field that a heading is read from."""
+    if not isinstance(heading, DirectionAt):
+        return None
+    return id(heading.field.value if isinstance(heading.field, Constant) else heading.field)
+
+
 def _any_heading(span: Span | None) -> Node:
     return Range(build.constant(-math.pi, span), build.constant(math.pi, span), span=span)
 
@@ -91,10 +119,13 @@ def _chosen_orientation(region: Select, point: Node, span: Span | None) -> Node 
         found.append(heading)
     if any(isinstance(heading, Range) for heading in found):
         return _any_heading(span)
-    known = [cast(DirectionAt, heading) for heading in found if heading is not None]
+    known = [heading for heading in found if heading is not None]
     if not known:
         return None
-    if len({id(each.field.value if isinstance(each.field, Constant) else each.field) for each in known}) == 1:
+    fields = {_field(each) for each in known}
+    if None in fields:
+        return Select(region.index, tuple(heading or known[0] for heading in found), span=span)
+    if len(fields) == 1:
         return known[0]
-    fields = tuple((known[0] if heading is None else cast(DirectionAt, heading)).field for heading in found)
-    return DirectionAt(Select(region.index, fields, span=span), point, span=span)
+    options = tuple(cast(DirectionAt, heading or known[0]).field for heading in found)
+    return DirectionAt(Select(region.index, options, span=span), point, span=span)

@@ -12,7 +12,7 @@ from typing import assert_never, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.choices import holds_instances, make_choice
-from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to_scalar, to_vector
+from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to_place, to_scalar, to_vector
 from scenicq.compiler.deviations import DEVIATIONS, deviation, leaves_the_plane
 from scenicq.compiler.environment import FIRST_NAMES, Budget
 from scenicq.compiler.following import follow
@@ -86,7 +86,9 @@ def _position(span: Span, value: ModelValue, heading: ModelValue = None) -> Boun
     """A specifier of a position and, if there is one, optionally of a heading."""
 
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
-        given: dict[str, ModelValue] = {"position": to_vector(_known(value, instance), span)}
+        place = _known(value, instance)
+        flat = to_vector(place, span) if instance.index is None else to_place(place, span)
+        given: dict[str, ModelValue] = {"position": flat}
         if heading is not None:
             given["heading"] = heading
         return given
@@ -144,10 +146,10 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
     right, ahead = _SIDES[node.direction]
     size = "width" if right else "length"
 
-    def gap(away: ModelValue) -> tuple[Node, Node]:
+    def gap(away: ModelValue, instance: Instance) -> tuple[Node, Node]:
         zero = build.constant(0.0)
         if kind_of_model(away) == "vector" or isinstance(away, tuple | list):
-            pair = to_vector(away, span)
+            pair = to_vector(away, span) if instance.index is None else to_place(away, span)
             x, y = build.coordinate(pair, 0, span), build.coordinate(pair, 1, span)
         else:
             distance = to_scalar(0.0 if away is None else away, span)
@@ -165,7 +167,7 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
         )
 
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
-        x, y = gap(_known(by, instance))
+        x, y = gap(_known(by, instance), instance)
         edge = half(instance)
         if isinstance(reference, Instance) and reference.index is not None:
             edge = build.add(edge, half(reference), span)
@@ -213,7 +215,8 @@ def _beyond(
     goal = to_vector(target, span)
     sight = build.bearing(build.vector_difference(goal, to_vector(origin, span), span), span)
     is_vector = kind_of_model(by) == "vector" or isinstance(by, tuple | list)
-    offset = to_vector(by, span) if is_vector else build.vector(build.constant(0.0), to_scalar(by, span), span)
+    flat = to_place if around.is_object else to_vector
+    offset = flat(by, span) if is_vector else build.vector(build.constant(0.0), to_scalar(by, span), span)
     position = build.offset_local(goal, sight, offset, span)
     if around.version < 3:
         return _position(span, position)
@@ -354,7 +357,9 @@ def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Boun
             return _position(span, evaluate(node.position))
         case ast.OnSpecifier():
             region = evaluate(node.region)
-            if around.version == 3 and (kind_of_model(region) == "vector" or isinstance(region, tuple | list)):
+            is_point = isinstance(region, Instance) and region.index is None
+            is_vector = is_point or kind_of_model(region) == "vector" or isinstance(region, tuple | list)
+            if around.version == 3 and is_vector:
                 return _position(span, region)
             if isinstance(region, Instance):
                 raise fail("unsupported-construct", "a place on an object is not supported", span,

@@ -16,12 +16,12 @@ from scenicq.errors import ScenarioError
 from scenicq.syntax import ast
 from scenicq.syntax.walk import walk
 
-__all__ = ["computed", "read"]
+__all__ = ["NoValue", "computed", "read"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Nothing:
-    """The value of an expression of which no outcome is left."""
+class NoValue:
+    """The value of a name that has none, which is an error once the name is read."""
 
     error: ScenarioError
 
@@ -44,7 +44,7 @@ def computed(run: Runner, node: ast.Expression, scope: Environment, compute: Cal
             # Scenic refuses `Uniform()` where it stands: it is given nothing, whatever a scene has
             if any(isinstance(each, ast.Call) and not each.arguments for each in walk(node)):
                 raise
-            value = _Nothing(error)
+            value = NoValue(error)
     run.excluded.keep(value, found)
     return value
 
@@ -55,7 +55,7 @@ def read(run: Runner, value: ModelValue) -> ModelValue:
     Raises:
         ScenarioError: map-lacks, where no outcome of it is left.
     """
-    if isinstance(value, _Nothing):
+    if isinstance(value, NoValue):
         raise value.error
     run.excluded.say(value)
     return value

@@ -15,7 +15,7 @@ CASES = {
     "ego = new Object at (1, 2), at (3, 4)\n": ("specifier-conflict", "at (3, 4)"),
     "ego = new Object left of (0, 0), facing toward (1, 1)\n": ("specifier-cycle", "facing toward (1, 1)"),
     "ego = new Object with pitch 3\n": ("unsupported-construct", "with pitch 3"),
-    "ego = new Object on (1, 2, 3)\n": ("unsupported-construct", "on (1, 2, 3)"),
+    "p = new Point on (1, 2, 3)\nego = new Object\n": ("unsupported-construct", "on (1, 2, 3)"),
     "ego = new Object using f()\n": ("unknown-name", "f"),
     "ego = new Object\nnew Object above ego by 1\n": ("unsupported-construct", "above ego by 1"),
     "ego = new Object\nrequire 1 > 2\n": ("impossible-requirement", "require 1 > 2"),

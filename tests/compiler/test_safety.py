@@ -38,7 +38,7 @@ def test_a_text_without_end_is_not_read(name: str) -> None:
         ("x = (1).real", "unknown-attribute"),
         ("x = str.mro", "unknown-attribute"),
         ("x = Object.ancestry", "unknown-attribute"),
-        ("import os", "unsupported-construct"),
+        ("import os\nx = os", "unsupported-construct"),
         ("x = str([1])", "wrong-arity"),
         ("x = {}.pop(Range(0, 1))", "runtime-error"),
     ],
