@@ -8,6 +8,7 @@ these for which they hold (`hidden_runs`).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
@@ -36,7 +37,7 @@ from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["IntervalMatcher", "IntervalVerdict"]
+__all__ = ["IntervalMatcher", "IntervalVerdict", "Reported"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,23 @@ class IntervalVerdict:
     cut_off: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """What became of the bindings of a block.
+
+    Attributes:
+        intervals: The intervals that match or may, by recording, then in order of time; of a binding without one how
+            far it came, if that is wanted.
+        bindings: How many bindings there are.
+        others: How many of them have no interval and are not told of, by what keeps each from matching and whether it
+            is cut off.
+    """
+
+    intervals: list[IntervalVerdict]
+    bindings: int = 0
+    others: Counter[tuple[Span | None, bool]] = field(default_factory=Counter["tuple[Span | None, bool]"])
+
+
 @dataclass(slots=True)
 class _Found:
     """Runs of a block side by side: labels, not samples."""
@@ -78,6 +96,16 @@ class _Found:
     broken: NDArray[np.object_]
     cut_off: NDArray[np.bool_]
     details: Mapping[tuple[int, int], Detail]
+
+    @staticmethod
+    def joined(parts: Sequence[_Found]) -> _Found:
+        """Some runs, then others."""
+        details = {number: each for part in parts for number, each in part.details.items()}
+        return _Found(
+            np.concatenate([part.starts for part in parts]), np.concatenate([part.ends for part in parts]),
+            np.concatenate([part.truth for part in parts]), np.concatenate([part.origins for part in parts]),
+            np.concatenate([part.broken for part in parts]), np.concatenate([part.cut_off for part in parts]), details,
+        )  # fmt: skip
 
     def renumbered(self, numbers: NDArray[np.int64]) -> _Found:
         """The same with other numbers of the starts."""
@@ -135,15 +163,13 @@ class IntervalMatcher:
             self._programs[outcome] = _Program(self.outcomes[outcome].scenario)
         return self._programs[outcome]
 
-    def intervals(self, table: StartTable, remember: Callable[[int], Remembered]) -> list[IntervalVerdict]:
+    def intervals(self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True) -> Reported:
         """What became of each binding: the intervals to report, or else the one that came furthest.
 
         Args:
             table: The starts.
             remember: The label of a start by its number, with who plays whom.
-
-        Returns:
-            By recording, then in order of time.
+            every: Whether bindings without an interval are told of, too.
         """
         order, bindings = _sorted(table)
         table = table.chosen(order)
@@ -157,9 +183,12 @@ class IntervalMatcher:
 
             for stretches in stretches_of(own, self.options.gap_s, apart=program.apart):
                 parts += (part.renumbered(which) for part in self._followed(program, stretches, own, remembered))
-        found = [each for part in self._reported(parts, table, bindings) for each in part]
-        found = [replace(each, origin=int(order[each.origin])) for each in found]
-        return sorted(found, key=lambda each: (each.recording, each.start, each.end, each.binding))
+        if not parts:
+            return Reported([])
+        found = self._reported(_Found.joined(parts), table, bindings, every=every)
+        told = [replace(each, origin=int(order[each.origin])) for each in found.intervals]
+        told.sort(key=lambda each: (each.recording, each.start, each.end, each.binding))
+        return replace(found, intervals=told)
 
     def _followed(
         self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], Remembered]
@@ -193,60 +222,54 @@ class IntervalMatcher:
 
         return _found(stretches, table, columns, HiddenFound(follow_runs(program.machine, stretches, atom)))
 
-    def _reported(
-        self, parts: Sequence[_Found], table: StartTable, bindings: NDArray[np.int64]
-    ) -> Iterator[list[IntervalVerdict]]:
-        """What is reported of each binding."""
-        if not parts:
-            return
-        starts, ends, truth, origins, cut_off = (
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("starts", "ends", "truth", "origins", "cut_off")
-        )
-        broken: list[Span | None] = []
-        for part in parts:
-            broken.extend(cast("list[Span | None]", part.broken.tolist()))
-        details = {number: each for part in parts for number, each in part.details.items()}
+    def _reported(self, found: _Found, table: StartTable, bindings: NDArray[np.int64], *, every: bool) -> Reported:
+        """What is reported of the runs of all bindings; see `intervals`."""
+        starts, ends, truth = found.starts, found.ends, found.truth
         times = table.block.times_us
         lasting = (times[ends] - times[starts]) / 1e6
         least = self.options.min_duration_s or 0.0
-        order = np.lexsort((starts, bindings[origins]))
-        groups = bindings[origins][order]
-        for group in np.split(order, np.flatnonzero(np.diff(groups)) + 1):
+        own = bindings[found.origins]
+        count = len(np.unique(own))
+        fit = (truth > FALSE) & (lasting >= least - 1e-6)
+        # of most bindings no interval or one is in question
+        many = np.bincount(own[fit], minlength=int(own.max()) + 1)
+        alone = np.flatnonzero(fit & (many[own] == 1))
+        several = np.flatnonzero(fit & (many[own] > 1))
+        several = several[np.lexsort((starts[several], own[several]))]
+        kept = [alone]
+        for group in np.split(several, np.flatnonzero(np.diff(own[several])) + 1) if len(several) else ():
             mine = group if len(self.outcomes) == 1 else _surest(group, starts, ends, truth)
-            kept = mine[chosen(starts[mine], ends[mine], truth[mine], lasting[mine], self.options.intervals, least)]
-            matches = len(kept) > 0
-            if not matches:
-                # what was cut off might have matched; else what was matched but is too short, else what came furthest
-                hopeful = cut_off[mine] & np.array([broken[each] is None for each in mine.tolist()], dtype=np.bool_)
-                rank = np.lexsort((-starts[mine], ends[mine] - starts[mine], truth[mine], hopeful))
-                kept = mine[rank[-1:]]
-            numbers: list[int] = kept.tolist()
-            verdicts: list[int] = truth[kept].tolist() if matches else [int(FALSE)]
-            yield [
-                self._interval(
-                    table, int(origins[each]), (int(starts[each]), int(ends[each])), verdict,
-                    details.get((int(origins[each]), int(ends[each])), ("", {})), broken[each],
-                    cut_off=bool(cut_off[each]),
-                )
-                for each, verdict in zip(numbers, verdicts, strict=True)
-            ]  # fmt: skip
+            kept.append(
+                mine[chosen(starts[mine], ends[mine], truth[mine], lasting[mine], self.options.intervals, least)]
+            )
+        told = [self._interval(found, table, each) for each in cast("list[int]", np.concatenate(kept).tolist())]
+        # what was cut off might have matched; else what was matched but is too short, else what came furthest
+        open_ = np.flatnonzero(many[own] == 0)
+        broken = cast("list[Span | None]", found.broken[open_].tolist())
+        hopeful = found.cut_off[open_] & np.array([each is None for each in broken], dtype=np.bool_)
+        order = np.lexsort((-open_, -starts[open_], (ends - starts)[open_], truth[open_], hopeful, own[open_]))
+        best = open_[order[np.append(np.diff(own[open_[order]]) != 0, True)]] if len(open_) else open_
+        if every:
+            told += [self._interval(found, table, each, no_match=True) for each in cast("list[int]", best.tolist())]
+            return Reported(told, count)
+        spans = cast("list[Span | None]", found.broken[best].tolist())
+        others = Counter(zip(spans, cast("list[bool]", found.cut_off[best].tolist()), strict=True))
+        return Reported(told, count, others)
 
-    def _interval(
-        self, table: StartTable, origin: int, span: tuple[int, int], truth: int,
-        detail: Detail, broken: Span | None, *, cut_off: bool,
-    ) -> IntervalVerdict:  # fmt: skip
-        block = table.block
-        recording = int(block.recording_of[span[0]])
+    def _interval(self, found: _Found, table: StartTable, number: int, *, no_match: bool = False) -> IntervalVerdict:
+        block, origin = table.block, int(found.origins[number])
+        start, end = int(found.starts[number]), int(found.ends[number])
+        truth = int(FALSE if no_match else found.truth[number])
+        recording = int(block.recording_of[start])
         first, _ = block.runs[recording]
         binding = tuple((index, block.key(int(members[origin]))) for index, members in sorted(table.members.items()))
-        reason, witness = detail
+        reason, witness = found.details.get((origin, end), ("", {}))
         made = self.outcomes[int(table.outcomes[origin])].witness
         if truth == UNKNOWN and table.sure[origin]:
             reason = reason or "unobserved"
         return IntervalVerdict(
-            span[0] - first, span[1] - first, truth, binding, recording, origin,
-            {**made, **witness} if truth == TRUE else {}, reason, broken, cut_off,
+            start - first, end - first, truth, binding, recording, origin,
+            {**made, **witness} if truth == TRUE else {}, reason, found.broken[number], bool(found.cut_off[number]),
         )  # fmt: skip
 
 

@@ -314,7 +314,7 @@ class StartSearch:
         columns = Columns(size, lambda index, name: _column(places, index, name))
         lookups = MapLookups()
         for form in forms:
-            if form.index >= 0:
+            if form.index >= 0 and (form.field is not None or form.regions):
                 x, y = places.observed(form.index, "position") or ((), ())
                 xy = list(zip(np.asarray(x).tolist(), np.asarray(y).tolist(), strict=True))
                 lookups.look_up(() if form.field is None else (form.field,), form.regions, xy)

@@ -98,6 +98,7 @@ class Decider:
         threads: Of the database.
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
+        proofs: Whether somebody reads the values that prove matches over time.
         time: Options of a query over time.
         until: When the time is over; see `check_deadline`.
     """
@@ -109,6 +110,7 @@ class Decider:
     threads: int | None
     all_matches: bool
     every: bool
+    proofs: bool = True
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
     _compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
@@ -183,7 +185,7 @@ class Decider:
         from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
         intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver)
-        recordings = RecordingMatcher(self.dataset, self._matcher(compiled), intervals)
+        recordings = RecordingMatcher(self.dataset, self._matcher(compiled), intervals, self.every, self.proofs)
         connection, plan = self.connection, compiled.plan
         rows: CandidateRows | None = None
         if not plan.stages:

@@ -96,6 +96,7 @@ def merge_intervals(
         funnel.candidates += int((block.missed < 0).sum())
         funnel.excluded.update(block.recordings.failed)
         funnel.over_time.update(block.recordings.counts)
+        funnel.broken.update(block.recordings.broken)
         for result in block.recordings.results:
             funnel.count_interval(result.verdict)
             if every or isinstance(result.verdict, Match | Unknown):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.errors import Span
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
@@ -41,11 +42,13 @@ class DecidedRecordings:
         results: One for each interval, in order; of a binding without one, how far it came.
         counts: See `Funnel.over_time`.
         failed: What frames failed at that are not excluded by the prefilter, and are no starts.
+        broken: What bindings without an interval failed at that are not among the results.
     """
 
     results: list[Result] = field(default_factory=list[Result])
     counts: Counter[str] = field(default_factory=Counter[str])
     failed: Counter[str] = field(default_factory=Counter[str])
+    broken: Counter[str] = field(default_factory=Counter[str])
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,11 +128,15 @@ class RecordingMatcher:
         dataset: The dataset.
         matcher: For the initial scene.
         intervals: For what follows.
+        every: Whether bindings without an interval are results, too.
+        proofs: Whether somebody reads the values that prove matches.
     """
 
     dataset: Dataset
     matcher: Matcher
     intervals: IntervalMatcher
+    every: bool = True
+    proofs: bool = True
 
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
@@ -166,9 +173,13 @@ class RecordingMatcher:
                 members = {index: int(mine[number]) for index, mine in table.members.items()}
                 return label_of(self.matcher.scenario, block, members, rows.map, self._relevant)
 
-            intervals = self.intervals.intervals(table, remember)
-            found.counts["bindings"] += len({(each.recording, each.binding) for each in intervals})
+            reported = self.intervals.intervals(table, remember, every=self.every)
+            intervals = reported.intervals
+            found.counts["bindings"] += reported.bindings
             found.counts["cut off"] += sum(each.cut_off and each.broken is None for each in intervals)
+            for (broken, cut_off), count in reported.others.items():
+                found.broken[_what(broken, cut_off=cut_off)] += count
+                found.counts["cut off"] += count if cut_off and broken is None else 0
             results = [
                 (int(block.recording_of[at]), _undecided(block, at, verdict)) for at, verdict in undecided.items()
             ]
@@ -275,7 +286,7 @@ class RecordingMatcher:
         remember: Callable[[int], Remembered],
     ) -> Iterator[tuple[int, Result]]:  # fmt: skip
         """Intervals as results, with the recordings that they are of."""
-        witnesses = self._witnesses(intervals, starts, remember)
+        witnesses = self._witnesses(intervals if self.proofs else (), starts, remember)
         for each in intervals:
             start = starts.decided.get(each.origin)
             reason = start.verdict.reason if start is not None and isinstance(start.verdict, Unknown) else ""
@@ -335,14 +346,21 @@ def _named(track: TrackKey) -> str:
     return "ego" if kind == "ego" else name.rpartition("\n")[2]
 
 
+def _what(broken: Span | None, *, cut_off: bool) -> str:
+    """What keeps a binding from matching, in a word."""
+    if broken is None:
+        return CUT_OFF if cut_off else "--min-duration"
+    return " ".join(broken.text.split())
+
+
 def _cause(seconds: float, interval: IntervalVerdict) -> Cause:
     """Why an interval that ends after some seconds of its recording does not match."""
-    if interval.cut_off and interval.broken is None:
-        return Cause(CUT_OFF, f"at {seconds:.1f} s, before the program ends")
-    if interval.broken is None:
-        return Cause("--min-duration", f"matches only up to {seconds:.1f} s")
-    what = " ".join(interval.broken.text.split())
-    return Cause(what, f"does not hold on what ends at {seconds:.1f} s", interval.broken)
+    what = _what(interval.broken, cut_off=interval.cut_off)
+    if interval.broken is not None:
+        return Cause(what, f"does not hold on what ends at {seconds:.1f} s", interval.broken)
+    if interval.cut_off:
+        return Cause(what, f"at {seconds:.1f} s, before the program ends")
+    return Cause(what, f"matches only up to {seconds:.1f} s")
 
 
 def _undecided(block: TrackBlock, at: int, verdict: Unknown) -> Result:

@@ -317,6 +317,7 @@ class Query:
             threads=threads,
             all_matches=options.all_matches,
             every=options.every,
+            proofs=options.proofs,
             time=options.time,
             until=options.until,
         )

@@ -246,7 +246,9 @@ def _intervals(
 ) -> list[IntervalVerdict]:
     table = start_table(scenario, block, {}, [start for start, _ in starts])
     table = replace(table, outcomes=np.array([outcome for _, outcome in starts], dtype=np.int64))
-    return matcher.intervals(table, lambda number: (starts[number][0].label, starts[number][0].correspondence))
+    return matcher.intervals(
+        table, lambda number: (starts[number][0].label, starts[number][0].correspondence)
+    ).intervals
 
 
 def _is_after(block: TrackBlock, start: _Start, samples: Mapping[tuple[tuple[int, TrackKey], ...], int]) -> bool:
