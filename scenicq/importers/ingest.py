@@ -20,9 +20,9 @@ from scenicq.importers.folders import readable
 from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
-from scenicq.importers.segments import Job, World, fingerprint, maps_digest, write_segments
+from scenicq.importers.segments import Job, RecordingTask, SegmentPlace, World, fingerprint, maps_digest, write_segments
 from scenicq.store.manifest import LeftOut, Manifest, is_dataset
-from scenicq.store.segment import SEGMENT_OBJECTS, Segment, read_segments, segments_of
+from scenicq.store.segment import SEGMENT_OBJECTS, is_whole, read_segments, segments_of
 from scenicq.store.writer import DatasetWriter
 
 __all__ = ["IngestSummary", "Progress", "ingest"]
@@ -96,7 +96,8 @@ def ingest(
         strict: Whether the first problem of the source is an error.
         force: Whether a dataset that is there already may be replaced, and everything is to be done anew.
         update: Whether a dataset that is there already is brought up to date: recordings that are new or have changed
-            are read, those that the source no longer has go. The result is that of an ingest of the whole source.
+            are read, those that the source no longer has go. The result is that of an ingest of the whole source,
+            but that messages about what is not read again name lines as they were.
         jobs: Number of processes, None for as many as pays; the result does not depend on it.
         progress: Called after each recording; what it raises ends the ingest.
         segment_objects: About how many label objects a part of the tables has at most.
@@ -128,7 +129,8 @@ def ingest(
         known = _known(writer, target_path if update and not force else None)
         reused = _write_all(opened, writer, groups, known, strict=strict, jobs=jobs, reached=reached)
         for segment in writer.segments:
-            report.merge(segment.counts, segment.told)
+            for piece in segment.pieces.values():
+                report.merge(piece.counts, piece.told)
         if not any(segment.recordings for segment in writer.segments):
             raise DataError([Diagnostic("dataset-empty", f"{source_path} holds no frame"), *report.diagnostics])
         provenance = _provenance(source_path, opened, replace(options, maps=given), class_map, strict)
@@ -176,29 +178,41 @@ def _scratch(writer: DatasetWriter) -> Path:
     return folder
 
 
-_Known = Mapping[tuple[str, int | None], tuple[Segment, tuple[Path, int]]]
-"""Segments that need not be written again, with the dataset and number where their files are.
+@dataclass(frozen=True, slots=True)
+class _EarlierWork:
+    """What need not be made again.
 
-The key is the fingerprint, and the number that the segment must have; None for any.
-"""
+    Attributes:
+        segments: Segments by their fingerprint, and the number that the segment must have; None for any.
+        pieces: Recordings by their fingerprint.
+    """
+
+    segments: Mapping[tuple[str, int | None], SegmentPlace]
+    pieces: Mapping[str, SegmentPlace]
 
 
-def _known(writer: DatasetWriter, target: Path | None) -> _Known:
-    """Those that a killed ingest left, at their places, and those of the dataset that is brought up to date."""
+def _known(writer: DatasetWriter, target: Path | None) -> _EarlierWork:
+    """What a killed ingest left, at its places, and what the dataset has that is brought up to date."""
     old = {} if target is None or not is_dataset(target) else read_segments(target)
-    found: dict[tuple[str, int | None], tuple[Segment, tuple[Path, int]]] = {}
+    segments: dict[tuple[str, int | None], SegmentPlace] = {}
     for number, segment in old.items():
-        found[segment.fingerprint, None] = segment, (target or writer.folder, number)
+        segments[segment.fingerprint, None] = SegmentPlace(target or writer.folder, number, segment)
     for number, segment in writer.left.items():
-        found[segment.fingerprint, number] = segment, (writer.folder, number)
-    return found
+        segments[segment.fingerprint, number] = SegmentPlace(writer.folder, number, segment)
+    pieces = {
+        piece.fingerprint: place
+        for place in segments.values()
+        for name, piece in place.segment.pieces.items()
+        if piece.fingerprint and (name in place.segment.rows) == (name in place.segment.recordings)
+    }
+    return _EarlierWork(segments, pieces)
 
 
 def _write_all(
     opened: OpenedSource,
     writer: DatasetWriter,
     groups: Sequence[Sequence[Entry]],
-    known: _Known,
+    known: _EarlierWork,
     *,
     strict: bool,
     jobs: int | None,
@@ -207,21 +221,33 @@ def _write_all(
     """Write or take over every segment; the result is the number of recordings that were taken over."""
     context = (opened.context, maps_digest(opened.maps), str(strict))
     world = World(writer.folder, opened.maps, strict)
-    reused = 0
+    whole: dict[tuple[Path, int], bool] = {}
+    reused: dict[int, int] = {}
     todo = {number: frozenset[tuple[str, str]]() for number in range(len(groups))}
     everything = dict(todo)
     while todo:
         waiting: list[Job] = []
-        moves: list[tuple[int, Segment, tuple[Path, int]]] = []
+        moves: list[tuple[int, SegmentPlace]] = []
         for number, taken in todo.items():
+            reused[number] = 0
             mark = fingerprint(context, groups[number], taken)
-            found = known.get((mark, number)) or known.get((mark, None))
+            found = known.segments.get((mark, number)) or known.segments.get((mark, None))
             if found is not None:
-                moves.append((number, *found))
-            else:
-                names = [entry.name for entry in groups[number]]
-                waiting.append(Job(number, opened.reader(names), mark, names[0], taken))
-        reused += _take_over(writer, moves, reached)
+                moves.append((number, found))
+                continue
+            shares: list[RecordingTask] = []
+            for entry in groups[number]:
+                own = fingerprint(context, [entry], frozenset(each for each in taken if each[0] == entry.name))
+                old = known.pieces.get(own)
+                if old is not None:
+                    if (old.folder, old.number) not in whole:
+                        whole[old.folder, old.number] = is_whole(old.segment, old.folder, old.number)
+                    old = old if whole[old.folder, old.number] else None
+                reused[number] += old is not None and entry.name in old.segment.recordings
+                shares.append(RecordingTask(entry.name, own, opened.reader([entry.name]), old))
+            waiting.append(Job(number, tuple(shares), mark, taken))
+        for number, old in moves:
+            reused[number] = _take_over(writer, number, old, reached)
         try:
             written = write_segments(world, waiting, jobs, reached)
             for job, segment in zip(waiting, written, strict=True):
@@ -231,17 +257,16 @@ def _write_all(
         todo = {}
         for number, recording, frame in writer.repeated_frames():
             todo[number] = everything[number] = everything[number] | {(recording, frame)}
-    return reused
+    return sum(reused.values())
 
 
-def _take_over(writer: DatasetWriter, moves: Sequence[tuple[int, Segment, tuple[Path, int]]], reached: _Reached) -> int:
-    reused = 0
-    for number, segment, place in moves:
-        writer.adopt(number, segment, None if place == (writer.folder, number) else place)
-        reused += len(segment.recordings)
-        for name, counts in segment.recordings.items():
-            reached(name, counts.frames)
-    return reused
+def _take_over(writer: DatasetWriter, number: int, old: SegmentPlace, reached: _Reached) -> int:
+    """Take over a whole segment; the result is the number of its recordings."""
+    at_place = (old.folder, old.number) == (writer.folder, number)
+    writer.adopt(number, old.segment, None if at_place else (old.folder, old.number))
+    for name, counts in old.segment.recordings.items():
+        reached(name, counts.frames)
+    return len(old.segment.recordings)
 
 
 def _summary(

@@ -12,9 +12,10 @@ from scenicq.importers.folders import readable
 from scenicq.store.manifest import LeftOut
 from scenicq.store.segment import SourceProblem
 
-__all__ = ["Report"]
+__all__ = ["MOST_TOLD", "Report"]
 
-_TOLD = 20
+MOST_TOLD = 20
+"""Messages of a kind that are kept."""
 _MOST_ELEMENTS, _LONGEST_ELEMENT = 200, 200
 """Kinds of elements that are counted apart, and characters of what they are called: a source may make up any number."""
 _LONG = re.compile(r"`([^`]{80})[^`]{20,}`")
@@ -100,7 +101,7 @@ class Report:
         """Take in the `tally` and the `told` of another report, as if its problems had been reported here."""
         before = {key for key in self._counts if key[0] and key[3]}
         for problem in told:
-            if _key(problem) not in before and self._told_of[problem.what, problem.code] < _TOLD:
+            if _key(problem) not in before and self._told_of[problem.what, problem.code] < MOST_TOLD:
                 self._told.append(problem)
                 self._told_of[problem.what, problem.code] += 1
         for what, code, name, kept, count in counts:
@@ -132,7 +133,7 @@ class Report:
         more = [
             Diagnostic(code, f"{total} {what}s like this in all", severity="warning")
             for (what, code), told in sorted(self._told_of.items())
-            if told >= _TOLD and (total := self._total(what, code)) > _TOLD
+            if told >= MOST_TOLD and (total := self._total(what, code)) > MOST_TOLD
         ]
         return (*(Diagnostic(p.code, p.message, hints=p.hints, severity="warning") for p in self._told), *more)
 
@@ -149,7 +150,7 @@ class Report:
         if known:
             return
         kind = problem.what, problem.code
-        if self._told_of[kind] < _TOLD:
+        if self._told_of[kind] < MOST_TOLD:
             self._told_of[kind] += 1
             self._told.append(problem)
 

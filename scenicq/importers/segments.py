@@ -7,8 +7,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
+from operator import add
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,17 +22,21 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
 from scenicq.importers.base import Entry, Labels, Reader
 from scenicq.importers.recording_checks import tell_recording
-from scenicq.importers.report import Report
+from scenicq.importers.report import MOST_TOLD, Report
 from scenicq.processes import Lost, Workers, as_many_as_pay
 from scenicq.store.columns import columns_of
 from scenicq.store.labels import Recording
-from scenicq.store.schema import SCHEMA_VERSION
-from scenicq.store.segment import MapIndexes, Segment, SegmentWriter
+from scenicq.store.part_rows import PartRows
+from scenicq.store.schema import SCHEMA_VERSION, SEGMENT_TABLES, ArrowTable
+from scenicq.store.segment import MapIndexes, Segment, SegmentWriter, SourceRecording
 
 if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature
 
-__all__ = ["Job", "World", "fingerprint", "maps_digest", "write_segments"]
+__all__ = ["Job", "RecordingTask", "SegmentPlace", "World", "fingerprint", "maps_digest", "write_segments"]
+
+_MOST_MESSAGES = 10_000
+"""Messages of the recordings of a segment that are kept for later ingests; what has more is read anew then."""
 
 OnRecording = Callable[[str, int], None]
 """Called with a recording and its number of frames when it is written."""
@@ -52,26 +60,56 @@ class World:
 
 
 @dataclass(frozen=True, slots=True)
+class SegmentPlace:
+    """Where a segment lies that there is already.
+
+    Attributes:
+        folder: Of its dataset.
+        number: Of the segment there.
+        segment: What it holds.
+    """
+
+    folder: Path
+    number: int
+    segment: Segment = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingTask:
+    """One recording of a segment to be written.
+
+    Attributes:
+        name: Of the recording.
+        fingerprint: Of all that it depends on.
+        reader: Of the recording alone.
+        old: A segment that has it already.
+    """
+
+    name: str
+    fingerprint: str
+    reader: Reader = field(repr=False)
+    old: SegmentPlace | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Job:
     """One segment to be written.
 
     Attributes:
         number: Of the segment.
-        reader: Of its recordings.
+        shares: Its recordings, in order.
         fingerprint: Of all that it depends on.
-        first: Its first recording.
         taken: Recording and frame of labels that are left out, because earlier recordings use the same name.
     """
 
     number: int
-    reader: Reader = field(repr=False)
+    shares: tuple[RecordingTask, ...]
     fingerprint: str
-    first: str = ""
     taken: frozenset[tuple[str, str]] = frozenset()
 
 
 def fingerprint(context: Sequence[str], entries: Sequence[Entry], taken: frozenset[tuple[str, str]]) -> str:
-    """What changes with everything that a segment depends on.
+    """What changes with everything that a segment, or a recording of it, depends on.
 
     Args:
         context: What all segments of an ingest depend on.
@@ -141,7 +179,7 @@ def _write_apart(world: World, jobs: Sequence[Job], many: int, on_recording: OnR
         for job, segment in workers.run(jobs, told):
             if isinstance(segment, Lost):
                 message = (
-                    f"{segment.tries} processes that wrote the recordings from `{job.first}` on were killed, "
+                    f"{segment.tries} processes that wrote the recordings from `{job.shares[0].name}` on were killed, "
                     "perhaps for want of memory"
                 )
                 raise DataError(Diagnostic("budget-exceeded", message, hints=("use fewer `--jobs`",)))
@@ -149,19 +187,76 @@ def _write_apart(world: World, jobs: Sequence[Job], many: int, on_recording: OnR
 
 
 def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecording) -> Segment:
-    report = Report(strict=world.strict)
     writer = SegmentWriter(world.folder, job.number)
+    pieces: dict[str, SourceRecording] = {}
+    messages: Counter[tuple[str, str]] = Counter()
     try:
-        with without_collector():
+        with without_collector(), closing(_OldRows()) as old:
             writer.open()
-            for found in job.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
-                columns = columns_of(found) if isinstance(found, Recording) else found
-                tell_recording(columns, report)
-                writer.add(columns, indexes.of(columns.map))
-                on_recording(columns.name, len(columns.frames))
-            return writer.finish(job.fingerprint, report.tally, report.told)
+            for share in job.shares:
+                if share.old is not None:
+                    piece = _copy(share, share.old, old, writer, on_recording)
+                else:
+                    piece = _read(world, job, share, writer, indexes, on_recording)
+                if messages.total() > _MOST_MESSAGES:
+                    few = tuple(each for each in piece.told if messages[each.what, each.code] < MOST_TOLD)
+                    piece = replace(piece, fingerprint="", told=few)
+                messages.update((each.what, each.code) for each in piece.told)
+                pieces[share.name] = piece
+            return writer.finish(job.fingerprint, pieces)
     finally:
         writer.abandon()
+
+
+def _read(
+    world: World, job: Job, share: RecordingTask, writer: SegmentWriter, indexes: MapIndexes, on_recording: OnRecording
+) -> SourceRecording:
+    """Read a recording from the source."""
+    report = Report(strict=world.strict)
+    for found in share.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
+        columns = columns_of(found) if isinstance(found, Recording) else found
+        tell_recording(columns, report)
+        writer.add(columns, indexes.of(columns.map))
+        on_recording(columns.name, len(columns.frames))
+    return SourceRecording(share.fingerprint, report.tally, report.told)
+
+
+def _copy(
+    share: RecordingTask, place: SegmentPlace, old: _OldRows, writer: SegmentWriter, on_recording: OnRecording
+) -> SourceRecording:
+    """Take a recording from a segment that has it."""
+    segment = place.segment
+    if share.name in segment.recordings:
+        writer.copy(share.name, old.of(place, share.name))
+        on_recording(share.name, segment.recordings[share.name].frames)
+    return segment.pieces[share.name]
+
+
+class _OldRows:
+    """Rows of segments that there are already, each read once and forwards; to be closed."""
+
+    def __init__(self) -> None:
+        self._open: dict[tuple[Path, int], dict[str, PartRows]] = {}
+        self._first: dict[tuple[Path, int], dict[str, list[int]]] = {}
+        self._files = ExitStack()
+
+    def of(self, place: SegmentPlace, name: str) -> dict[str, ArrowTable]:
+        """The rows of a recording in each table; recordings of a segment come in order."""
+        key, rows = (place.folder, place.number), place.segment.rows
+        if key not in self._open:
+            files = {table: place.segment.part(table, place.number).path for table in SEGMENT_TABLES}
+            tables = {table: PartRows(table, place.folder / path, path) for table, path in files.items()}
+            self._open[key] = {table: self._files.enter_context(closing(each)) for table, each in tables.items()}
+            firsts = accumulate(
+                rows.values(), lambda first, counts: [*map(add, first, counts)], initial=[0] * len(tables)
+            )
+            self._first[key] = dict(zip(rows, map(list, firsts), strict=False))
+        taken = zip(self._open[key].items(), self._first[key][name], rows[name], strict=True)
+        return {table: there.take(first, count) for (table, there), first, count in taken}
+
+    def close(self) -> None:
+        """Close all files."""
+        self._files.close()
 
 
 def _start_worker(world: World) -> Callable[[Job, OnTold], Segment]:

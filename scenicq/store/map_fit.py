@@ -293,12 +293,12 @@ def _cause(fit: MapFit, lanes: _Lanes, vehicles: Vehicles) -> tuple[str, str]:
     off = fit.on_lanes is not None and fit.on_lanes < least
     if not off and (fit.deviation or 0.0) <= _DEVIATION and (fit.against or 0.0) <= _MOST_AGAINST:
         return "", ""
-    best, found = (0.0, -math.inf), ""
+    best, found = (0.0, -math.inf), ""  # of those that are as good, the first: headings are wrong more often
     for cause, (change, _) in _CANDIDATES.items():
         share, deviation, against = lanes.measure(change(vehicles))
         if share < least or (deviation or 0.0) > _DEVIATION / 2 or (against or 0.0) > _MOST_AGAINST:
             continue
-        if (score := (round(share, 2), -(deviation or 0.0))) > best:
+        if (score := (round(share, 2), -round(deviation or 0.0, 1))) > best:
             best, found = score, cause
     if found:
         return found, _CANDIDATES[found][1]

@@ -76,7 +76,7 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
                         part.add(columns, indexes.of(columns.map))
                         if progress is not None:
                             progress(len(columns.frames))
-                    writer.adopt(number, part.finish(old.fingerprint, old.counts, old.told))
+                    writer.adopt(number, part.finish(old.fingerprint, old.pieces))
                 finally:
                     part.abandon()
         except OSError as error:

@@ -5,6 +5,10 @@ is written last, so a segment is there completely or not at all. Segments depend
 maps; therefore processes write them side by side, and an interrupted or repeated ingest takes them over as they are.
 """
 
+# pyarrow has no type stubs.
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 import hashlib
@@ -18,12 +22,15 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.manifest import SEGMENTS, Counts, Part
 from scenicq.store.parquet import TableWriter, part_path
 from scenicq.store.rows import recording_rows
-from scenicq.store.schema import SEGMENT_TABLES
+from scenicq.store.schema import SEGMENT_TABLES, ArrowTable
 
 if TYPE_CHECKING:  # slow to load, and not every source has maps
     from scenicq.geometry.features import MapFeature
@@ -35,6 +42,8 @@ __all__ = [
     "Segment",
     "SegmentWriter",
     "SourceProblem",
+    "SourceRecording",
+    "is_whole",
     "read_segments",
     "segments_of",
     "take_over",
@@ -62,6 +71,21 @@ class SourceProblem:
 
 
 @dataclass(frozen=True, slots=True)
+class SourceRecording:
+    """What one recording of the source became.
+
+    Attributes:
+        fingerprint: Changes with everything that the recording was made from; "" where nobody asks.
+        counts: How often each problem occurred: what, code, name, kept, count.
+        told: The first problems of each kind.
+    """
+
+    fingerprint: str
+    counts: Sequence[tuple[str, str, str, bool, int]] = ()
+    told: Sequence[SourceProblem] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Segment:
     """What one segment holds.
 
@@ -69,12 +93,12 @@ class Segment:
         fingerprint: Changes with everything that the segment was made from; "" where nobody asks.
         files: Size, checksum and rows of its file in each table; the paths are those of its number.
         recordings: Frames and label objects of each recording, in order.
+        rows: Rows of each recording in each of `SEGMENT_TABLES`, in order.
         by_map: Frames and label objects of each map.
         by_class, by_source_class: Label objects of each class.
         tracks: Distinct tracks, counted within each recording.
         span_us: First and last timestamp; None without frames.
-        counts: How often each problem occurred: what, code, name, kept, count.
-        told: The first problems of each kind.
+        pieces: What each recording of the source became, in order, those of which nothing came, too.
     """
 
     fingerprint: str
@@ -85,8 +109,8 @@ class Segment:
     by_source_class: Mapping[str, int]
     tracks: int
     span_us: tuple[int, int] | None
-    counts: Sequence[tuple[str, str, str, bool, int]] = ()
-    told: Sequence[SourceProblem] = ()
+    rows: Mapping[str, Sequence[int]] = field(default_factory=dict[str, Sequence[int]])
+    pieces: Mapping[str, SourceRecording] = field(default_factory=dict[str, SourceRecording])
 
     @property
     def objects(self) -> int:
@@ -155,6 +179,7 @@ class SegmentWriter:
     _by_map: dict[str, Counts] = field(default_factory=dict[str, Counts])
     _by_class: Counter[str] = field(default_factory=Counter[str])
     _by_source_class: Counter[str] = field(default_factory=Counter[str])
+    _rows: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
     _tracks: int = 0
     _times: list[int] = field(default_factory=list[int])
 
@@ -177,30 +202,56 @@ class SegmentWriter:
         """
         tables = self._tables
         first = {"first_object": tables["objects"].rows, "first_sensor": tables["sensors"].rows}
-        for table, rows in recording_rows(columns, index, **first).items():
-            tables[table].add(rows)
-        counts = Counts(len(columns.frames), len(columns.objects.x))
-        self._recordings[columns.name] = counts
-        before = self._by_map.get(columns.map, Counts())
-        self._by_map[columns.map] = Counts(before.frames + counts.frames, before.objects + counts.objects)
-        self._by_class.update(columns.objects.category)
-        self._by_source_class.update(columns.objects.source_class)
-        self._tracks += len({*columns.objects.track} - {None})
-        times = [*self._times, *columns.times_us]
-        self._times = [min(times), max(times)] if times else []
+        self._append(columns.name, recording_rows(columns, index, **first))
+
+    def copy(self, name: str, rows: Mapping[str, ArrowTable]) -> None:
+        """Append a recording that another segment has.
+
+        Args:
+            name: Of the recording; they come in order of their names.
+            rows: Its rows in each of `SEGMENT_TABLES`.
+
+        Raises:
+            OSError: The folder cannot be written.
+        """
+        labels = rows["labels"]
+        for column, table in (("first_object", "objects"), ("first_sensor", "sensors")):
+            place = labels.schema.get_field_index(column)
+            moved = pc.add(
+                pc.subtract(labels[column], labels[column][0]), pa.scalar(self._tables[table].rows, pa.int32())
+            )
+            labels = labels.set_column(place, labels.schema.field(place), moved)
+        self._append(name, {**rows, "labels": labels})
+
+    def _append(self, name: str, rows: Mapping[str, ArrowTable]) -> None:
+        for table in SEGMENT_TABLES:
+            self._tables[table].add(rows[table])
+        labels, objects = rows["labels"], rows["objects"]
+        counts = Counts(len(labels), len(objects))
+        self._recordings[name] = counts
+        self._rows[name] = [len(rows[table]) for table in SEGMENT_TABLES]
+        map_name = labels["map"][0].as_py() if len(labels) else ""
+        before = self._by_map.get(map_name, Counts())
+        self._by_map[map_name] = Counts(before.frames + counts.frames, before.objects + counts.objects)
+        for column, found in (("class", self._by_class), ("source_class", self._by_source_class)):
+            for each in objects[column].value_counts().to_pylist():
+                found[each["values"]] += each["counts"]
+        self._tracks += pc.count_distinct(objects["track"], mode="only_valid").as_py()
+        times = pc.min_max(labels["timestamp_us"]).as_py()
+        ends = [*self._times, *(time for time in times.values() if time is not None)]
+        self._times = [min(ends), max(ends)] if ends else []
 
     @property
     def objects(self) -> int:
         """Label objects so far."""
         return self._tables["objects"].rows if self._tables else 0
 
-    def finish(
-        self,
-        fingerprint: str = "",
-        counts: Sequence[tuple[str, str, str, bool, int]] = (),
-        told: Sequence[SourceProblem] = (),
-    ) -> Segment:
+    def finish(self, fingerprint: str = "", pieces: Mapping[str, SourceRecording] | None = None) -> Segment:
         """Complete the files, then say so.
+
+        Args:
+            fingerprint: Of the segment.
+            pieces: As in `Segment`.
 
         Raises:
             OSError: The folder cannot be written.
@@ -214,8 +265,8 @@ class SegmentWriter:
             by_source_class=dict(sorted(self._by_source_class.items())),
             tracks=self._tracks,
             span_us=(self._times[0], self._times[1]) if self._times else None,
-            counts=tuple(counts),
-            told=tuple(told),
+            rows=self._rows,
+            pieces=dict(pieces or {}),
         )
         self._tables.clear()
         (self.folder / SEGMENTS).mkdir(exist_ok=True)
@@ -243,6 +294,25 @@ def read_segments(folder: Path) -> dict[int, Segment]:
         except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):
             continue
     return found
+
+
+def is_whole(segment: Segment, folder: Path, number: int) -> bool:
+    """Whether the files of a segment are as they were written, by their checksums.
+
+    Args:
+        segment: The segment.
+        folder: Of the dataset.
+        number: Of the segment there.
+    """
+    for table in SEGMENT_TABLES:
+        part = segment.part(table, number)
+        try:
+            with (folder / part.path).open("rb") as file:
+                if hashlib.file_digest(file, "sha256").hexdigest() != part.sha256:
+                    return False
+        except OSError:
+            return False
+    return True
 
 
 def take_over(segment: Segment, source: Path, number: int, target: Path, new_number: int) -> None:
@@ -278,6 +348,8 @@ def _to_json(segment: Segment) -> str:
 
 def _from_json(fields: dict[str, Any]) -> Segment:
     span = fields["span_us"]
+    # older segments have one piece for all of their recordings
+    pieces = fields.get("pieces", {"": {**fields, "fingerprint": ""}})
     return Segment(
         fingerprint=fields["fingerprint"],
         files={name: Part("", *fields["files"][name]) for name in SEGMENT_TABLES},
@@ -287,9 +359,14 @@ def _from_json(fields: dict[str, Any]) -> Segment:
         by_source_class=fields["by_source_class"],
         tracks=fields["tracks"],
         span_us=None if span is None else (span[0], span[1]),
-        counts=tuple((what, code, name, kept, count) for what, code, name, kept, count in fields["counts"]),
-        told=tuple(_problem(entry) for entry in fields["told"]),
+        rows={name: [int(count) for count in rows] for name, rows in fields.get("rows", {}).items()},
+        pieces={name: _piece(entry) for name, entry in pieces.items()},
     )
+
+
+def _piece(fields: dict[str, Any]) -> SourceRecording:
+    counts = tuple((what, code, name, kept, count) for what, code, name, kept, count in fields["counts"])
+    return SourceRecording(fields["fingerprint"], counts, tuple(_problem(entry) for entry in fields["told"]))
 
 
 def _problem(fields: dict[str, Any]) -> SourceProblem:

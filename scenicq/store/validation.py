@@ -26,7 +26,7 @@ from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
 from scenicq.store.value_rules import TEXT_KEYS, is_json, longest_text, plain_object_problem, unsound_reals
 
-__all__ = ["check_table", "invalid", "read_sound"]
+__all__ = ["check_columns", "check_table", "decoding", "invalid", "read_sound"]
 
 _MOST_BYTES = 1 << 32
 """Bytes of one file, decoded. A segment has a quarter of that at most, unless a recording is very long."""
@@ -65,10 +65,10 @@ def read_sound(table: str, file: StoreFile, name: str, columns: Sequence[str] | 
         DataError: dataset-invalid.
     """
     fields = [field for field in SCHEMAS[table] if columns is None or field.name in columns]
-    with _decoding(name):
+    with decoding(name):
         with open_parquet(file) as parquet:
             found = parquet.schema_arrow.names
-            _check_columns(parquet, fields, found if columns is None else [n for n in found if n in columns], name)
+            check_columns(parquet, fields, found if columns is None else [n for n in found if n in columns], name)
             rows = parquet.read(columns)
         rows.validate(full=True)
     for field in fields:
@@ -93,11 +93,11 @@ def check_table(table: str, file: StoreFile, name: str, kept: Collection[str]) -
     """
     fields = list(SCHEMAS[table])
     columns: dict[str, ArrowArray] = {}
-    with _decoding(name), open_parquet(file) as parquet:
-        _check_columns(parquet, fields, parquet.schema_arrow.names, name)
+    with decoding(name), open_parquet(file) as parquet:
+        check_columns(parquet, fields, parquet.schema_arrow.names, name)
         said = parquet.metadata
     texts = [field.name for field in fields if field.type == pa.string()]
-    with _decoding(name), open_parquet(file, metadata=said, read_dictionary=texts) as parquet:
+    with decoding(name), open_parquet(file, metadata=said, read_dictionary=texts) as parquet:
         for field in fields:
             column = parquet.read([field.name]).column(0)
             column.validate(full=True)
@@ -109,8 +109,15 @@ def check_table(table: str, file: StoreFile, name: str, kept: Collection[str]) -
 
 
 @contextmanager
-def _decoding(name: str) -> Generator[None]:
-    """Refuses a file of which a library says that it cannot be decoded."""
+def decoding(name: str) -> Generator[None]:
+    """Refuse a file of which a library says that it cannot be decoded.
+
+    Args:
+        name: What it is called in the dataset.
+
+    Raises:
+        DataError: dataset-invalid.
+    """
     try:
         yield
     except (pa.ArrowException, OSError, ValueError, OverflowError, KeyError) as error:
@@ -119,8 +126,18 @@ def _decoding(name: str) -> Generator[None]:
         invalid(name, f"cannot be decoded: {' '.join(str(error).split())[:200]}")
 
 
-def _check_columns(parquet: Any, fields: Sequence[Any], names: Sequence[str], name: str) -> None:
-    """Look at what the file says of itself, before anything is decoded."""
+def check_columns(parquet: Any, fields: Sequence[Any], names: Sequence[str], name: str) -> None:
+    """Look at what a file says of itself, before anything is decoded.
+
+    Args:
+        parquet: A `pyarrow.parquet.ParquetFile`.
+        fields: Those that it must have.
+        names: The columns that it has.
+        name: What it is called in the dataset.
+
+    Raises:
+        DataError: dataset-invalid.
+    """
     expected, found = [field.name for field in fields], parquet.schema_arrow
     if names != expected:
         odd = sorted({*names} ^ {*expected})

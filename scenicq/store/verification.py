@@ -6,11 +6,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from contextlib import ExitStack, closing
+
 import numpy as np
 import pyarrow as pa
 
 from scenicq.store.columns import second_of_track
 from scenicq.store.dataset import Dataset
+from scenicq.store.part_rows import PartRows
 from scenicq.store.rebuild import recordings_of
 from scenicq.store.regions import lane_rows
 from scenicq.store.rows import recording_rows
@@ -36,21 +40,36 @@ def verify_computed(dataset: Dataset) -> None:
         _compare("lanes", read_sound("lanes", file, part.path), lane_rows(maps), part.path)
     indexes = MapIndexes(maps)
     for number in range(len(manifest.tables["labels"])):
-        parts = {table: manifest.tables[table][number] for table in SEGMENT_TABLES}
-        found = {table: read_sound(table, dataset.place.file(part), part.path) for table, part in parts.items()}
-        first: dict[str, int] = dict.fromkeys(SEGMENT_TABLES, 0)
-        for columns in recordings_of(found["labels"], found["objects"], found["sensors"]):
-            if (second := second_of_track(columns)) is not None:
-                row = first["objects"] + second
-                invalid(parts["objects"].path, "has two objects of one track in a label", row=row, column="track")
-            index = indexes.of(columns.map)
-            rows = recording_rows(columns, index, first_object=first["objects"], first_sensor=first["sensors"])
-            for table, more in rows.items():
-                # a recording at a time: all of a part computed again would take several times what it takes to read
-                _compare(table, found[table].slice(first[table], len(more)), more, parts[table].path)
-                first[table] += len(more)
-        for table, count in first.items():
-            _compare_lengths(len(found[table]), count, parts[table].path)
+        with ExitStack() as files:
+            found = {
+                table: files.enter_context(closing(PartRows(table, dataset.place.file(part), part.path)))
+                for table in SEGMENT_TABLES
+                for part in (manifest.tables[table][number],)
+            }
+            _verify_part(found, indexes)
+
+
+def _verify_part(found: Mapping[str, PartRows], indexes: MapIndexes) -> None:
+    """Compare the tables of a part, a recording at a time, so that memory does not grow with the part."""
+    first: dict[str, int] = dict.fromkeys(SEGMENT_TABLES, 0)
+    for size in found["labels"].runs("recording"):
+        # what labels say of objects and sensors is sound
+        there = {"labels": found["labels"].take(first["labels"], size)}
+        for table, name in (("objects", "object_count"), ("sensors", "sensor_count")):
+            there[table] = found[table].take(first[table], int(there["labels"][name].to_numpy().sum()))
+        (columns,) = recordings_of(there["labels"], there["objects"], there["sensors"])
+        if (second := second_of_track(columns)) is not None:
+            row = first["objects"] + second
+            invalid(found["objects"].name, "has two objects of one track in a label", row=row, column="track")
+        again = recording_rows(
+            columns, indexes.of(columns.map), first_object=first["objects"], first_sensor=first["sensors"]
+        )
+        there["memberships"] = found["memberships"].take(first["memberships"], len(again["memberships"]))
+        for table, rows in again.items():
+            _compare(table, there[table], rows, found[table].name)
+            first[table] += len(rows)
+    for table, count in first.items():
+        _compare_lengths(found[table].rows, count, found[table].name)
 
 
 def _compare(table: str, found: ArrowTable, expected: ArrowTable, file: str) -> None:

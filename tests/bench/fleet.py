@@ -25,7 +25,7 @@ from scenicq.compiler.default_street import street
 from scenicq.geometry.features import LINES, REFERENCES, MapFeature, names
 from scenicq.importers.base import Entry, Labels
 from scenicq.importers.report import Report
-from scenicq.importers.segments import Job, World, fingerprint, write_segments
+from scenicq.importers.segments import Job, RecordingTask, World, fingerprint, write_segments
 from scenicq.store.columns import MemberColumns, RecordingColumns
 from scenicq.store.manifest import Manifest
 from scenicq.store.segment import SEGMENT_OBJECTS, segments_of
@@ -232,7 +232,8 @@ def write_store(fleet: Fleet, target: Path, jobs: int) -> Manifest:
         first = 0
         for number, group in enumerate(groups):
             mark = fingerprint([repr(fleet)], [Entry(name, 0, "") for name in group], frozenset())
-            waiting.append(Job(number, FleetReader(fleet, tuple(range(first, first + len(group)))), mark))
+            shares = tuple(RecordingTask(name, "", FleetReader(fleet, (first + n,))) for n, name in enumerate(group))
+            waiting.append(Job(number, shares, mark))
             first += len(group)
         written = write_segments(World(writer.folder, maps), waiting, jobs, lambda recording, frames: None)
         for job, segment in zip(waiting, written, strict=True):

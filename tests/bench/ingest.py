@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import platform
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -32,6 +33,9 @@ LEAST_RATE, MOST_GROWTH = 50_000, 1.25
 SHORT_S, ROUNDS = 2.0, 10
 GENERATED, IMPORTING = "fleet-", "importing"
 WHOLE_FROM = 1_000_000
+MOST_OF_WHOLE, MOST_VERIFY_GROWTH = 0.4, 1.6
+"""CPU seconds of an update by one recording, of those of a whole ingest (it writes one segment again), and how many
+times as much memory ten times as many frames may take to verify."""
 BARS_FROM = 10_000
 """Objects from which a rate says something, and frames from which memory may no longer grow."""
 
@@ -86,6 +90,30 @@ def measure(source: Path, jobs: int, folder: Path) -> Measured:
     return one
 
 
+def one_more(source: Path, folder: Path) -> tuple[float, float, float]:
+    """CPU seconds of an ingest and of an update by one recording more, and the peak memory of `info --verify`, MiB."""
+    target, grown = folder / "updated", folder / "grown"
+    folder.mkdir()
+    whole = command(source, target, 1)
+    shutil.copytree(source, grown)
+    last = [line for line in (source / "labels.jsonl").read_text().splitlines() if f'"{GENERATED}000001"' in line]
+    with (grown / "labels.jsonl").open("a") as labels:
+        labels.writelines(line.replace(f"{GENERATED}000001", f"{GENERATED}000001x") + "\n" for line in last)
+    update = run([COMMAND, "ingest", str(grown), str(target), "--update", "--quiet", "--jobs", "1"])
+    return whole.cpu_s, update.cpu_s, run([COMMAND, "info", str(target), "--verify"]).peak_mib
+
+
+def update_bars(sources: list[Path], folder: Path) -> Iterator[tuple[str, bool]]:
+    """The same of two sizes, as ratios."""
+    found = [one_more(source, folder / f"of-{source.name}") for source in (sources[0], sources[-1])]
+    whole_s, update_s, _ = found[-1]
+    told = f"{update_s:.1f} of {whole_s:.1f} CPU s, {update_s / whole_s:.2f}, at most {MOST_OF_WHOLE}"
+    yield f"{sources[-1].name}: one recording more by --update takes {told}", update_s / whole_s <= MOST_OF_WHOLE
+    growth = found[1][2] / found[0][2]
+    told = f"{growth:.2f} times the memory ({found[1][2]:.0f} MiB)"
+    yield f"info --verify of {sources[-1].name} takes {told} of {sources[0].name}", growth < MOST_VERIFY_GROWTH
+
+
 def is_whole(one: Measured) -> bool:
     """Whether the start of the command counts: not for generated frames that are few, which any start outweighs."""
     return not one.source.startswith(GENERATED) or one.frames >= WHOLE_FROM
@@ -126,7 +154,9 @@ def main() -> None:
             sources.append(source)
         print("  source             frames     objects  jobs  import s command s  objects/s of both      MiB")
         found += [measure(source, jobs, folder) for source in sources for jobs in given.jobs]
-    judged = list(bars(found))
+        fleets = [source for source in sources if source.name.startswith(GENERATED)]
+        updates = list(update_bars(fleets, folder)) if len(fleets) > 1 else []
+    judged = [*bars(found), *updates]
     for what, met in judged:
         print(f"  {'pass' if met else 'FAIL'}  {what}")
     now = datetime.now(UTC)

@@ -20,12 +20,15 @@ import pytest
 from scenicq.errors import DataError
 from scenicq.importers.base import Labels
 from scenicq.importers.ingest import Progress, ingest
+from scenicq.importers.interchange import LineReader
 from scenicq.importers.report import Report
-from scenicq.importers.segments import Job, World, write_segments
+from scenicq.importers.segments import Job, RecordingTask, World, write_segments
 from scenicq.processes import Workers
+from scenicq.store.columns import RecordingColumns
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Recording
 from scenicq.store.manifest import MANIFEST
+from scenicq.store.verification import verify_computed
 
 ROOT = Path(__file__).parents[2]
 RECORDINGS, FRAMES = 24, 26
@@ -161,7 +164,7 @@ def test_processes_that_are_killed_are_replaced(
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_recording_that_kills_is_named(tmp_path: Path) -> None:
-    jobs = [Job(number, Deadly(), str(number), first=f"r{number}") for number in range(2)]
+    jobs = [Job(number, (RecordingTask(f"r{number}", "", Deadly()),), str(number)) for number in range(2)]
     (tmp_path / "d").mkdir()
     world = World(tmp_path / "d", {})
     with pytest.raises(DataError, match=r"3 processes .* from `r0` on .* killed"):
@@ -236,6 +239,55 @@ def test_update_reads_what_is_new_or_has_changed(tmp_path: Path) -> None:
     open_dataset(tmp_path / "d").verify()
     again = ingest(source, tmp_path / "d", update=True, segment_objects=SEGMENT)
     assert again.reused == again.recordings == RECORDINGS + 1
+
+
+def test_an_update_reads_recordings_of_a_segment_that_are_new_or_have_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All lie in one segment, whose other recordings are copied with what was told of them."""
+    names = [f"r{number:02}" for number in range(8)]
+    source = write_source(tmp_path / "source", names)
+    lines = (source / "labels.jsonl").read_text().splitlines(keepends=True)
+    lines[FRAMES * 3] = lines[FRAMES * 3].replace('"id"', '"more": 1, "id"', 1)
+    unsound = '{"recording": "r01x", "id": "odd"}\n'
+    (source / "labels.jsonl").write_text("".join([unsound, *lines]))
+    ingest(source, tmp_path / "d")
+    changed = [line for line in lines if '"recording": "r05"' not in line]
+    changed = [
+        line.replace('"heading": 0.0', '"heading": 0.1') if '"recording": "r06"' in line else line for line in changed
+    ]
+    new = [line.replace("r02", "r02n") for line in lines if '"recording": "r02"' in line]
+    (source / "labels.jsonl").write_text("".join([unsound, *changed, *new]).replace("r00/00", "r07/00"))
+    read: list[str] = []
+    original = LineReader.recordings
+
+    def recordings(self: LineReader, labels: Labels, report: Report) -> Iterator[Recording | RecordingColumns]:
+        read.extend(self.lines.runs)
+        yield from original(self, labels, report)
+
+    monkeypatch.setattr(LineReader, "recordings", recordings)
+    summary = ingest(source, tmp_path / "d", update=True)
+    assert {*read} == {"r00", "r02n", "r06", "r07"}  # r07 again, as a label of r00 has the name of one of its own
+    ingest(source, tmp_path / "fresh")
+    assert contents(tmp_path / "d") == contents(tmp_path / "fresh")
+    assert len(open_dataset(tmp_path / "d").files("objects")) == 1
+    assert summary.reused == 4
+    assert {"record-invalid", "not-read"} <= {each.code for each in summary.left_out}
+    verify_computed(open_dataset(tmp_path / "d"))
+
+
+def test_an_update_copies_nothing_of_a_file_that_has_changed(tmp_path: Path) -> None:
+    source = write_source(tmp_path / "source", ["a", "b"])
+    ingest(source, tmp_path / "d")
+    (file,) = (tmp_path / "d" / "objects").iterdir()
+    content = bytearray(file.read_bytes())
+    content[len(content) // 3] ^= 1
+    file.write_bytes(content)
+    write_source(source, ["a", "b", "c"])
+    summary = ingest(source, tmp_path / "d", update=True)
+    assert summary.reused == 0
+    ingest(source, tmp_path / "fresh")
+    assert contents(tmp_path / "d") == contents(tmp_path / "fresh")
 
 
 def test_an_interrupted_update_changes_nothing(source: Path, tmp_path: Path) -> None:
