@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import assert_never, cast
 
 from scenicq.compiler import operators
@@ -31,6 +31,7 @@ __all__ = ["Surroundings", "bind"]
 Evaluate = Callable[[ast.Expression], ModelValue]
 
 
+@dataclass(slots=True, eq=False)
 class Surroundings:
     """What specifiers refer to besides their arguments.
 
@@ -44,18 +45,13 @@ class Surroundings:
         is_object: Whether an object, rather than a point, is being placed.
     """
 
-    def __init__(
-        self, version: int, ego: Callable[[Span], Instance], workspace: Callable[[], Node], budget: Budget,
-        network: Network, may_lack: Callable[[Node], bool], *, is_object: bool,
-    ) -> None:  # fmt: skip
-        """Take what the interpreter knows."""
-        self.version = version
-        self.ego = ego
-        self.workspace = workspace
-        self.budget = budget
-        self.network = network
-        self.may_lack = may_lack
-        self.is_object = is_object
+    version: int
+    ego: Callable[[Span], Instance]
+    workspace: Callable[[], Node]
+    budget: Budget
+    network: Network
+    may_lack: Callable[[Node], bool]
+    is_object: bool
 
 
 def _specifier(
@@ -111,14 +107,15 @@ def _own_position(instance: Instance, position: Node, span: Span) -> Node:
 def _in_region(
     span: Span, region: ModelValue, around: Surroundings, *, contained: bool = False, modifies: bool = False
 ) -> BoundSpecifier:
-    area = operators.existing(region, span)
+    on_object = isinstance(region, Instance) and region.index is not None and around.version == 3
+    area = operators.object_box(region, span) if on_object else operators.existing(region, span)
     point = PointIn(area, span=span)
-    has_heading = orientation(area, point, span) is not None
+    has_heading = on_object or orientation(area, point, span) is not None
 
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         given: dict[str, ModelValue] = {"position": point, "regionContainedIn": area}
         if has_heading:
-            given["heading"] = orientation(area, _own_position(instance, point, span), span)
+            given["heading"] = 0.0 if on_object else orientation(area, _own_position(instance, point, span), span)
         return given
 
     def inside(instance: Instance) -> Node:
@@ -357,14 +354,9 @@ def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> Boun
             return _position(span, evaluate(node.position))
         case ast.OnSpecifier():
             region = evaluate(node.region)
-            is_point = isinstance(region, Instance) and region.index is None
-            is_vector = is_point or kind_of_model(region) == "vector" or isinstance(region, tuple | list)
-            if around.version == 3 and is_vector:
+            is_place = kind_of_model(region) == "vector" or isinstance(region, tuple | list)
+            if around.version == 3 and (is_place or (isinstance(region, Instance) and region.index is None)):
                 return _position(span, region)
-            if isinstance(region, Instance):
-                raise fail("unsupported-construct", "a place on an object is not supported", span,
-                           "labels are matched in 2D",
-                           ("place it `at` the object's position, or `ahead of` it",))  # fmt: skip
             return _in_region(span, region, around, modifies=around.version == 3)
         case ast.InSpecifier():
             return _in_region(span, evaluate(node.region), around)
