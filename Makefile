@@ -2,7 +2,7 @@
 # `make dreal`, and by `make setup` where a Debian system lacks Python's venv.
 
 PYTHON ?= python3
-WORKERS ?= 2
+WORKERS ?= $(shell n=$$(nproc 2>/dev/null || echo 2); [ $$n -lt 8 ] || n=8; echo $$n)
 BIN := .venv/bin
 READY := .venv/.ready
 PYTEST := $(BIN)/python -m pytest -q -p no:cacheprovider
