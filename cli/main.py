@@ -6,7 +6,6 @@ Subcommands are imported when they are called, so that `--help` and `--version` 
 from __future__ import annotations
 
 import contextlib
-import difflib
 import errno
 import gc
 import os
@@ -18,7 +17,7 @@ from typing import Any, NoReturn
 import click
 
 from scenicq import __version__
-from scenicq.errors import Diagnostic, ScenicqError
+from scenicq.errors import Diagnostic, ScenicqError, similar
 from scenicq.garbage import seldom_collected
 from scenicq.refusals import refused_by_system
 
@@ -102,8 +101,8 @@ class Commands(click.Group):
         """Find a subcommand, or say which one may be meant."""
         name = args[0]
         if name not in COMMANDS and not name.startswith("-"):
-            near = difflib.get_close_matches(name, COMMANDS, n=1)
-            hint = f" Did you mean '{near[0]}'?" if near else ""
+            near = similar(name, COMMANDS)
+            hint = f" Did you mean '{near}'?" if near else ""
             raise click.UsageError(f"No such command '{name}'.{hint}", ctx)
         return super().resolve_command(ctx, args)
 

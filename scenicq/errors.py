@@ -11,6 +11,7 @@ import unicodedata
 from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cached_property
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "plain",
     "plain_json",
     "render",
+    "similar",
 ]
 
 CODES: dict[str, str] = {
@@ -292,3 +294,8 @@ def render(diagnostic: Diagnostic) -> str:
         lines += _excerpt(note.span, note.text, "-", margin)
     lines += [f"{pad} = hint: {hint}" for hint in diagnostic.hints]
     return "\n".join(lines)
+
+
+def similar(word: str, words: Iterable[str]) -> str:
+    """The one of several words that a misspelt one was probably meant to be, or nothing."""
+    return next(iter(get_close_matches(word, sorted(words), n=1, cutoff=0.7)), "")

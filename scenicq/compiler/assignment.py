@@ -7,10 +7,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler.arithmetic import hashed
-from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.environment import Environment
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import decided
 from scenicq.compiler.logic import condition
@@ -18,10 +18,13 @@ from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.syntax import ast
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["assign", "assign_around", "go_through"]
 
 
-def assign(run: Runner, target: ast.Expression, value: ModelValue, scope: Environment) -> None:
+def assign(run: Interpreter, target: ast.Expression, value: ModelValue, scope: Environment) -> None:
     """Give a name, an item or several names a value."""
     match target:
         case ast.Name():
@@ -46,7 +49,7 @@ def assign(run: Runner, target: ast.Expression, value: ModelValue, scope: Enviro
 
 
 def _assign_each(
-    run: Runner, targets: tuple[ast.Expression, ...], items: list[ModelValue], scope: Environment, span: Span
+    run: Interpreter, targets: tuple[ast.Expression, ...], items: list[ModelValue], scope: Environment, span: Span
 ) -> None:
     """Give several names a value each; one with a star takes what the others leave."""
     starred = [number for number, target in enumerate(targets) if isinstance(target, ast.Starred)]
@@ -61,7 +64,7 @@ def _assign_each(
         assign(run, target.value if isinstance(target, ast.Starred) else target, item, scope)
 
 
-def assign_around(run: Runner, target: ast.Name, value: ModelValue, scope: Environment) -> None:
+def assign_around(run: Interpreter, target: ast.Name, value: ModelValue, scope: Environment) -> None:
     """`name := value`, which binds outside of comprehensions."""
     while scope.comprehension and scope.parent is not None:
         scope = scope.parent
@@ -69,14 +72,14 @@ def assign_around(run: Runner, target: ast.Name, value: ModelValue, scope: Envir
 
 
 def go_through(
-    run: Runner, clauses: tuple[ast.Clause, ...], scope: Environment, visit: Callable[[Environment], None]
+    run: Interpreter, clauses: tuple[ast.Clause, ...], scope: Environment, visit: Callable[[Environment], None]
 ) -> None:
     """Visit every combination of a comprehension, whose names live in one scope of their own."""
     _nest(run, clauses, scope, Environment({}, scope, comprehension=True), visit)
 
 
 def _nest(
-    run: Runner,
+    run: Interpreter,
     clauses: tuple[ast.Clause, ...],
     around: Environment,
     inner: Environment,

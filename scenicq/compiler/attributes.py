@@ -8,21 +8,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from difflib import get_close_matches
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_flat, is_random
 from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import property_node, to_heading, to_region, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.following import follow
 from scenicq.compiler.lookups import look_up
 from scenicq.compiler.region_attributes import REGION_METHODS, holds_regions, of_region
 from scenicq.compiler.unavailable import unavailable_attribute
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
-from scenicq.errors import ScenarioError, Span
+from scenicq.errors import ScenarioError, Span, similar
 from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
@@ -30,6 +28,9 @@ from scenicq.forest.nodes import ArithmeticOp, Node
 from scenicq.geometry.elements import Lane, Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
 from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["PARTS", "attribute", "part_of"]
 
@@ -69,7 +70,7 @@ def part_of(part: str, target: ModelValue, span: Span) -> Instance:
     return operators.oriented(build.offset_local(to_vector(target, span), heading, offset, span), heading)
 
 
-def attribute(run: Runner, value: ModelValue, name: str, span: Span) -> ModelValue:
+def attribute(run: Interpreter, value: ModelValue, name: str, span: Span) -> ModelValue:
     """`value.name`.
 
     Raises:
@@ -110,8 +111,8 @@ def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
     if value is None and is_of_elements(name):
         return fail("map-lacks", f"the map has no element here that `{name}` could be of", span, "this is of None",
                     ("leave out with a condition where there is none",))  # fmt: skip
-    close = get_close_matches(name, sorted(_names(value)), 1, 0.7)
-    hints = (f"`{close[0]}` is an attribute with a similar name",) if close else ()
+    close = similar(name, _names(value))
+    hints = (f"`{close}` is an attribute with a similar name",) if close else ()
     if isinstance(value, Network) and name in ("bikeLanes", "bikeLane", "bicycleLanes"):
         hints = (BIKE_LANES,)
     if isinstance(value, Instance) and (said := _SAID.get(name.replace("_", "").lower())):
@@ -142,7 +143,7 @@ _OWNER = re.compile(r"([A-Za-z_][\w.]{0,60})\.\Z")
 """The dotted name before an attribute."""
 
 
-def _of_choice(run: Runner, value: Choice, name: str, span: Span) -> ModelValue:
+def _of_choice(run: Interpreter, value: Choice, name: str, span: Span) -> ModelValue:
     """The attribute of each option; where there is none (in the map, or of None), that option has no scene."""
     return each_existing(run, value, lambda option: attribute(run, option, name, span), span)
 
@@ -159,7 +160,7 @@ def _names(value: ModelValue) -> set[str]:
             return set(_PLAIN.get(type(value), ()))
 
 
-def _lookup(run: Runner, value: ModelValue, name: str, span: Span) -> ModelValue:
+def _lookup(run: Interpreter, value: ModelValue, name: str, span: Span) -> ModelValue:
     match value:
         case Instance():
             return _of_instance(run, value, name, span)
@@ -235,7 +236,7 @@ _PLACES = {
 }
 
 
-def _of_instance(run: Runner, value: Instance, name: str, span: Span) -> ModelValue:
+def _of_instance(run: Interpreter, value: Instance, name: str, span: Span) -> ModelValue:
     if name in value.properties:
         found = property_node(value, name, span)
         turned = name == "heading" and run.version == 3 and is_node(found)
@@ -271,7 +272,7 @@ def _corners(value: Instance, span: Span) -> tuple[ModelValue, ...]:
     return 2 * tuple(part_of(part, value, span).properties["position"] for part in around)
 
 
-def _of_field(run: Runner, value: Node, name: str) -> ModelValue:
+def _of_field(run: Interpreter, value: Node, name: str) -> ModelValue:
     if name != "followFrom":
         return MISSING
 

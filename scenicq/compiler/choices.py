@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.coerce import kind_of_model, to_node
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = [
     "LACKING",
@@ -74,7 +76,9 @@ def map_choice(value: ModelValue, function: Callable[[ModelValue], ModelValue], 
     return make_choice(value.index, [function(option) for option in value.options], span)
 
 
-def each_existing(run: Runner, choice: Choice, function: Callable[[ModelValue], ModelValue], span: Span) -> ModelValue:
+def each_existing(
+    run: Interpreter, choice: Choice, function: Callable[[ModelValue], ModelValue], span: Span
+) -> ModelValue:
     """Apply a function to each option for which it has a result; the others have no scene, as in Scenic.
 
     Raises:
@@ -101,7 +105,9 @@ def each_existing(run: Runner, choice: Choice, function: Callable[[ModelValue], 
     return make_choice(choice.index, [found.get(number, spare) for number in range(count)], span)
 
 
-def each_option(run: Runner, choice: Choice, function: Callable[[ModelValue], ModelValue], span: Span) -> ModelValue:
+def each_option(
+    run: Interpreter, choice: Choice, function: Callable[[ModelValue], ModelValue], span: Span
+) -> ModelValue:
     """Apply a function that runs the program to each option; what one of them lacks excludes that option alone."""
     options: list[ModelValue] = []
     for number, option in enumerate(choice.options):

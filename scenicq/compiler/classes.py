@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler.deviations import DEVIATIONS, IN_SPACE
-from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
+from scenicq.compiler.environment import FIRST_NAMES, Environment
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.values import Function, ModelValue, PropertyDefinition, ScenicClass, describe, fail
 from scenicq.errors import Span
 from scenicq.store.classes import is_class
 from scenicq.syntax import ast
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["bind_arguments", "define_class", "refuse_decorators"]
-
-
-class _Definer(Runner, Protocol):
-    """What defining a class asks of the interpreter."""
-
-    def run(self, body: tuple[ast.Statement, ...], scope: Environment) -> None:
-        """Run statements in order."""
-        ...
 
 
 def refuse_decorators(decorators: tuple[ast.Expression, ...]) -> None:
@@ -35,7 +30,7 @@ def refuse_decorators(decorators: tuple[ast.Expression, ...]) -> None:
                    ("leave it out: a scenario only needs plain functions",))  # fmt: skip
 
 
-def define_class(run: _Definer, node: ast.ClassDef, scope: Environment) -> ScenicClass:
+def define_class(run: Interpreter, node: ast.ClassDef, scope: Environment) -> ScenicClass:
     """The class that a definition makes.
 
     Raises:

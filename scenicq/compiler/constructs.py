@@ -10,18 +10,21 @@ Programs may also call operators as functions, by the names that Scenic's compil
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from scenicq.compiler import operators
 from scenicq.compiler.attributes import PARTS, part_of
 from scenicq.compiler.choices import distribute
 from scenicq.compiler.coerce import to_vector
-from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.environment import Environment
 from scenicq.compiler.following import follow
 from scenicq.compiler.values import Builtin, ModelValue, fail, lift
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.syntax import ast
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["construct", "operator_functions"]
 
@@ -56,7 +59,7 @@ def _implies(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
 
 
 def _sight(combine: Callable[..., ModelValue]) -> _Operation:
-    def part(run: Runner, region: ModelValue, viewer: ModelValue, span: Span) -> ModelValue:
+    def part(run: Interpreter, region: ModelValue, viewer: ModelValue, span: Span) -> ModelValue:
         return combine(operators.existing(region, span), operators.visible_region(viewer, span), span)
 
     return _Operation("region viewer", part)
@@ -109,7 +112,7 @@ _FUNCTIONS: dict[str, tuple[_Operation, str]] = {
 """Operators by the names of their functions, and the operands that a function takes in its order."""
 
 
-def _apply(run: Runner, operation: _Operation, operands: Sequence[ModelValue], span: Span) -> ModelValue:
+def _apply(run: Interpreter, operation: _Operation, operands: Sequence[ModelValue], span: Span) -> ModelValue:
     """Apply an operator as soon as its operands are known."""
     run.budget.step(span, operation.look_ups * run.budget.LOOK_UP_STEPS)
 
@@ -119,7 +122,7 @@ def _apply(run: Runner, operation: _Operation, operands: Sequence[ModelValue], s
     return lift(lambda *values: distribute(now, values, span) if operation.is_spread else now(*values), *operands)
 
 
-def operator_functions(run: Runner) -> dict[str, ModelValue]:
+def operator_functions(run: Interpreter) -> dict[str, ModelValue]:
     """The functions that programs may call in place of operators."""
 
     def function(name: str, operation: _Operation, parameters: list[str]) -> Builtin:
@@ -137,7 +140,7 @@ def operator_functions(run: Runner) -> dict[str, ModelValue]:
 
 
 def construct(
-    run: Runner, node: ast.Expression, scope: Environment, value: Callable[[ast.Expression], ModelValue]
+    run: Interpreter, node: ast.Expression, scope: Environment, value: Callable[[ast.Expression], ModelValue]
 ) -> ModelValue:
     """The value of an expression that Python does not have.
 

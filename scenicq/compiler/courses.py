@@ -13,16 +13,20 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from scenicq.compiler.choices import LACKING
 from scenicq.compiler.coerce import kind_of_model
-from scenicq.compiler.environment import Course, Runner
+from scenicq.compiler.environment import Course
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.values import Choice, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
 from scenicq.forest.nodes import CompareOp, Constant, Feature, Index, LogicOp, Node, Select
 from scenicq.forest.walk import leaves
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["as_test", "option_of", "split", "without_courses"]
 
@@ -72,7 +76,7 @@ def _refused(span: Span, label: str) -> ScenarioError:
 
 
 @contextmanager
-def _on(run: Runner, course: Course) -> Generator[None]:
+def _on(run: Interpreter, course: Course) -> Generator[None]:
     before, run.course = run.course, course
     try:
         yield
@@ -80,12 +84,12 @@ def _on(run: Runner, course: Course) -> Generator[None]:
         run.course = before
 
 
-def without_courses(run: Runner) -> AbstractContextManager[None]:
+def without_courses(run: Interpreter) -> AbstractContextManager[None]:
     """While what is evaluated must have one course, although objects are read as a label shows them."""
     return _on(run, _None())
 
 
-def split(run: Runner, evaluate: Callable[[], Node], span: Span) -> Node:
+def split(run: Interpreter, evaluate: Callable[[], Node], span: Span) -> Node:
     """The value of a condition as a choice between those of its courses.
 
     Args:
@@ -157,7 +161,7 @@ def _either(test: Node, no: Node, yes: Node, span: Span) -> Node:
             return Select(test, (no, yes), span=span)
 
 
-def option_of(run: Runner, value: ModelValue, span: Span) -> ModelValue:
+def option_of(run: Interpreter, value: ModelValue, span: Span) -> ModelValue:
     """The option of a random choice that the course takes, found by halving; anything else as it is.
 
     Raises:

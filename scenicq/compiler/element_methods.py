@@ -7,11 +7,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler.choices import map_choice
 from scenicq.compiler.coerce import to_vector
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.following import follow
 from scenicq.compiler.known_properties import settled
 from scenicq.compiler.lanes_ahead import lanes_ahead
@@ -35,6 +34,9 @@ from scenicq.geometry.elements import (
 from scenicq.geometry.network import TOLERANCE, Network
 from scenicq.geometry.regions import SLACK
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["METHODS", "find_among", "method_of", "nominal_directions"]
 
 _PARTS: dict[str, tuple[tuple[type, Callable[[Any], Sequence[NetworkElement]]], ...]] = {
@@ -53,7 +55,7 @@ METHODS = frozenset({"nominalDirectionsAt"})
 """Methods that every element and the network have."""
 
 
-def find_among(run: Runner, point: ModelValue, elements: ModelValue, reject: ModelValue, span: Span) -> ModelValue:
+def find_among(run: Interpreter, point: ModelValue, elements: ModelValue, reject: ModelValue, span: Span) -> ModelValue:
     """`network.findPointIn(point, elements, reject)`.
 
     Raises:
@@ -66,7 +68,7 @@ def find_among(run: Runner, point: ModelValue, elements: ModelValue, reject: Mod
     return among(run, list(cast("Sequence[NetworkElement]", elements)), "findPointIn", point, reject, span)
 
 
-def method_of(run: Runner, value: NetworkElement, name: str) -> Builtin | None:
+def method_of(run: Interpreter, value: NetworkElement, name: str) -> Builtin | None:
     """A method of an element, None if it has no such method."""
     parts = next((parts for kind, parts in _PARTS.get(name, ()) if isinstance(value, kind)), None)
     if parts is not None:
@@ -106,14 +108,14 @@ def method_of(run: Runner, value: NetworkElement, name: str) -> Builtin | None:
     return None
 
 
-def _finder(run: Runner, parts: Sequence[NetworkElement], name: str) -> Callable[..., ModelValue]:
+def _finder(run: Interpreter, parts: Sequence[NetworkElement], name: str) -> Callable[..., ModelValue]:
     def find(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
         return among(run, parts, name, point, reject, span)
 
     return find
 
 
-def _known_place(run: Runner, point: ModelValue, what: str, hint: str, span: Span) -> Vector:
+def _known_place(run: Interpreter, point: ModelValue, what: str, hint: str, span: Span) -> Vector:
     where = settled(run, to_vector(point, span))
     if not isinstance(where, Constant):
         raise fail("unsupported-construct", f"`{what}` of a random point is not supported", span,
@@ -121,7 +123,7 @@ def _known_place(run: Runner, point: ModelValue, what: str, hint: str, span: Spa
     return cast(Vector, where.value)
 
 
-def nominal_directions(run: Runner, owner: Network | NetworkElement) -> Builtin:
+def nominal_directions(run: Interpreter, owner: Network | NetworkElement) -> Builtin:
     """`nominalDirectionsAt`: the directions of traffic at a point, in an element or in whatever lies there."""
 
     def directions(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
@@ -147,7 +149,7 @@ def _directions(element: ModelValue, place: Node, span: Span) -> ModelValue:
     return tuple(heading for each in fields if (heading := each.first(x, y)) is not None)
 
 
-def _maneuvers_at(run: Runner, intersection: Intersection, point: ModelValue, span: Span) -> ModelValue:
+def _maneuvers_at(run: Interpreter, intersection: Intersection, point: ModelValue, span: Span) -> ModelValue:
     """The ways through an intersection that pass a known point."""
     hint = "choose a maneuver first, as in `Uniform(*intersection.maneuvers)`"
     return _ways_at(intersection, *_known_place(run, point, "maneuversAt", hint, span))
@@ -168,7 +170,7 @@ def _ways_at(intersection: Intersection, x: float, y: float) -> list[Maneuver]:
     return [min(away, key=away.__getitem__)] if away else []
 
 
-def _shifted(run: Runner, section: LaneSection, offset: ModelValue, span: Span) -> ModelValue:
+def _shifted(run: Interpreter, section: LaneSection, offset: ModelValue, span: Span) -> ModelValue:
     """The section some lanes over: to the left, or to the right where the number is negative."""
     if isinstance(offset, bool) or not isinstance(offset, int):
         raise fail("wrong-type", "`shiftedBy` needs a known whole number", span)

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import shapely
 
 from scenicq.compiler.element_lookups import LOOKUPS
 from scenicq.compiler.element_methods import METHODS, find_among, method_of, nominal_directions
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.lookups import look_up
 from scenicq.compiler.road_attributes import is_worked_out, names_worked_out, worked_out
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
@@ -38,6 +37,9 @@ from scenicq.geometry.elements import (
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["MANEUVER_TYPES", "MISSING", "is_of_elements", "names_of", "of_element", "of_network"]
 
@@ -100,7 +102,7 @@ def is_of_elements(name: str) -> bool:
     return own or name in METHODS or is_worked_out(name)
 
 
-def of_network(run: Runner, network: Network, name: str, span: Span) -> ModelValue:
+def of_network(run: Interpreter, network: Network, name: str, span: Span) -> ModelValue:
     """An attribute of the network, or `MISSING`."""
     if name == "nominalDirectionsAt":
         return nominal_directions(run, network)
@@ -130,7 +132,7 @@ def of_network(run: Runner, network: Network, name: str, span: Span) -> ModelVal
     return build.constant(found, span) if name.endswith("Region") or name == "roadDirection" else found
 
 
-def of_element(run: Runner, value: NetworkElement | Maneuver | Signal, name: str, span: Span) -> ModelValue:
+def of_element(run: Interpreter, value: NetworkElement | Maneuver | Signal, name: str, span: Span) -> ModelValue:
     """An attribute of an element, maneuver or signal, or `MISSING`.
 
     Raises:

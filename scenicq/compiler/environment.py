@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import Protocol
 
 from scenicq.budget import look
-from scenicq.compiler.element_lookups import Lookups
-from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.unavailable import unavailable_name
-from scenicq.compiler.values import Function, Instance, ModelValue, fail
-from scenicq.errors import Span
+from scenicq.compiler.values import ModelValue, fail
+from scenicq.errors import Span, similar
 from scenicq.forest.nodes import Node
-from scenicq.geometry.network import Network
-from scenicq.syntax import ast
 from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS, TURNS
 
-__all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Course", "Environment", "Runner"]
+__all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Course", "Environment"]
 
 FIRST_LIBRARIES = frozenset({"gtaLib", "mars"})
 """The 2019 paper's libraries."""
@@ -180,8 +174,8 @@ class Environment:
                            "has no value yet", (f"`global {name}` says that the program's own is meant",))  # fmt: skip
             known.update(current.names)
             current = current.parent
-        close = get_close_matches(name, sorted(known), 1, 0.75)
-        hints = (f"`{close[0]}` has a similar name",) if close else ()
+        close = similar(name, known)
+        hints = (f"`{close}` has a similar name",) if close else ()
         if _SYNONYMS.get(name) in known:
             hints = (f"`{_SYNONYMS[name]}` is what Scenic calls it",)
         elif name in _SAID:
@@ -204,70 +198,4 @@ class Course(Protocol):
         Raises:
             ScenarioError: random-branch, where the condition may take one course alone.
         """
-        ...
-
-
-class Runner(Protocol):
-    """What evaluating an expression asks of the interpreter.
-
-    Attributes:
-        version: The version of Scenic that the program is read as.
-        budget: What the program may still use.
-        params: Global parameters: value, place, whether a library sets it.
-        objects: The objects made so far.
-        network: The road network that the program is compiled against.
-        lookups: What the program asks about places of the map.
-        excluded: Outcomes of random choices that no scene has.
-        course: Decides the tests of a condition on the scene while one is evaluated: there, no value of an object is
-            known before a label tells it. None while the program itself runs.
-    """
-
-    version: int
-    budget: Budget
-    params: dict[str, tuple[ModelValue, Span, bool]]
-    objects: list[Instance]
-    network: Network
-    lookups: Lookups
-    excluded: Exclusions
-    course: Course | None
-
-    def ego(self, span: Span) -> Instance:
-        """The ego.
-
-        Raises:
-            ScenarioError: no-ego, where none is defined yet.
-        """
-        ...
-
-    def evaluate(self, node: ast.Expression, scope: Environment) -> ModelValue:
-        """The value of an expression."""
-        ...
-
-    def call_function(
-        self, function: Function, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span
-    ) -> ModelValue:
-        """Call a function of the program."""
-        ...
-
-    def make_function(
-        self,
-        name: str,
-        parameters: tuple[ast.Parameter, ...],
-        body: tuple[ast.Statement, ...] | ast.Expression,
-        scope: Environment,
-        span: Span,
-    ) -> Function:
-        """Make a function, evaluating the defaults of its parameters."""
-        ...
-
-    def name_value(self, name: str, value: ModelValue, scope: Environment, span: Span) -> None:
-        """Give a name a value; an object's first name becomes its own."""
-        ...
-
-    def make_instance(self, node: ast.New, scope: Environment) -> Instance:
-        """Make a point, oriented point or object."""
-        ...
-
-    def dynamic(self, kind: str, span: Span) -> None:
-        """Refuse what does not describe one instant, or note that it is ignored."""
         ...

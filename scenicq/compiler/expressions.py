@@ -10,7 +10,7 @@ No Python is ever executed: every construct is interpreted here, and what is not
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, plain_unary
@@ -21,7 +21,7 @@ from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
 from scenicq.compiler.constructs import construct
 from scenicq.compiler.courses import option_of
 from scenicq.compiler.distributions import interval
-from scenicq.compiler.environment import FIRST_NAMES, Environment, Runner
+from scenicq.compiler.environment import FIRST_NAMES, Environment
 from scenicq.compiler.items import items_of, length_of, subscript
 from scenicq.compiler.known_properties import decided, settled
 from scenicq.compiler.logic import condition, connected, inverted
@@ -44,6 +44,9 @@ from scenicq.errors import Span
 from scenicq.geometry.elements import NetworkElement
 from scenicq.syntax import ast
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["call", "evaluate"]
 
 
@@ -56,7 +59,7 @@ class _Arguments:
         self.choice: Choice | None = None
 
 
-def _arguments(run: Runner, items: tuple[ast.Argument, ...], scope: Environment) -> _Arguments:
+def _arguments(run: Interpreter, items: tuple[ast.Argument, ...], scope: Environment) -> _Arguments:
     found = _Arguments()
     for item in items:
         value = evaluate(run, item.value, scope)
@@ -81,7 +84,7 @@ _ONE_BY_ONE = frozenset({"sum", "min", "max", "sorted"})
 
 
 def call(
-    run: Runner, function: ModelValue, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span
+    run: Interpreter, function: ModelValue, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span
 ) -> ModelValue:
     """Call a function, with evaluated arguments."""
     run.budget.step(span)
@@ -114,7 +117,7 @@ def call(
     raise fail("wrong-type", f"{describe(function)} cannot be called", span, "not a function")
 
 
-def _call(run: Runner, node: ast.Call, scope: Environment) -> ModelValue:
+def _call(run: Interpreter, node: ast.Call, scope: Environment) -> ModelValue:
     function = evaluate(run, node.function, scope)
     arguments = _arguments(run, node.arguments, scope)
     if arguments.choice is not None:
@@ -122,7 +125,7 @@ def _call(run: Runner, node: ast.Call, scope: Environment) -> ModelValue:
     return call(run, function, arguments.positional, arguments.named, node.span)
 
 
-def _call_each(run: Runner, function: ModelValue, choice: Choice, span: Span) -> ModelValue:
+def _call_each(run: Interpreter, function: ModelValue, choice: Choice, span: Span) -> ModelValue:
     """`f(*list)` of a random list: an empty list has no scene, as in Scenic, where it is rejected."""
 
     def now(items: ModelValue) -> ModelValue:
@@ -136,14 +139,14 @@ def _call_each(run: Runner, function: ModelValue, choice: Choice, span: Span) ->
     return each_existing(run, choice, now, span)
 
 
-def _tuple(run: Runner, node: ast.Tuple, scope: Environment) -> ModelValue:
+def _tuple(run: Interpreter, node: ast.Tuple, scope: Environment) -> ModelValue:
     items = _items(run, node.items, scope)
     if run.version == 1 and not scope.library and len(items) == 2 and node.span.text.startswith("("):
         return lift(lambda low, high: interval(low, high, node.span), *items)
     return lift(lambda *values: tuple(values), *items)
 
 
-def _items(run: Runner, nodes: Iterable[ast.Expression], scope: Environment) -> list[ModelValue]:
+def _items(run: Interpreter, nodes: Iterable[ast.Expression], scope: Environment) -> list[ModelValue]:
     items: list[ModelValue] = []
     for node in nodes:
         value = evaluate(run, node.value if isinstance(node, ast.Starred) else node, scope)
@@ -151,7 +154,7 @@ def _items(run: Runner, nodes: Iterable[ast.Expression], scope: Environment) -> 
     return items
 
 
-def _compare_chain(run: Runner, node: ast.ComparisonChain, scope: Environment) -> ModelValue:
+def _compare_chain(run: Interpreter, node: ast.ComparisonChain, scope: Environment) -> ModelValue:
     left = evaluate(run, node.left, scope)
     results: list[ModelValue] = []
     for comparison in node.comparisons:
@@ -186,7 +189,7 @@ def _unary(op: str, value: ModelValue, span: Span) -> ModelValue:
     return plain_unary(op, value, span)
 
 
-def evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelValue:
+def evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> ModelValue:
     """The value of an expression.
 
     Args:
@@ -208,7 +211,7 @@ _MAKERS = (ast.Call, ast.BinaryOp, ast.Subscript, ast.List, ast.Tuple, ast.Compr
 """Expressions that make a new value of some length, or go through one."""
 
 
-def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelValue:
+def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> ModelValue:
     span = node.span
     match node:
         case ast.Name():
@@ -278,7 +281,7 @@ def _evaluate(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             return construct(run, node, scope, lambda part: evaluate(run, part, scope))
 
 
-def _attribute(run: Runner, value: ModelValue, node: ast.Attribute, scope: Environment) -> ModelValue:
+def _attribute(run: Interpreter, value: ModelValue, node: ast.Attribute, scope: Environment) -> ModelValue:
     if value is None and isinstance(node.value, ast.Attribute):
         owner, lacked = evaluate(run, node.value.value, scope), node.value.name
         if isinstance(owner, NetworkElement):
@@ -297,7 +300,7 @@ def _attribute(run: Runner, value: ModelValue, node: ast.Attribute, scope: Envir
     return found
 
 
-def _dictionary(run: Runner, node: ast.Dict, scope: Environment) -> dict[ModelValue, ModelValue]:
+def _dictionary(run: Interpreter, node: ast.Dict, scope: Environment) -> dict[ModelValue, ModelValue]:
     table: dict[ModelValue, ModelValue] = {}
     for item in node.items:
         value = evaluate(run, item.value, scope)

@@ -8,10 +8,9 @@ between ways of different numbers of steps, each for the distances that have it.
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from scenicq.compiler.coerce import to_scalar, to_vector
-from scenicq.compiler.environment import Budget
 from scenicq.compiler.operators import direction_at, oriented
 from scenicq.compiler.step_counts import FEWEST, LONGEST, StepCount
 from scenicq.compiler.values import Instance, ModelValue, fail
@@ -19,7 +18,10 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import ArithmeticOp, Constant, Node, Select
-from scenicq.geometry.network import Network
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+    from scenicq.compiler.placing import SpecifierContext
 
 __all__ = ["follow"]
 
@@ -29,17 +31,13 @@ MOST_KNOWN = 2_000
 """Steps of the longest way whose length is known."""
 
 
-class _Reader(Protocol):
-    version: int
-    budget: Budget
-    network: Network
-
-
-def follow(run: _Reader, field: ModelValue, start: ModelValue, distance: ModelValue, span: Span) -> Instance:
+def follow(
+    run: Interpreter | SpecifierContext, field: ModelValue, start: ModelValue, distance: ModelValue, span: Span
+) -> Instance:
     """The oriented point at the end of the way, with the field's direction there.
 
     Args:
-        run: The interpreter, for the version of Scenic and what the program may still use.
+        run: The interpreter, or what specifiers know of it.
         field: A vector field, or anything with a heading.
         start: Where to start.
         distance: Metres along the field, backwards where negative.
@@ -55,7 +53,7 @@ def follow(run: _Reader, field: ModelValue, start: ModelValue, distance: ModelVa
     return oriented(position, heading)
 
 
-def _later(run: _Reader, field: ModelValue) -> ModelValue:
+def _later(run: Interpreter | SpecifierContext, field: ModelValue) -> ModelValue:
     """The field as it counts after the first step: steps along the road may leave it."""
     along_road = isinstance(field, Constant) and field.value is run.network.roadDirection
     return build.constant(run.network.followedDirection, field.span) if along_road else field

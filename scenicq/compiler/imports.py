@@ -6,8 +6,6 @@ go up from the package of the file that has them, and a module that is still bei
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-
 from scenicq.compiler.builtins import language_names
 from scenicq.compiler.constructs import operator_functions
 from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
@@ -26,7 +24,7 @@ from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
 from scenicq.compiler.unread import NoValue
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
-from scenicq.errors import Diagnostic, Note, ScenarioError, Span
+from scenicq.errors import Diagnostic, Note, ScenarioError, Span, similar
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 
@@ -136,9 +134,9 @@ class Modules:
             raise fail("unknown-name", f"`{module.name}` has no `{alias.path}` yet: it is imported in a circle",
                        alias.span, "not found",
                        (f"`import {module.name}` takes its names when they are used",))  # fmt: skip
-        close = get_close_matches(alias.path, sorted(module.names), 1, 0.75)
+        close = similar(alias.path, module.names)
         raise fail("unknown-name", f"`{module.name}` has no `{alias.path}`", alias.span, "not found",
-                   tuple(f"it has `{name}`" for name in close))  # fmt: skip
+                   (f"it has `{close}`",) if close else ())  # fmt: skip
 
     def _is_there(self, name: str) -> bool:
         return is_dynamic(name) or is_package(name) or bool(libraries_of(name)) or self._files.find(name) is not None

@@ -27,7 +27,7 @@ from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import decided
 from scenicq.compiler.logic import condition
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition
-from scenicq.compiler.placing import Surroundings, bind
+from scenicq.compiler.placing import SpecifierContext, bind
 from scenicq.compiler.requirements import RequireStatement, requirement
 from scenicq.compiler.scoping import own_names
 from scenicq.compiler.specifiers import construct
@@ -82,7 +82,14 @@ class Interpreter:
         initial: Whether dynamic parts are ignored rather than refused.
         imports: Runs an import or model statement; the environment takes the names.
         network: The road network.
+        budget: What the program may still use.
+        objects: The objects made so far.
+        params: Global parameters: value, place, whether a library sets it.
+        excluded: Outcomes of random choices that no scene has.
+        lookups: What the program asks about places of the map.
         timed: Takes what is said about time; None for a program that is matched at one instant.
+        course: Decides the tests of a condition on the scene while one is evaluated: there, no value of an object is
+            known before a label tells it. None while the program itself runs.
     """
 
     version: int
@@ -105,7 +112,11 @@ class Interpreter:
     # --- what expressions ask for
 
     def ego(self, span: Span) -> Instance:
-        """The ego; see `Runner`."""
+        """The ego.
+
+        Raises:
+            ScenarioError: no-ego, where none is defined yet.
+        """
         if self.current_ego is None:
             example = "ego = new Car" if self.version == 3 else "ego = Car"
             raise fail("no-ego", "the ego is used before it is defined", span, "refers to the ego",
@@ -113,7 +124,7 @@ class Interpreter:
         return self.current_ego
 
     def name_value(self, name: str, value: ModelValue, scope: Environment, span: Span) -> None:
-        """Give a name a value; see `Runner`."""
+        """Give a name a value; an object's first name becomes its own."""
         if isinstance(value, Delayed):
             raise fail("wrong-type", "this needs the position of an object", span, "no object here",
                        ("use it in a specifier, or write `F at V`",))  # fmt: skip
@@ -134,7 +145,7 @@ class Interpreter:
         self.current_ego = value
 
     def evaluate(self, node: ast.Expression, scope: Environment) -> ModelValue:
-        """The value of an expression; see `Runner`."""
+        """The value of an expression."""
         return evaluate(self, node, scope)
 
     def demand(self, condition: Callable[[], Node], span: Span) -> None:
@@ -144,7 +155,7 @@ class Interpreter:
     def call_function(
         self, function: Function, args: list[ModelValue], named: Mapping[str, ModelValue], span: Span
     ) -> ModelValue:
-        """Call a function; see `Runner`."""
+        """Call a function."""
         given = bind_arguments(function, args, named, span)
         if isinstance(function, MonitorDefinition):
             return MonitorCall(function, given)
@@ -177,12 +188,12 @@ class Interpreter:
         scope: Environment,
         span: Span,
     ) -> Function:
-        """Make a function; see `Runner`."""
+        """Make a function, evaluating the defaults of its parameters."""
         given = {p.name: evaluate(self, p.default, scope) for p in parameters if p.default is not None}
         return Function(name, parameters, given, body, scope, span)
 
     def make_instance(self, node: ast.New, scope: Environment) -> Instance:
-        """Make a point, oriented point or object; see `Runner`."""
+        """Make a point, oriented point or object."""
         cls = evaluate(self, node.cls, scope)
         if isinstance(cls, Choice):
             raise fail("unsupported-construct", "an object of a random class is not supported", node.cls.span,
@@ -197,7 +208,7 @@ class Interpreter:
         self, cls: ScenicClass, specifiers: tuple[ast.Specifier, ...], scope: Environment, span: Span
     ) -> Instance:
         is_object = cls.derives_from("Object")
-        around = Surroundings(
+        around = SpecifierContext(
             self.version,
             self.ego,
             lambda: self.workspace,

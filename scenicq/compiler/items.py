@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, is_random
@@ -14,13 +14,15 @@ from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import kind_of_model, to_vector
 from scenicq.compiler.comparisons import compare, iterate
 from scenicq.compiler.courses import option_of
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.known_properties import decided
 from scenicq.compiler.region_attributes import corner
 from scenicq.compiler.values import Choice, ModelValue, Module, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.geometry.elements import NetworkElement
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["components", "is_vector", "items_of", "length_of", "subscript"]
 
@@ -35,13 +37,13 @@ def is_vector(value: ModelValue) -> bool:
     return is_node(value) and kind_of_model(value) == "vector"
 
 
-def components(run: Runner, vector: ModelValue, span: Span) -> tuple[ModelValue, ...]:
+def components(run: Interpreter, vector: ModelValue, span: Span) -> tuple[ModelValue, ...]:
     """The coordinates of a vector, in Scenic 3 with its height."""
     plane = tuple(build.coordinate(to_vector(vector, span), axis, span) for axis in (0, 1))
     return (*plane, 0.0) if run.version == 3 else plane
 
 
-def items_of(run: Runner, value: ModelValue, span: Span) -> list[ModelValue]:
+def items_of(run: Interpreter, value: ModelValue, span: Span) -> list[ModelValue]:
     """The items of a known sequence or of a vector.
 
     Raises:
@@ -50,7 +52,7 @@ def items_of(run: Runner, value: ModelValue, span: Span) -> list[ModelValue]:
     return list(components(run, value, span)) if is_vector(value) else iterate(option_of(run, value, span), span)
 
 
-def _index_on_course(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
+def _index_on_course(run: Interpreter, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
     """The index that the course takes among those that a value has.
 
     Raises:
@@ -68,7 +70,7 @@ def _index_on_course(run: Runner, value: ModelValue, index: ModelValue, span: Sp
     raise fail("map-lacks", "there is no item with this random index", span, "not found")
 
 
-def subscript(run: Runner, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
+def subscript(run: Interpreter, value: ModelValue, index: ModelValue, span: Span) -> ModelValue:
     """`value[index]`.
 
     Raises:

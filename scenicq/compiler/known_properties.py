@@ -8,11 +8,11 @@ about what a label observes (`courses`), nor for how objects move, of which a cl
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from scenicq.compiler.builtins import truth
 from scenicq.compiler.coerce import kind_of_model
 from scenicq.compiler.courses import as_test
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.values import ModelValue, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -21,10 +21,13 @@ from scenicq.forest.nodes import Constant, Feature, Node, Value
 from scenicq.forest.unobserved import MOTION
 from scenicq.forest.walk import features, postorder
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["decided", "settled"]
 
 
-def settled(run: Runner, value: ModelValue) -> ModelValue:
+def settled(run: Interpreter, value: ModelValue) -> ModelValue:
     """A value with known properties of objects put in, if that leaves nothing random; else the value itself."""
     if run.course is not None or not is_node(value) or isinstance(value, Constant):
         return value
@@ -51,7 +54,7 @@ def settled(run: Runner, value: ModelValue) -> ModelValue:
     return _put_in(value, known) or value
 
 
-def _definition(run: Runner, key: tuple[int, str]) -> Node | None:
+def _definition(run: Interpreter, key: tuple[int, str]) -> Node | None:
     """What the program says of a property, as far as it is an expression or a plain value."""
     instance = run.objects[key[0]]
     if key[1] in MOTION and key[1] not in instance.explicit:
@@ -75,7 +78,7 @@ def _put_in(node: Node, known: Mapping[tuple[int, str], Constant | None]) -> Con
     return found if isinstance(found, Constant) else None
 
 
-def decided(run: Runner, value: ModelValue, span: Span) -> bool:
+def decided(run: Interpreter, value: ModelValue, span: Span) -> bool:
     """The truth of a condition on which the program's course depends.
 
     Raises:

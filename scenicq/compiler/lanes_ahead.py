@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import heapq
 import math
+from typing import TYPE_CHECKING
 
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.geometry.elements import Lane
 from scenicq.geometry.regions import PolygonSet
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["lanes_ahead"]
 
 
-def lanes_ahead(run: Runner, lane: Lane, distance: ModelValue, span: Span) -> PolygonSet:
+def lanes_ahead(run: Interpreter, lane: Lane, distance: ModelValue, span: Span) -> PolygonSet:
     """A lane and all lanes that it leads to which begin at most so far behind its end.
 
     Args:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random
@@ -15,7 +16,7 @@ from scenicq.compiler.builtins import truth
 from scenicq.compiler.choices import distribute, is_choice
 from scenicq.compiler.coerce import kind_of_model, to_boolean
 from scenicq.compiler.courses import as_test, split
-from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.environment import Environment
 from scenicq.compiler.known_properties import decided
 from scenicq.compiler.values import Delayed, ModelValue, fail, is_node
 from scenicq.errors import Span
@@ -23,10 +24,13 @@ from scenicq.forest.nodes import Constant
 from scenicq.syntax import ast
 from scenicq.syntax.walk import walk
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["condition", "connected", "inverted"]
 
 
-def condition(run: Runner, node: ast.Expression, scope: Environment) -> ModelValue:
+def condition(run: Interpreter, node: ast.Expression, scope: Environment) -> ModelValue:
     """The value of an expression of which only the truth counts."""
     match node:
         case ast.BoolOp():
@@ -40,7 +44,7 @@ def condition(run: Runner, node: ast.Expression, scope: Environment) -> ModelVal
             return run.evaluate(node, scope)
 
 
-def _operand(run: Runner, node: ast.Expression, scope: Environment) -> ModelValue:
+def _operand(run: Interpreter, node: ast.Expression, scope: Environment) -> ModelValue:
     """The truth of an operand, with all its courses."""
     found = split(run, lambda: to_boolean(condition(run, node, scope), node.span), node.span)
     return found.value if isinstance(found, Constant) and isinstance(found.value, bool) else found
@@ -51,13 +55,13 @@ def inverted(value: ModelValue, span: Span) -> ModelValue:
     return operators.combine("not", [value], span) if is_random(value) else not truth(value, span)
 
 
-def connected(run: Runner, node: ast.BoolOp, scope: Environment) -> ModelValue:
+def connected(run: Interpreter, node: ast.BoolOp, scope: Environment) -> ModelValue:
     """The value of `a and b` or `a or b`: the operand that decides, else the last one."""
     values = (run.evaluate(part, scope) for part in node.values)
     return _deciding(run, node.operator, _until_decided(run, node.operator, values, node.span), node.span)
 
 
-def _until_decided(run: Runner, op: str, values: Iterable[ModelValue], span: Span) -> list[ModelValue]:
+def _until_decided(run: Interpreter, op: str, values: Iterable[ModelValue], span: Span) -> list[ModelValue]:
     """Operands up to the first known one that decides: Python does not evaluate the others.
 
     What one of them lacks excludes scenes in which those before do not decide.
@@ -84,7 +88,7 @@ def _joined(op: str, values: list[ModelValue], span: Span) -> ModelValue:
     return operators.combine(op, pending, span)
 
 
-def _deciding(run: Runner, op: str, values: list[ModelValue], span: Span) -> ModelValue:
+def _deciding(run: Interpreter, op: str, values: list[ModelValue], span: Span) -> ModelValue:
     """The operand that Python would take.
 
     Raises:

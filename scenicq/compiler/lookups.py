@@ -13,11 +13,10 @@ their sections, groups and roads together.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.element_lookups import LOOKUPS, LookupTable, own
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.known_properties import settled
 from scenicq.compiler.values import Choice, ModelValue, fail
 from scenicq.errors import Span
@@ -25,10 +24,15 @@ from scenicq.forest.nodes import Constant, Vector
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.network import Network
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["among", "look_up"]
 
 
-def look_up(run: Runner, network: Network, name: str, point: ModelValue, reject: ModelValue, span: Span) -> ModelValue:
+def look_up(
+    run: Interpreter, network: Network, name: str, point: ModelValue, reject: ModelValue, span: Span
+) -> ModelValue:
     """`network.laneAt(point)` and its like.
 
     Args:
@@ -49,7 +53,7 @@ def look_up(run: Runner, network: Network, name: str, point: ModelValue, reject:
 
 
 def among(
-    run: Runner, elements: Sequence[NetworkElement], name: str, point: ModelValue, reject: ModelValue, span: Span
+    run: Interpreter, elements: Sequence[NetworkElement], name: str, point: ModelValue, reject: ModelValue, span: Span
 ) -> ModelValue:
     """The same among some elements only, as in `road.laneAt(point)`."""
     key = (name, tuple(element.id for element in elements))
@@ -58,7 +62,7 @@ def among(
 
 
 def _at(
-    run: Runner,
+    run: Interpreter,
     key: object,
     table: LookupTable,
     point: ModelValue,

@@ -8,14 +8,13 @@ over time has no meaning at one instant. The driving domain itself has CARLA's c
 from __future__ import annotations
 
 import sys
-from difflib import get_close_matches
 from functools import cache
 from importlib import resources
 
 from scenicq.compiler.builtins import mathematics
 from scenicq.compiler.elements import MANEUVER_TYPES
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
-from scenicq.errors import ScenarioError, Source, Span
+from scenicq.errors import ScenarioError, Source, Span, similar
 from scenicq.forest import build
 from scenicq.geometry.elements import (
     Intersection,
@@ -173,8 +172,8 @@ def plain_module(name: str, span: Span) -> Module:
             raise fail("unsupported-construct", f"`{name}` is not supported: labels are matched in 2D", span,
                        "shapes in space", ("give objects a `width` and a `length` instead of a shape",))  # fmt: skip
         case _:
-            close = get_close_matches(name, sorted(_LIBRARIES), 1, 0.6)
-            nearest = (f"`{close[0]}` is the nearest that is known",) if close else ()
+            close = similar(name, _LIBRARIES)
+            nearest = (f"`{close}` is the nearest that is known",) if close else ()
             raise fail("unknown-model", f"`{name}` is not a model or module known here", span, "not found",
                        (*nearest,
                         "known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "

@@ -26,13 +26,13 @@ from scenicq.forest.nodes import Constant, Feature, Index, Node, PointIn, Region
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 
-__all__ = ["Surroundings", "bind"]
+__all__ = ["SpecifierContext", "bind"]
 
 Evaluate = Callable[[ast.Expression], ModelValue]
 
 
 @dataclass(slots=True, eq=False)
-class Surroundings:
+class SpecifierContext:
     """What specifiers refer to besides their arguments.
 
     Attributes:
@@ -92,7 +92,7 @@ def _position(span: Span, value: ModelValue, heading: ModelValue = None) -> Boun
     return _specifier(span, "position", evaluate, value, optionally="heading" if heading is not None else "")
 
 
-def _inherited(origin: ModelValue, around: Surroundings, span: Span) -> ModelValue:
+def _inherited(origin: ModelValue, around: SpecifierContext, span: Span) -> ModelValue:
     """The heading that Scenic 3 takes over from an oriented origin; Scenic 1 and 2 take none."""
     if around.version < 3 or not (isinstance(origin, Instance) and origin.oriented):
         return None
@@ -105,7 +105,7 @@ def _own_position(instance: Instance, position: Node, span: Span) -> Node:
 
 
 def _in_region(
-    span: Span, region: ModelValue, around: Surroundings, *, contained: bool = False, modifies: bool = False
+    span: Span, region: ModelValue, around: SpecifierContext, *, contained: bool = False, modifies: bool = False
 ) -> BoundSpecifier:
     on_object = isinstance(region, Instance) and region.index is not None and around.version == 3
     area = operators.object_box(region, span) if on_object else operators.existing(region, span)
@@ -180,7 +180,7 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
 
 
 def _visible(
-    node: ast.VisibleSpecifier | ast.NotVisibleSpecifier, viewer: ModelValue, around: Surroundings
+    node: ast.VisibleSpecifier | ast.NotVisibleSpecifier, viewer: ModelValue, around: SpecifierContext
 ) -> BoundSpecifier:
     """`visible`, `not visible`: up to Scenic 2 about the position; in 3 also about the object, however placed."""
     span, hidden = node.span, isinstance(node, ast.NotVisibleSpecifier)
@@ -206,7 +206,7 @@ def _visible(
 
 
 def _beyond(
-    node: ast.BeyondSpecifier, target: ModelValue, by: ModelValue, origin: ModelValue, around: Surroundings
+    node: ast.BeyondSpecifier, target: ModelValue, by: ModelValue, origin: ModelValue, around: SpecifierContext
 ) -> BoundSpecifier:
     span = node.span
     goal = to_vector(target, span)
@@ -279,7 +279,7 @@ def _apparently(span: Span, heading: ModelValue, origin: ModelValue, version: in
     return _specifier(span, "heading", evaluate, heading, needs=needs)
 
 
-def bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> BoundSpecifier:
+def bind(node: ast.Specifier, evaluate: Evaluate, around: SpecifierContext) -> BoundSpecifier:
     """The specifier that a syntax node stands for, with its arguments evaluated.
 
     Args:
@@ -308,7 +308,7 @@ def _as_parent(bound: BoundSpecifier) -> BoundSpecifier:
     return replace(bound, optionally=bound.optionally - {"heading"} | {"parentOrientation"}, evaluate=evaluate)
 
 
-def _bind_each(node: ast.Specifier, values: dict[int, ModelValue], around: Surroundings) -> BoundSpecifier:
+def _bind_each(node: ast.Specifier, values: dict[int, ModelValue], around: SpecifierContext) -> BoundSpecifier:
     """The specifier for each outcome of a random choice of objects among its arguments, as one."""
     choice = next((value for value in values.values() if holds_instances(value)), None)
     if choice is None:
@@ -332,7 +332,7 @@ def _bind_each(node: ast.Specifier, values: dict[int, ModelValue], around: Surro
     return BoundSpecifier(options[0].gives, optional, needs, chosen, node.span)
 
 
-def _with(node: ast.WithSpecifier, value: ModelValue, around: Surroundings) -> BoundSpecifier:
+def _with(node: ast.WithSpecifier, value: ModelValue, around: SpecifierContext) -> BoundSpecifier:
     name = FIRST_NAMES.get(node.property, node.property) if around.version == 1 else node.property
     if leaves_the_plane(name, value):
         raise fail("unsupported-construct", f"`with {name}` is not supported", node.span, "labels are matched in 2D",
@@ -343,7 +343,7 @@ def _with(node: ast.WithSpecifier, value: ModelValue, around: Surroundings) -> B
     )
 
 
-def _bind(node: ast.Specifier, evaluate: Evaluate, around: Surroundings) -> BoundSpecifier:
+def _bind(node: ast.Specifier, evaluate: Evaluate, around: SpecifierContext) -> BoundSpecifier:
     span = node.span
 
     def origin(expression: ast.Expression | None) -> ModelValue:

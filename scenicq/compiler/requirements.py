@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from scenicq.compiler.coerce import to_boolean
 from scenicq.compiler.courses import split
-from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.environment import Environment
 from scenicq.compiler.logic import condition
-from scenicq.compiler.temporal import TimedStatements, is_temporal
-from scenicq.compiler.values import Delayed, Instance, ModelValue, fail
+from scenicq.compiler.temporal import is_temporal
+from scenicq.compiler.values import Delayed, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Node
 from scenicq.syntax import ast
 
-__all__ = ["RequireStatement", "Requirer", "deferred", "requirement"]
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
+__all__ = ["RequireStatement", "deferred", "requirement"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,14 +31,7 @@ class RequireStatement:
     probability: float = 1.0
 
 
-class Requirer(Runner, Protocol):
-    """What a requirement asks of the interpreter."""
-
-    current_ego: Instance | None
-    timed: TimedStatements | None
-
-
-def requirement(run: Requirer, node: ast.Require, scope: Environment) -> RequireStatement | None:
+def requirement(run: Interpreter, node: ast.Require, scope: Environment) -> RequireStatement | None:
     """The requirement that a statement makes; None where it is about time and ignored.
 
     Raises:
@@ -57,7 +53,7 @@ def requirement(run: Requirer, node: ast.Require, scope: Environment) -> Require
     return RequireStatement(deferred(run, wanted, scope, node.span), node.span, probability)
 
 
-def deferred(run: Requirer, wanted: ast.Expression, scope: Environment, span: Span) -> Callable[[], Node]:
+def deferred(run: Interpreter, wanted: ast.Expression, scope: Environment, span: Span) -> Callable[[], Node]:
     """What computes a condition, once the ego is known, over the names that the program has now."""
     names: dict[str, ModelValue] = {}
     current = scope
@@ -88,7 +84,7 @@ def deferred(run: Requirer, wanted: ast.Expression, scope: Environment, span: Sp
     return held
 
 
-def _probability(run: Runner, node: ast.Expression, scope: Environment) -> float:
+def _probability(run: Interpreter, node: ast.Expression, scope: Environment) -> float:
     value = run.evaluate(node, scope)
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
         raise fail("wrong-value", "a probability must be a known number from 0 to 1", node.span)

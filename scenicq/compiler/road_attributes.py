@@ -11,11 +11,10 @@ those that reach into it. What depends on facts that no map of a dataset holds i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from shapely.geometry import LineString
 
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.values import ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -37,6 +36,9 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
 from scenicq.geometry.road_direction import along_lines
 from scenicq.geometry.shapes import Shape
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["is_worked_out", "names_worked_out", "worked_out"]
 
@@ -239,7 +241,7 @@ def names_worked_out(value: NetworkElement | Network) -> set[str]:
     return found | {f"_{name}" for name in found & _UNDERSCORED}
 
 
-def worked_out(run: Runner, value: NetworkElement | Network, name: str, span: Span) -> tuple[ModelValue] | None:
+def worked_out(run: Interpreter, value: NetworkElement | Network, name: str, span: Span) -> tuple[ModelValue] | None:
     """An attribute that is worked out, in a tuple of its own; None for any other.
 
     Raises:

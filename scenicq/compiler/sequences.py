@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cmp_to_key
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random, plain_binary
@@ -16,7 +16,6 @@ from scenicq.compiler.builtins import extreme, language_names, truth
 from scenicq.compiler.choices import each_option
 from scenicq.compiler.coerce import kind_of_model, to_scalar
 from scenicq.compiler.comparisons import compare
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector, items_of
 from scenicq.compiler.known_properties import decided, settled
@@ -25,6 +24,9 @@ from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail,
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
 __all__ = ["sequence_functions"]
 
 
@@ -32,7 +34,7 @@ def _plain(value: ModelValue) -> ModelValue:
     return value.value if isinstance(value, Constant) else value
 
 
-def sequence_functions(run: Runner) -> dict[str, ModelValue]:
+def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
     """The functions, by name.
 
     Args:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from scenicq.compiler.choices import make_choice
 from scenicq.compiler.coerce import to_node
@@ -17,7 +17,10 @@ from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, Sc
 from scenicq.errors import Diagnostic, Note, ScenarioError, Span
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Constant, DirectionAt, Feature, Index, Node
 
-__all__ = ["BoundSpecifier", "SpecifierEvaluator", "construct"]
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
+__all__ = ["BoundSpecifier", "construct"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,19 +52,7 @@ class BoundSpecifier:
     perhaps: bool = False
 
 
-class SpecifierEvaluator(Protocol):
-    """What construction asks of the interpreter."""
-
-    def default(self, definition: PropertyDefinition, instance: Instance) -> ModelValue:
-        """The value of a property's default for an instance."""
-        ...
-
-    def demand(self, condition: Callable[[], Node], span: Span) -> None:
-        """Require a condition, which can be made once all objects are there."""
-        ...
-
-
-def _default_specifier(name: str, chain: list[PropertyDefinition], evaluator: SpecifierEvaluator) -> BoundSpecifier:
+def _default_specifier(name: str, chain: list[PropertyDefinition], evaluator: Interpreter) -> BoundSpecifier:
     first = chain[0]
     additive = "additive" in first.modifiers
     used = chain if additive else chain[:1]
@@ -118,7 +109,7 @@ def _choose(specifiers: Iterable[BoundSpecifier]) -> dict[str, BoundSpecifier]:
 def construct(
     instance: Instance,
     specifiers: tuple[BoundSpecifier, ...],
-    evaluator: SpecifierEvaluator,
+    evaluator: Interpreter,
 ) -> None:
     """Fill an instance's properties (language paper, algorithm 1).
 

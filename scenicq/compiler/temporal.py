@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from scenicq.compiler.coerce import read_over_time
-from scenicq.compiler.environment import Runner
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.values import fail
 from scenicq.errors import Span
@@ -33,6 +32,9 @@ from scenicq.forest.temporal import (
 from scenicq.forest.walk import postorder
 from scenicq.syntax import ast
 from scenicq.syntax.walk import walk
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["Behaviors", "Deferred", "TimedStatements", "is_temporal"]
 
@@ -88,7 +90,7 @@ class TimedStatements:
         self._conditions.append(condition)
         return Atom(len(self._conditions) - 1)
 
-    def dynamics(self, run: Runner) -> tuple[Dynamics | None, list[tuple[Node, Span]]]:
+    def dynamics(self, run: Interpreter) -> tuple[Dynamics | None, list[tuple[Node, Span]]]:
         """What has been collected, None for a static program; and what of it excludes scenes, whatever the sample.
 
         Where a condition asks for something that is not there, Scenic rejects the run when it reads the condition:

@@ -7,14 +7,18 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 from scenicq.compiler.arithmetic import LARGEST
-from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.environment import Environment
 from scenicq.compiler.known_properties import settled
 from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
 from scenicq.syntax import ast
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["checked_text", "formatted"]
 
@@ -33,7 +37,7 @@ def checked_text(text: str, span: Span) -> str:
     return text
 
 
-def formatted(run: Runner, node: ast.FormattedString, scope: Environment) -> str:
+def formatted(run: Interpreter, node: ast.FormattedString, scope: Environment) -> str:
     """The text of an f-string.
 
     Raises:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, cast
+from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.assignment import assign
 from scenicq.compiler.courses import without_courses
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.items import items_of
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition, graph_of
-from scenicq.compiler.requirements import Requirer, deferred
+from scenicq.compiler.requirements import deferred
 from scenicq.compiler.temporal import TimedStatements
 from scenicq.compiler.values import describe, fail
 from scenicq.errors import Diagnostic, Span
 from scenicq.forest.nodes import Node
 from scenicq.syntax import ast
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["leave_out", "timed_statement"]
 
@@ -30,14 +33,8 @@ _STEP_S = 0.1
 """Seconds of a step, where the program sets no `time_step`."""
 
 
-class Timer(Requirer, Protocol):
-    """What statements about time ask of the interpreter."""
-
-    ignored: list[Diagnostic]
-
-
 def timed_statement(
-    run: Timer, timed: TimedStatements, node: ast.DynamicStatement | ast.DynamicDefinition | ast.RequireMonitor,
+    run: Interpreter, timed: TimedStatements, node: ast.DynamicStatement | ast.DynamicDefinition | ast.RequireMonitor,
     scope: Environment,
 ) -> None:  # fmt: skip
     """Read a statement about time.
@@ -101,7 +98,7 @@ def leave_out(timed: TimedStatements, ignored: list[Diagnostic], kind: str, span
     ignored.append(Diagnostic("unsupported-construct", message, span, "left out", severity="warning"))
 
 
-def _watch(run: Timer, timed: TimedStatements, call: MonitorCall, span: Span) -> None:
+def _watch(run: Interpreter, timed: TimedStatements, call: MonitorCall, span: Span) -> None:
     """Require a monitor with values of its parameters."""
     scope = Environment(dict(call.given), cast(Environment, call.monitor.environment))
     body = cast("tuple[ast.Statement, ...]", call.monitor.body)
@@ -125,7 +122,7 @@ def _watch(run: Timer, timed: TimedStatements, call: MonitorCall, span: Span) ->
     timed.watch(graph_of(timed, body, scope, conditions, rounds, seconds, span))
 
 
-def _seconds(run: Timer, node: ast.DynamicStatement, scope: Environment) -> float:
+def _seconds(run: Interpreter, node: ast.DynamicStatement, scope: Environment) -> float:
     """The time of `terminate after` or `wait for`, in seconds."""
     assert node.operand is not None
     value = run.evaluate(node.operand, scope)

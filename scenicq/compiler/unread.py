@@ -8,13 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from scenicq.compiler.choices import NothingLeftError
-from scenicq.compiler.environment import Environment, Runner
+from scenicq.compiler.environment import Environment
 from scenicq.compiler.values import Function, ModelValue, ScenicClass
 from scenicq.errors import ScenarioError
 from scenicq.syntax import ast
 from scenicq.syntax.walk import walk
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["NoValue", "computed", "read"]
 
@@ -26,7 +30,9 @@ class NoValue:
     error: ScenarioError
 
 
-def computed(run: Runner, node: ast.Expression, scope: Environment, compute: Callable[[], ModelValue]) -> ModelValue:
+def computed(
+    run: Interpreter, node: ast.Expression, scope: Environment, compute: Callable[[], ModelValue]
+) -> ModelValue:
     """The value that a statement gives a name.
 
     Args:
@@ -49,7 +55,7 @@ def computed(run: Runner, node: ast.Expression, scope: Environment, compute: Cal
     return value
 
 
-def read(run: Runner, value: ModelValue) -> ModelValue:
+def read(run: Interpreter, value: ModelValue) -> ModelValue:
     """A value whose name is read.
 
     Raises:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
 from collections.abc import Iterable, Iterator
@@ -10,7 +9,7 @@ from functools import cache
 
 from scenicq.compiler.models import library_texts
 from scenicq.compiler.roots import root_classes
-from scenicq.errors import Diagnostic, Span
+from scenicq.errors import Diagnostic, Span, similar
 from scenicq.syntax import ast
 from scenicq.syntax.walk import children, walk
 
@@ -226,8 +225,8 @@ def _unused(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
             continue
         if isinstance(target, ast.Name) and target.id not in read | told | _READ_BY_MODELS and target.id[0] != "_":
             told.add(target.id)
-            near = difflib.get_close_matches(target.id, sorted(read), n=1)
-            hints = (f"`{near[0]}` is read, and spelled nearly like it",) if near else ()
+            near = similar(target.id, read)
+            hints = (f"`{near}` is read, and spelled nearly like it",) if near else ()
             yield _warning("unused-variable", f"nothing uses `{target.id}`", target.span, "set here", *hints)
 
 
@@ -247,8 +246,8 @@ def _unknown_properties(nodes: Iterable[ast.SyntaxNode]) -> Iterator[Diagnostic]
     known |= {node.name for node in nodes if isinstance(node, ast.Attribute)}
     for node in nodes:
         if isinstance(node, ast.WithSpecifier) and node.property not in known:
-            near = difflib.get_close_matches(node.property, sorted(known), n=1)
-            hints = [f"`{near[0]}` is spelled nearly like it"] if near else []
+            near = similar(node.property, known)
+            hints = [f"`{near}` is spelled nearly like it"] if near else []
             hints.append("where it is an attribute of labels, `scenicq check SCENARIO DATASET` says so")
             message = f"no class has a property `{node.property}`, and nothing reads it"
             yield _warning("unknown-property", message, node.property_span, "set here", *hints)

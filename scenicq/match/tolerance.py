@@ -11,13 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from functools import cached_property
 from typing import Literal, TypeAlias
 
 import shapely
 
-from scenicq.errors import DataError, Diagnostic
+from scenicq.errors import DataError, Diagnostic, similar
 from scenicq.forest.nodes import Undefined, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.angles import distance
@@ -233,8 +232,8 @@ def _shown(scope: str, name: str, size: float) -> str:
 
 
 def _unknown(word: str, why: str, known: Iterable[str]) -> DataError:
-    close = get_close_matches(word, sorted(known), n=1)
-    hint = f"`{close[0]}` has a similar name" if close else _SHAPE
+    close = similar(word, known)
+    hint = f"`{close}` has a similar name" if close else _SHAPE
     return DataError(Diagnostic("option-invalid", f"`{word}` in the tolerance is {why}", hints=(hint,)))
 
 

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
 from scenicq.syntax.tokens import CLOSERS, Token
 
-__all__ = ["MAX_DEPTH", "Cursor", "similar"]
+__all__ = ["MAX_DEPTH", "Cursor"]
 
 MAX_DEPTH = 220
 """How deep the parser may call itself; each pair of brackets takes one or two levels."""
-
-
-def similar(word: str, words: list[str]) -> str:
-    """The word that a misspelt one was probably meant to be, or nothing."""
-    return next(iter(get_close_matches(word, words, n=1, cutoff=0.7)), "")
 
 
 class Cursor:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Literal
 
-from scenicq.errors import ScenarioError, Source
+from scenicq.errors import ScenarioError, Source, similar
 from scenicq.syntax import ast
 from scenicq.syntax.atoms import AtomParser
-from scenicq.syntax.cursor import similar
 from scenicq.syntax.precedence import POWER
 from scenicq.syntax.tokens import INFIX_NAMES, Token
 

@@ -6,7 +6,6 @@ what no label has is named with its line, what labels have instead, and a name s
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import json
 from collections.abc import Collection, Iterable, Iterator
@@ -14,7 +13,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from scenicq.errors import Diagnostic, Span
+from scenicq.errors import Diagnostic, Span, similar
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import MOTION
@@ -283,7 +282,7 @@ def _warning(
     else:
         message = f"`{each.what}` is never compared: no label of {kind} in the dataset has it"
         have = f"the labels have of {kind}: {', '.join(known) or 'class and position alone'}"
-    near = [name for name in difflib.get_close_matches(each.name, [*known, *_COLUMNS], n=1) if name != each.name]
-    absent = "" if not near or near[0] in known else ", which the labels do not have either"
-    hints = (have, *(f"`{name}` is spelled nearly like it{absent}" for name in near))
+    near = similar(each.name, {*known, *_COLUMNS} - {each.name})
+    absent = "" if near in known else ", which the labels do not have either"
+    hints = (have, *([f"`{near}` is spelled nearly like it{absent}"] if near else []))
     return Diagnostic("never-compared", message, each.span, each.told, hints=hints, severity="warning")
