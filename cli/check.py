@@ -10,11 +10,11 @@ from typing import Literal
 
 import click
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import DataError, Diagnostic, ScenarioError, ScenicqError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.show import show_forest
+from scenicq.geometry.default_street import street
 from scenicq.geometry.network import Network
 from scenicq.lint.impossible import impossible_requirements
 from scenicq.lint.program import lint

@@ -20,10 +20,10 @@ from pathlib import Path
 import pytest
 from drawing import draw_scene
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import CODES, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
+from scenicq.geometry.default_street import street
 from scenicq.lint.program import lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance

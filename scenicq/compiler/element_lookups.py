@@ -10,13 +10,13 @@ from typing import TypeAlias, cast
 
 from shapely.geometry import Polygon
 
-from scenicq.compiler.occupancy import TOLERANCE, Layer, Occupancy, Ranked
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, Feature, Index, Node, Select
 from scenicq.geometry import shapes
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.network import Network
+from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Layer, Occupancy
 
 __all__ = ["LOOKUPS", "LookupEntry", "LookupTable", "Lookups", "own"]
 
@@ -136,7 +136,7 @@ class Lookups:
         scale = build.constant(float(options.scale), span)
 
         def number(rank: int) -> Node:
-            angle = DirectionAt(build.constant(Ranked(options, rank), span), place, span=span)
+            angle = DirectionAt(build.constant(ElementAtPoint(options, rank), span), place, span=span)
             return build.arithmetic(ArithmeticOp.MUL, angle, scale, span=span)
 
         if options.depth == 1:

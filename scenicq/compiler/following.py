@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 from scenicq.compiler.coerce import to_scalar, to_vector
 from scenicq.compiler.operators import direction_at, oriented
-from scenicq.compiler.step_counts import FEWEST, LONGEST, StepCount
 from scenicq.compiler.values import Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import ArithmeticOp, Constant, Node, Select
+from scenicq.forest.step_counts import FEWEST, LONGEST, StepCount
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter

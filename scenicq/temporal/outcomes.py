@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from scenicq.compiler.occupancy import Ranked
 from scenicq.forest.condition import condition, expand
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, Select
@@ -18,6 +17,7 @@ from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.simplify import rebuilt, roots_of
 from scenicq.forest.temporal import Atom, TemporalRequirement
 from scenicq.forest.walk import children, deciding_first, features, leaves, postorder, transform
+from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import WitnessValue
 from scenicq.temporal.hidden import has_cuts
@@ -98,7 +98,9 @@ def _choice(scenario: Scenario) -> tuple[Leaf, range] | None:
 
 def _is_hidden_lookup(node: Node) -> bool:
     return any(
-        isinstance(each, DirectionAt) and isinstance(each.field, Constant) and isinstance(each.field.value, Ranked)
+        isinstance(each, DirectionAt)
+        and isinstance(each.field, Constant)
+        and isinstance(each.field.value, ElementAtPoint)
         for each in (node, *children(node))
     ) and bool(leaves(node))
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from shapely.affinity import translate
 from shapely.geometry import mapping
 
-from scenicq.compiler.default_street import street
+from scenicq.geometry.default_street import street
 from scenicq.geometry.features import LINES, REFERENCES, MapFeature, names
 from scenicq.importers.base import Entry, Labels
 from scenicq.importers.report import Report
@@ -52,7 +52,7 @@ KINDS: tuple[tuple[str, str, float, tuple[float, float, float]], ...] = (
 
 
 def fleet_map() -> tuple[MapFeature, ...]:
-    """The crossing of `scenicq.compiler.default_street`, repeated in a grid."""
+    """The crossing of `scenicq.geometry.default_street`, repeated in a grid."""
     features = street().features
     return tuple(
         _moved(feature, f"{column}{row}-", column * PITCH_M, row * PITCH_M)

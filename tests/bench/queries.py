@@ -22,9 +22,9 @@ sys.path.insert(0, str(ROOT / "tests" / "compiler"))
 
 from hostile import END, HOSTILE, TOO_LONG  # noqa: E402
 
-from scenicq.compiler.default_street import street  # noqa: E402
 from scenicq.compiler.program import compile_scenario  # noqa: E402
 from scenicq.errors import ScenarioError, Source  # noqa: E402
+from scenicq.geometry.default_street import street  # noqa: E402
 
 RECORDINGS = ROOT.parent / "shared" / "data" / "boston"
 RESULTS = ROOT / "bench-results"

@@ -8,11 +8,11 @@ from functools import cache
 
 from drawing import draw_scene
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.improvise import Scene
 from scenicq.forest.scenario import Scenario
+from scenicq.geometry.default_street import street
 from scenicq.geometry.network import Network
 
 Vector = tuple[float, float]

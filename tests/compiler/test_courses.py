@@ -4,12 +4,12 @@ import random
 
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.condition import condition
 from scenicq.forest.nodes import Constant
 from scenicq.forest.walk import features
+from scenicq.geometry.default_street import street
 
 HEAD = """model scenic.domains.driving.model
 ego = new Car in everywhere, facing Range(0, 360) deg

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.geometry.default_street import street
 from scenicq.query.execution.program_files import sibling_loader
 
 Files = dict[str, str]

@@ -3,9 +3,9 @@
 import pytest
 
 from scenicq.compiler import program
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.geometry.default_street import street
 
 HEAD = "model scenic.domains.driving.model\nego = new Car\n"
 REFUSED = {

@@ -13,13 +13,13 @@ import shapely
 from drawing import draw_scene
 
 from scenicq.compiler.element_lookups import LOOKUPS, Lookups
-from scenicq.compiler.occupancy import Ranked
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.nodes import Constant, DirectionAt, PointIn
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
 from scenicq.geometry.network import Network
+from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT
@@ -170,14 +170,16 @@ def test_overlapping_elements_are_each_allowed_and_one_at_a_time() -> None:
     )
 
 
-def fields(lookup: str) -> list[Ranked]:
+def fields(lookup: str) -> list[ElementAtPoint]:
     """The fields of a look-up at a random place of the street."""
     program = compiled(f"{HEADER}ego = new Car\nx = network.{lookup}(ego, reject=True)\n")
     return [
         node.field.value
         for requirement in program.requirements
         for node in postorder((requirement.condition,))
-        if isinstance(node, DirectionAt) and isinstance(node.field, Constant) and isinstance(node.field.value, Ranked)
+        if isinstance(node, DirectionAt)
+        and isinstance(node.field, Constant)
+        and isinstance(node.field.value, ElementAtPoint)
     ]
 
 

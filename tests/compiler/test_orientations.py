@@ -6,12 +6,12 @@ import math
 
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import Constant, DirectionAt, Node, Range, Select
 from scenicq.forest.walk import postorder
+from scenicq.geometry.default_street import street
 
 MODEL = "model scenic.domains.driving.model\nego = new Car\n"
 

@@ -32,7 +32,7 @@ from shrinking import shrink
 from sifting import Drawing, sifted
 from wrong_lines import WRONG, WRONG_ON_ROADS
 
-from scenicq.compiler.default_street import street
+from scenicq.geometry.default_street import street
 from scenicq.geometry.features import read_geojson
 from scenicq.geometry.network import Network
 from scenicq.smt.solver import open_solver

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.evaluate.ranking import log_densities, sample_diverse, sample_plain
 from scenicq.forest.improvise import Improviser, Scene
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.areas import area
+from scenicq.geometry.default_street import street
 from scenicq.geometry.regions import Disc, PolygonSet, PolylineSet, Rectangle, Sector, difference, intersection, union
 from scenicq.geometry.sampling import sampler
 from scenicq.match.verdict import Match

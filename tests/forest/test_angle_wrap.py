@@ -8,7 +8,6 @@ import random
 import pytest
 from drawing import draw_scene
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest import build
@@ -16,6 +15,7 @@ from scenicq.forest.angle_wrap import any_turn, one_turn
 from scenicq.forest.improvise import Scene
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Range
 from scenicq.forest.scenario import Scenario
+from scenicq.geometry.default_street import street
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT

@@ -15,7 +15,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from expressions import expressions
 from test_intervals import observing
 
-from scenicq.compiler.default_street import street
 from scenicq.forest import build
 from scenicq.forest.column_domain import ColumnDomain
 from scenicq.forest.columns import (
@@ -58,6 +57,7 @@ from scenicq.forest.nodes import (
     VectorOf,
     VectorSum,
 )
+from scenicq.geometry.default_street import street
 from scenicq.geometry.membership import contains, contains_many, distance
 from scenicq.geometry.regions import Disc, Rectangle, Sector
 

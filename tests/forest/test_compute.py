@@ -8,7 +8,6 @@ from contextlib import suppress
 
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.forest.compute import CannotEvaluate, compute, directions
 from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
@@ -40,6 +39,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children
+from scenicq.geometry.default_street import street
 from scenicq.geometry.regions import Disc, Rectangle
 
 STREET = street()

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest import improvise
@@ -21,6 +20,7 @@ from scenicq.forest.improvise import Improviser
 from scenicq.forest.inline import assemble
 from scenicq.forest.nodes import Constant, Identity, Leaf, TruncatedNormal, Undefined, Value
 from scenicq.forest.scenario import BuiltIn, Scenario
+from scenicq.geometry.default_street import street
 from scenicq.geometry.regions import Disc, Rectangle, UnionOf
 
 STREET = street()

@@ -15,7 +15,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from drawing import draw_scene
 from expressions import expressions, near
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest import build
@@ -45,6 +44,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.show import show
 from scenicq.forest.simplify import simplify
 from scenicq.forest.walk import features, leaves, postorder, transform
+from scenicq.geometry.default_street import street
 from scenicq.geometry.membership import contains
 from scenicq.geometry.regions import PolygonSet
 

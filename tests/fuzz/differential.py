@@ -17,9 +17,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenicqError, Source
+from scenicq.geometry.default_street import street
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance, parse_tolerance
 from scenicq.match.verdict import NoMatch, Unknown

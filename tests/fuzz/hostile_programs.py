@@ -115,9 +115,9 @@ def attempt(text: str) -> str:
     Raises:
         Exception: Something that is our own mistake.
     """
-    from scenicq.compiler.default_street import street
     from scenicq.compiler.program import compile_scenario
     from scenicq.errors import ScenicqError, Source
+    from scenicq.geometry.default_street import street
     from scenicq.match.matcher import Matcher
     from scenicq.match.options import MatchOptions
     from scenicq.store.labels import Label, LabelObject

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.scenario import Scenario
+from scenicq.geometry.default_street import street
 from scenicq.geometry.features import read_geojson
 from scenicq.geometry.network import Network
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.errors import DataError, Source
+from scenicq.geometry.default_street import street
 from scenicq.importers.base import Labels
 from scenicq.importers.ingest import ingest
 from scenicq.importers.report import Report

@@ -3,9 +3,9 @@
 import pytest
 from click.testing import CliRunner
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
+from scenicq.geometry.default_street import street
 from scenicq.lint.impossible import impossible_requirements
 from scenicq_cli.main import cli
 

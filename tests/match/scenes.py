@@ -7,11 +7,11 @@ from dataclasses import replace
 
 from drawing import draw_scene
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest.improvise import Scene
 from scenicq.forest.scenario import Scenario
+from scenicq.geometry.default_street import street
 from scenicq.geometry.network import Network
 from scenicq.store.classes import is_class
 from scenicq.store.labels import Label, LabelObject

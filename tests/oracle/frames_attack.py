@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "fuzz"))
 from frames import Maker, Program, Scene, Thing, TooManyError, random_scene, unmatched_answers
 from rounds import Round, cpu_seconds
 
-from scenicq.compiler.default_street import street
 from scenicq.errors import ScenarioError, Source
+from scenicq.geometry.default_street import street
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import NoMatch, Unknown

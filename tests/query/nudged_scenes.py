@@ -9,10 +9,10 @@ from pathlib import Path
 
 from drawing import draw_scene
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.geometry.angles import normalize
+from scenicq.geometry.default_street import street
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset

@@ -41,8 +41,8 @@ LAYERS = ("compiler", "forest", "geometry", "match", "query", "smt", "store", "t
 LIMIT = re.compile(r"_?(MOST|FEW|FEWEST|DEEPEST|LONGEST|LARGEST|MAX)(_[A-Z]+)*$")
 AT_ONCE = re.compile(r"_?([A-Z]+_)*(AT_ONCE|BATCH|CHUNK|HALVES|RETRIES|STEPS|TRIES)$")
 FACTS = {
-    "scenicq.compiler.step_counts.FEWEST": "how many steps Scenic takes",
-    "scenicq.compiler.step_counts.LONGEST": "how long Scenic's steps are",
+    "scenicq.forest.step_counts.FEWEST": "how many steps Scenic takes",
+    "scenicq.forest.step_counts.LONGEST": "how long Scenic's steps are",
     "scenicq.query.explain.nearest_miss.MOST_M": "how far `--near` looks",
     "scenicq.store.camera_rows.LARGEST_IMAGE": "what an image may be",
     "scenicq.store.manifest._LARGEST": "what the file may say",

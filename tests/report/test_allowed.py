@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import shapely
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.exporters.sample import sample_labels
+from scenicq.geometry.default_street import street
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT

@@ -2,9 +2,9 @@
 
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.geometry.default_street import street
 
 EGO_3, EGO_2 = "ego = new Car\n", "ego = Car on road\n"
 

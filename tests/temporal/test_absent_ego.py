@@ -2,8 +2,8 @@
 
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.errors import Source
+from scenicq.geometry.default_street import street
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.run import Query, QueryOptions

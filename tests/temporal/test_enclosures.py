@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).parents[1] / "forest"))
 from expressions import expressions
 
-from scenicq.compiler.default_street import street
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
@@ -32,6 +31,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import transform
+from scenicq.geometry.default_street import street
 from scenicq.geometry.regions import Rectangle
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.enclosures import certainly, unchanging

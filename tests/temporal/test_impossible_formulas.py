@@ -7,9 +7,9 @@ import random
 
 from interval_definition import Condition, holds, random_formula, text_of
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.geometry.default_street import street
 from scenicq.geometry.network import Network
 
 OPEN = Condition("(ego.position.x > 0)", lambda *_: None)

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest.nodes import Compare, Constant
 from scenicq.forest.walk import postorder
+from scenicq.geometry.default_street import street
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.runs import Runs

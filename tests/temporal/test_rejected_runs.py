@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from interval_definition import Sample, recording_of
 
-from scenicq.compiler.default_street import street
 from scenicq.errors import Source
+from scenicq.geometry.default_street import street
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import pytest
 from interval_definition import Sample, recording_of
 
-from scenicq.compiler.default_street import street
 from scenicq.errors import Source
+from scenicq.geometry.default_street import street
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.run import Query, QueryOptions

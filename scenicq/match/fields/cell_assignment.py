@@ -13,13 +13,13 @@ from typing import cast
 
 import numpy as np
 
-from scenicq.compiler.occupancy import Ranked
 from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn, Value
 from scenicq.geometry.cell_guards import half_planes
 from scenicq.geometry.fields import FieldCell, VectorField
+from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.fields.contractor import BoxSet
@@ -221,7 +221,9 @@ def _cells(cases: BoxSet, number: int, node: DirectionAt) -> tuple[Bounds, list[
 def _cells_in(field: VectorField, heading: float, box: Bounds) -> list[FieldCell]:
     """Where in a box a field may have a heading."""
     found: list[FieldCell] = []
-    for whole in field.cells_of(heading, box) if isinstance(field, Ranked | RoadDirection) else field.cells(box):
+    for whole in (
+        field.cells_of(heading, box) if isinstance(field, ElementAtPoint | RoadDirection) else field.cells(box)
+    ):
         cell = whole.part(box) if abs(whole.heading - heading) <= SAME and _meets(whole, box) else None
         if cell is not None:
             found.append(cell)

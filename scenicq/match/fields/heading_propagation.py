@@ -14,11 +14,11 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.compiler.occupancy import Ranked
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn
 from scenicq.forest.walk import leaves
 from scenicq.geometry import shapes
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.geometry.regions import SLACK, PointSet, PolygonSet, PolylineSet
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
@@ -224,7 +224,7 @@ def _pieces(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray
     gap = np.diff(heading, prepend=-np.inf)
     gap[first] = np.inf
     apart = gap > _POINT
-    if not isinstance(cast(Constant, node.field).value, Ranked):
+    if not isinstance(cast(Constant, node.field).value, ElementAtPoint):
         # a number of an option is near no other; headings are parted evenly
         low, high = np.full(cases.size, np.inf), np.full(cases.size, -np.inf)
         np.minimum.at(low, owner, heading)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from scenicq.compiler.free_places import choose_elements
-from scenicq.compiler.step_counts import choose_steps
+from scenicq.forest.free_places import choose_elements
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import simplify
+from scenicq.forest.step_counts import choose_steps
 
 __all__ = ["ready"]
 

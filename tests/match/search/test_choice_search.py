@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.geometry.default_street import street
 from scenicq.geometry.membership import contains
 from scenicq.geometry.network import Network
 from scenicq.importers.base import read_maps

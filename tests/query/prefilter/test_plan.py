@@ -13,9 +13,9 @@ import pytest
 from drawing import draw_scene
 from shapely.geometry import LineString
 
-from scenicq.compiler.default_street import street
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
+from scenicq.geometry.default_street import street
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions

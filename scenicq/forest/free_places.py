@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import cast
 
-from scenicq.compiler.occupancy import Occupancy, Ranked
 from scenicq.forest import build
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import (
@@ -26,6 +25,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import rebuilt, roots_of
 from scenicq.forest.walk import children, postorder, transform
+from scenicq.geometry.occupancy import ElementAtPoint, Occupancy
 from scenicq.geometry.regions import Everywhere, PolygonSet
 
 __all__ = ["choose_elements"]
@@ -60,7 +60,7 @@ def _free_places(roots: list[Node]) -> dict[Identity, tuple[Occupancy, Constant]
                 continue
             field = node.field if isinstance(node, DirectionAt) else None
             ranked = field.value if isinstance(field, Constant) else None
-            if not (isinstance(ranked, Ranked) and isinstance(child.region, Constant)):
+            if not (isinstance(ranked, ElementAtPoint) and isinstance(child.region, Constant)):
                 others.add(child.identity)
                 continue
             known = found.setdefault(child.identity, (ranked.options, child.region))

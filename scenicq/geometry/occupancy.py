@@ -28,7 +28,7 @@ from scenicq.geometry.network import TOLERANCE
 from scenicq.geometry.regions import SLACK
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["TOLERANCE", "Layer", "Occupancy", "OptionArea", "Ranked"]
+__all__ = ["TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea"]
 
 _OVERLAP = 1e-6
 """Square metres that two elements may share without counting as overlapping."""
@@ -274,7 +274,7 @@ class Occupancy:
 
 
 @dataclass(frozen=True, eq=False)
-class Ranked:
+class ElementAtPoint:
     """One of the options at each point, by its rank among them: a vector field whose angles number the options."""
 
     options: Occupancy
