@@ -14,6 +14,7 @@ from shapely.geometry import Point
 from scenicq.geometry import shapes
 from scenicq.geometry.closest import closest_point
 from scenicq.geometry.membership import contains, distance
+from scenicq.geometry.outlines import disc_outline
 from scenicq.geometry.regions import (
     SLACK,
     DifferenceOf,
@@ -163,10 +164,9 @@ def _inner(term: Term) -> XY | None:
     """A point well inside a term, from polygons inscribed in its circles, if these leave an area."""
     rest = term.clip
     for circle in term.inside:
-        rest = shapes.intersection(rest, shapes.disc_polygon(circle.x, circle.y, circle.radius))
+        rest = shapes.intersection(rest, disc_outline(circle.x, circle.y, circle.radius, "inner"))
     for circle in term.outside:
-        # 1 / cos(pi / 64) makes the polygon of 64 corners surround the circle
-        rest = shapes.difference(rest, shapes.disc_polygon(circle.x, circle.y, circle.radius * 1.0013))
+        rest = shapes.difference(rest, disc_outline(circle.x, circle.y, circle.radius, "outer"))
     pieces = shapes.polygonal_part(rest)
     if not pieces:
         return None

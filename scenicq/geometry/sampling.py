@@ -19,6 +19,7 @@ from scenicq.budget import look
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction, rotate
 from scenicq.geometry.membership import bounds, contains
+from scenicq.geometry.outlines import disc_outline, sector_outline
 from scenicq.geometry.regions import (
     DifferenceOf,
     Disc,
@@ -138,9 +139,9 @@ def _straightened(term: Term) -> shapes.Shape:
     """A shape that holds a term, with polygons for its circles."""
     shape = term.clip
     for circle in term.inside:
-        shape = shapes.intersection(shape, _fan((circle.x, circle.y), circle.radius, 0.0, math.tau))
+        shape = shapes.intersection(shape, disc_outline(circle.x, circle.y, circle.radius, "outer"))
     for circle in term.outside:
-        shape = shapes.difference(shape, shapes.disc_polygon(circle.x, circle.y, circle.radius))
+        shape = shapes.difference(shape, disc_outline(circle.x, circle.y, circle.radius, "inner"))
     return shape
 
 
@@ -199,22 +200,11 @@ def _window(region: Region) -> shapes.Shape | None:
     """A polygon that holds a disc or sector, with little to spare; None for other regions."""
     match region:
         case Disc():
-            return _fan(region.center, region.radius, 0.0, math.tau)
+            return disc_outline(*region.center, region.radius, "outer")
         case Sector():
-            return _fan(region.center, region.radius, region.heading, min(region.angle, math.tau))
+            return sector_outline(region, "outer")
         case _:
             return None
-
-
-_STEPS = 64
-
-
-def _fan(center: XY, radius: float, heading: float, angle: float) -> shapes.Shape:
-    reach = radius / math.cos(angle / _STEPS / 2) + 1e-6
-    first = heading - angle / 2
-    rim = [direction(first + angle * step / _STEPS) for step in range(_STEPS + 1)]
-    ring = [(center[0] + reach * x, center[1] + reach * y) for x, y in rim]
-    return shapes.polygon(ring[:-1] if angle >= math.tau else [center, *ring])
 
 
 def _filtered(source: Region, region: Region) -> _Proposal | None:

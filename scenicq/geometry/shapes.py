@@ -251,11 +251,6 @@ def inner_point(shape: Shape) -> XY:
     return float(found[0, 0]), float(found[0, 1])
 
 
-def disc_polygon(x: float, y: float, radius: float, quarter: int = 16) -> Shape:
-    """A polygon inscribed in a circle."""
-    return cast(Shape, shapely.buffer(Point(x, y), radius, quad_segs=quarter))
-
-
 QUARTER_SEGMENTS = 16
 """Sides of the polygon that stands for a quarter of a circle in `grown`."""
 

@@ -18,9 +18,9 @@ from scenicq.forest.nodes import Constant, Distance, Node, Norm, Scale, VectorSu
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
 from scenicq.geometry import shapes
+from scenicq.geometry.outlines import outline
 from scenicq.geometry.regions import Region
 from scenicq.geometry.shapes import XY, Bounds
-from scenicq.report.outlines import outline
 from scenicq.report.placement import Placement
 from scenicq.report.svg import Plane, element
 

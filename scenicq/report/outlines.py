@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import assert_never, cast
+from typing import cast
 
 import shapely
 
@@ -40,32 +40,20 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import children, features, postorder
 from scenicq.geometry import shapes
-from scenicq.geometry.angles import direction
+from scenicq.geometry.outlines import clip, outline
 from scenicq.geometry.regions import (
-    DifferenceOf,
     Disc,
-    Everywhere,
-    IntersectionOf,
-    Nowhere,
-    PointSet,
-    PolygonSet,
-    PolylineSet,
-    Rectangle,
     Region,
     Sector,
-    UnionOf,
 )
 from scenicq.geometry.shapes import Bounds, Shape
-from scenicq.geometry.terms import rectangle_shape
 from scenicq.query.explain.violations import choices
 
-__all__ = ["PossibleArea", "allowed_headings", "allowed_place", "outline", "views"]
+__all__ = ["PossibleArea", "allowed_headings", "allowed_place", "views"]
 
 _MOST_RANGES = 6
 _THIN = 0.2
 """Metres around what has no area, so that it can be seen."""
-_STEP = math.tau / 128
-"""Radians between the corners of an arc; they lie outside of it, so that its inside is drawn whole."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,54 +69,6 @@ class PossibleArea:
     shapes: tuple[Shape, ...]
     exact: bool
     fixed: bool
-
-
-def _arc(x: float, y: float, radius: float, start: float, angle: float) -> list[tuple[float, float]]:
-    count = max(2, math.ceil(angle / _STEP))
-    far = radius / math.cos(angle / count / 2)
-    turns = [start + angle * number / count for number in range(count + 1)]
-    return [(x + far * dx, y + far * dy) for dx, dy in map(direction, turns)]
-
-
-def outline(region: Region, bounds: Bounds) -> list[Shape]:
-    """Shapes whose union is the region within bounds (metres); arcs are drawn a little outside of themselves."""
-    match region:
-        case Everywhere():
-            return [shapes.box(*bounds)]
-        case Nowhere():
-            return []
-        case Disc():
-            return _cut([shapes.polygon(_arc(*region.center, region.radius, 0.0, math.tau))], bounds)
-        case Sector():
-            start = region.heading - region.angle / 2
-            if region.angle >= math.tau:
-                return outline(Disc(region.center, region.radius), bounds)
-            corners = [region.center, *_arc(*region.center, region.radius, start, region.angle)]
-            return _cut([shapes.polygon(corners)], bounds)
-        case Rectangle():
-            return _cut([rectangle_shape(region)], bounds)
-        case PolygonSet() | PolylineSet() | PointSet():
-            return _cut(region.near(bounds), bounds)
-        case UnionOf():
-            return [piece for part in region.parts for piece in outline(part, bounds)]
-        case IntersectionOf():
-            found = [shapes.box(*bounds)]
-            for part in region.parts:
-                inside = outline(part, bounds)
-                whole = inside[0] if len(inside) == 1 else shapes.union_all(inside)
-                found = [cut for piece in found if not (cut := shapes.intersection(piece, whole)).is_empty]
-            return found
-        case DifferenceOf():
-            removed = shapes.union_all(outline(region.removed, bounds))
-            base = outline(region.base, bounds)
-            return [cut for piece in base if not (cut := shapes.difference(piece, removed)).is_empty]
-        case _:
-            assert_never(region)
-
-
-def _cut(pieces: list[Shape], bounds: Bounds) -> list[Shape]:
-    cut: list[Shape] = shapes.intersections(pieces, shapes.box(*bounds))
-    return [piece for piece in cut if not piece.is_empty]
 
 
 def _visible(pieces: list[Shape]) -> tuple[Shape, ...]:
@@ -179,7 +119,7 @@ def _reach(root: Node, bounds: Bounds) -> tuple[list[Shape], bool] | None:
         ]
         if all(isinstance(corner, tuple) for corner in corners):
             hull = shapely.convex_hull(shapely.multipoints(cast("list[tuple[float, float]]", corners)))
-            return _cut([hull], bounds), True
+            return clip([hull], bounds), True
     (west, east), (south, north) = vector_bounds(root)
     box = (max(west, bounds[0]), max(south, bounds[1]), min(east, bounds[2]), min(north, bounds[3]))
     if box == bounds:

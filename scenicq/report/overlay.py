@@ -13,9 +13,10 @@ from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import features
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction
+from scenicq.geometry.outlines import outline
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.verdict import Match, Verdict
-from scenicq.report.outlines import allowed_headings, allowed_place, outline, views
+from scenicq.report.outlines import allowed_headings, allowed_place, views
 from scenicq.report.scene import Role, box_of, observed_by
 from scenicq.report.svg import Plane, area_path, element, escape, points_path
 

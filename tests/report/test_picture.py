@@ -12,13 +12,14 @@ import pytest
 import shapely
 
 from scenicq.geometry.boxes import corners
+from scenicq.geometry.outlines import outline
 from scenicq.geometry.regions import DifferenceOf, Disc, IntersectionOf, PolygonSet, Rectangle, Sector, UnionOf
 from scenicq.match.verdict import Match
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.distances import draw_distances, measured_distances
-from scenicq.report.outlines import allowed_headings, allowed_place, outline
+from scenicq.report.outlines import allowed_headings, allowed_place
 from scenicq.report.picture import Shot, caption, draw, view_of
 from scenicq.report.placement import Placement
 from scenicq.report.png import can_make_png, png
