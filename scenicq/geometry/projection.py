@@ -11,12 +11,16 @@ from shapely import STRtree
 
 from scenicq.budget import look
 from scenicq.geometry import shapes
-from scenicq.geometry.membership import nearest_point
+from scenicq.geometry.membership import bounds, contains_many, nearest_point
+from scenicq.geometry.outlines import outline
 from scenicq.geometry.regions import Everywhere, PointSet, PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.geometry.shapes import Bounds, Coordinates
-from scenicq.geometry.terms import UndecidedError
+from scenicq.geometry.terms import UndecidedError, overlap
 
 __all__ = ["nearest_points"]
+
+_SEVERAL = 4
+"""Points from which on it takes less time to make polygons for a region than to ask it about each."""
 
 
 def nearest_points(region: Region, xy: Coordinates, near: Bounds) -> Coordinates:
@@ -42,7 +46,7 @@ def nearest_points(region: Region, xy: Coordinates, near: Bounds) -> Coordinates
             case Everywhere():
                 return xy
             case _:
-                found = _one_by_one(part, xy)
+                found = _of_outline(part, xy, near)
         _take_nearer(xy, found, best, least)
     for each in sets:
         _take_nearer(xy, _of_pieces(*_pieces(each, near), xy), best, least)
@@ -71,6 +75,28 @@ def _of_pieces(tree: STRtree, pieces: NDArray[Any], xy: Coordinates) -> Coordina
         points = shapes.points(xy)
         owner, piece, _ = shapes.tree_nearest(tree, points)
         found[owner] = shapes.nearest_of(pieces[piece], points[owner])
+    return found
+
+
+@lru_cache(maxsize=64)
+def _outline(region: Region, near: Bounds) -> tuple[STRtree, NDArray[Any]] | None:
+    """Polygons, lines and points that hold a region within a box; None where neither has an end."""
+    west, south, east, north = overlap(near, bounds(region))
+    if not np.isfinite([west, south, east, north]).all():
+        return None
+    pieces = outline(region, (west, south, east, north)) if west <= east and south <= north else []
+    return STRtree(pieces), shapes.array(pieces)
+
+
+def _of_outline(region: Region, xy: Coordinates, near: Bounds) -> Coordinates:
+    """The nearest points by polygons that hold the region; exactly where these are not of the region."""
+    held = _outline(region, near) if len(xy) >= _SEVERAL else None
+    if held is None:
+        return _one_by_one(region, xy)
+    found = _of_pieces(*held, xy)
+    there = np.flatnonzero(~np.isnan(found[:, 0]))
+    beyond = there[~contains_many(region, found[there])]
+    found[beyond] = _one_by_one(region, xy[beyond])
     return found
 
 
