@@ -9,6 +9,9 @@ PYTEST := $(BIN)/python -m pytest -q -p no:cacheprovider
 LINTED := scenicq cli tests sample_data
 FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/search/test_backtracking.py
 
+# The tests start hundreds of processes: without bytecode each compiles 300 files of ours, which takes 0.7 s.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo lint check test test-all test-oldest test-newest golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames oracle-time mutate browser dreal clean
 
