@@ -34,6 +34,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Share out the cases of `one_in`. What is slow is slower still on a busy machine: only what hangs is stopped."""
     cases: Counter[str] = Counter()
     for item in items:
+        _fewer_examples(item)
         sampled = item.get_closest_marker("one_in")
         if sampled is not None:
             name = item.nodeid.partition("[")[0]
@@ -42,6 +43,30 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             cases[name] += 1
         if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(_HANGS_S))
+
+
+_FEWER = 4
+"""How many times fewer rounds a sweep makes where slow tests are left out."""
+
+
+def _leaves_out_slow(config: pytest.Config) -> bool:
+    return "not slow" in config.getoption("markexpr")
+
+
+def _fewer_examples(item: pytest.Item) -> None:
+    """Hypothesis draws all examples that a test asks for in `make test-all`."""
+    test = getattr(getattr(item, "obj", None), "__func__", getattr(item, "obj", None))
+    asked = getattr(test, "_hypothesis_internal_use_settings", None)
+    if asked is not None and _leaves_out_slow(item.config) and not hasattr(test, "fewer_examples"):
+        test.fewer_examples = True
+        test._hypothesis_internal_use_settings = settings(asked, max_examples=-(-asked.max_examples // _FEWER))
+
+
+@pytest.fixture(scope="session")
+def rounds(request: pytest.FixtureRequest) -> Callable[[int], int]:
+    """How many of so many rounds a sweep makes: all in `make test-all`."""
+    fewer = _FEWER if _leaves_out_slow(request.config) else 1
+    return lambda number: -(-number // fewer)
 
 
 @pytest.fixture(scope="session", autouse=True)

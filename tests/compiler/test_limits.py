@@ -77,7 +77,7 @@ def test_numbers_near_the_end_of_all_numbers_break_nothing(text, run, tmp_path, 
     file = tmp_path / "p.scenic"
     file.write_text(HEAD + text)
     for words in (
-        ["match", file, crossroads, "--jobs", "1", "--timeout", "0.5"],
+        ["match", file, crossroads, "--jobs", "1", "--timeout", "0.1"],
         ["sample", file, "-n", "1"],
         ["check", file],
     ):

@@ -133,6 +133,7 @@ def kill_often(source: Path, tmp_path: Path, kills: int, jobs: int) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.slow
 def test_three_kills(source: Path, tmp_path: Path) -> None:
     kill_often(source, tmp_path, 3, jobs=1)
 

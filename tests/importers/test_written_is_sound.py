@@ -5,8 +5,8 @@ from __future__ import annotations
 import copy
 import json
 import shutil
-from collections.abc import Iterator
-from itertools import count
+from collections.abc import Callable, Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -56,24 +56,28 @@ def with_everything(line: dict[str, Any]) -> dict[str, Any]:
     return line
 
 
+def spread(pairs: list[Any], rounds: Callable[[int], int]) -> list[Any]:
+    """All pairs of a place and a value, or of each place a share, another one than of the place before."""
+    share = 4 // rounds(4)
+    return [pair for number, pair in enumerate(pairs) if number % share == number // len(JUNK) % share]
+
+
 @pytest.mark.parametrize("columnar", [True, False])
 @pytest.mark.parametrize("alone", [True, False])
 @pytest.mark.one_in(4)
-def test_every_field_of_a_label(tmp_path, monkeypatch, columnar, alone):
+def test_every_field_of_a_label(tmp_path, monkeypatch, columnar, alone, rounds):
     """Each value in place of each field, in a recording of its own or beside sound labels."""
     if not columnar:
         monkeypatch.setattr(Interchange, "columnar", False)
     assert "columnar" in LineReader.__slots__
     source = Path(shutil.copytree(SOURCE, tmp_path / "source"))
     first = with_everything(json.loads((source / "labels.jsonl").read_text().splitlines()[0]))
-    lines, numbers = [], count()
-    for path in leaves(first):
-        for junk in JUNK:
-            number = next(numbers)
-            own = first | {"id": f"frame-{number}", "recording": f"r-{number if alone else number // 50}"}
-            own["timestamp_us"] = 1_700_000_000_000_000 + 1_000_000 * number
-            lines.append(changed(own, path, junk))
-    assert len(lines) > 1000
+    lines = []
+    for number, (path, junk) in enumerate(spread(list(product(leaves(first), JUNK)), rounds)):
+        own = first | {"id": f"frame-{number}", "recording": f"r-{number if alone else number // 50}"}
+        own["timestamp_us"] = 1_700_000_000_000_000 + 1_000_000 * number
+        lines.append(changed(own, path, junk))
+    assert len(lines) > rounds(1000)
     (source / "labels.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
     summary = ingest(source, tmp_path / "made")
     made = open_dataset(tmp_path / "made")

@@ -122,7 +122,7 @@ def compare(dataset: Dataset, chosen: list[Example]) -> tuple[list[str], int]:
 
 
 @pytest.mark.parametrize(
-    ("dataset", "step"), [("crossroads", 64), ("nuscenes_tiny", 48), ("waymo_tiny", 48)], indirect=["dataset"]
+    ("dataset", "step"), [("crossroads", 128), ("nuscenes_tiny", 96), ("waymo_tiny", 96)], indirect=["dataset"]
 )
 def test_some_programs_find_the_same(dataset: Dataset, step: int) -> None:
     anything = Example("anything", HEADER + "ego = new Car\n")

@@ -98,13 +98,13 @@ def expected(town: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     return rows(town), found
 
 
-def test_a_folder_is_no_column(town: Path, expected: tuple[Any, Any], tmp_path: Path) -> None:
+@pytest.mark.parametrize("value", ["1", pytest.param("zzz", marks=pytest.mark.slow)])
+def test_a_folder_is_no_column(value: str, town: Path, expected: tuple[Any, Any], tmp_path: Path) -> None:
     place = tmp_path / "here"
     shutil.copytree(town, place / "town")
-    for value in ("1", "zzz"):
-        for column in COLUMNS:
-            place = place.rename(tmp_path / f"{column}={value}")
-            assert rows(place / "town") == expected[0], place.name
+    for column in COLUMNS:
+        place = place.rename(tmp_path / f"{column}={value}")
+        assert rows(place / "town") == expected[0], place.name
 
 
 @pytest.mark.parametrize("value", ["1", "zzz"])
@@ -116,7 +116,7 @@ def test_nor_are_all_of_them(value: str, town: Path, expected: tuple[Any, Any], 
 
 ELSEWHERE = [f"{column}={value}" for column in COLUMNS for value in ("1", "zzz")] + [*PATTERNS, *ORDINARY]
 """Names of folders in object storage."""
-_FEW = {"class=1", "map=zzz", "frame=1", "id=1", "heading=1", "a?b", "a*b", "a[xy]b", "{a,b}", "a%3Fb", "a#b", "a b"}
+_FEW = {"class=1", "map=zzz", "a?b", "{a,b}", "a%3Fb"}
 
 
 @pytest.mark.parametrize(

@@ -103,6 +103,7 @@ terminate when (distance to spot) > 15 and (distance to lane) < 100
 """
 
 
+@pytest.mark.slow
 def test_choices_that_share_a_place_have_values_of_their_own(crossroads):
     dataset = open_dataset(crossroads)
     options = QueryOptions(solver="portable", every=True)
@@ -130,6 +131,7 @@ terminate when (distance to spot) > 40
 """
 
 
+@pytest.mark.slow
 def test_bounds_of_the_point_answer_for_samples_side_by_side(crossroads, monkeypatch):
     """The matcher is asked for them, and hardly ever for one sample and its likes."""
     asked: list[Node] = []

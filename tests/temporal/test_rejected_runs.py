@@ -98,6 +98,7 @@ terminate after 1 seconds
     assert spans(drive, program) == expected
 
 
+@pytest.mark.slow
 def test_what_the_scene_alone_lacks_excludes_the_scene(drive):
     asked = "place = Range(1, 10) @ 50\nrequire always place.x > other.position.x"
     # each end with a place on a lane, which are those up to 7 m, that holds until there and no further

@@ -20,7 +20,7 @@ def dataset(program_scenes) -> Dataset:
     return program_scenes
 
 
-@pytest.mark.parametrize("jobs", [1, 2, None])
+@pytest.mark.parametrize("jobs", [1, 2, pytest.param(None, marks=pytest.mark.slow)])
 def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
     monkeypatch.setattr("scenicq.query.execution.block_executor.as_many_as_pay", lambda: 2)
     monkeypatch.setattr("scenicq.query.execution.block_executor._PAYS_S", 0.0)

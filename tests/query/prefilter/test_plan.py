@@ -93,7 +93,7 @@ def cases():
 
 
 @pytest.mark.parametrize(("name", "options"), list(cases()))
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_the_prefilter_loses_nothing(dataset, name, options):
     text = PROGRAMS[name]
     with_it, query = found(dataset, text, OPTIONS[options], prefilter=True)
