@@ -5,7 +5,7 @@ import math
 import pytest
 from scenes import compiled
 
-from scenicq.compiler.default_street import street
+from scenicq.geometry.default_street import street
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.store.labels import Label, LabelObject
