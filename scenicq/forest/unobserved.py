@@ -109,17 +109,21 @@ class _Reader:
                 same = _joined(LogicOp.OR, _joined(LogicOp.AND, one, other),
                                _joined(LogicOp.AND, _opposite(one), _opposite(other)))  # fmt: skip
                 return same if node.op is CompareOp.EQ else _opposite(same)
-            case Compare(left=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme) if node.op in _MIRRORED:
+            case Compare(left=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme):
                 return self._of_extreme(node.op, extreme, node.right, node.span, selects)
-            case Compare(right=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme) if node.op in _MIRRORED:
-                return self._of_extreme(_MIRRORED[node.op], extreme, node.left, node.span, selects)
+            case Compare(right=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme):
+                return self._of_extreme(_MIRRORED.get(node.op, node.op), extreme, node.left, node.span, selects)
             case _:
                 return self._atom(node, reading, selects)
 
     def _of_extreme(
         self, op: CompareOp, extreme: Arithmetic, bound: Node, span: Span | None, selects: int
     ) -> Truths:  # fmt: skip
-        """The same of `min(a, b) < c` and its like: one operand, or each, must be beyond the bound."""
+        """The same of `min(a, b) < c` and its like: one operand, or each, is beyond; `==` is both ways."""
+        if op not in _MIRRORED:
+            sides = (self._of_extreme(each, extreme, bound, span, selects) for each in (CompareOp.LE, CompareOp.GE))
+            same = _joined(LogicOp.AND, *sides)
+            return same if op is CompareOp.EQ else _opposite(same)
         least, below = extreme.op is ArithmeticOp.MIN, op in (CompareOp.LT, CompareOp.LE)
         parts = [self.truths(build.compare(op, arg, bound, span), selects) for arg in extreme.args]
         return _joined(LogicOp.OR if least is below else LogicOp.AND, *parts)

@@ -76,6 +76,9 @@ def test_what_is_sure_holds_for_all_completions_and_what_is_impossible_for_none(
                  build.compare(CompareOp.LT, SEEN[0], SEEN[1]))), True, True),
         (build.compare(CompareOp.LT, build.arithmetic(ArithmeticOp.MIN, UNSEEN[0], SEEN[0]), SEEN[1]), True, True),
         (build.compare(CompareOp.GT, SEEN[0], build.arithmetic(ArithmeticOp.MAX, UNSEEN[0], SEEN[1])), False, False),
+        (build.compare(CompareOp.EQ, build.arithmetic(ArithmeticOp.MIN, UNSEEN[0], SEEN[0]), SEEN[1]), False, False),
+        (build.compare(CompareOp.NE, SEEN[0], build.arithmetic(ArithmeticOp.MAX, UNSEEN[0], SEEN[1])), True, True),
+        (build.compare(CompareOp.EQ, build.arithmetic(ArithmeticOp.MAX, UNSEEN[0], SEEN[0]), SEEN[1]), False, True),
     ],
 )  # fmt: skip
 def test_unknown_only_where_it_makes_a_difference(condition_, sure, possible):

@@ -2,9 +2,11 @@
 
 A program is made as a value that has a text and a meaning of its own; no code of the package takes part in the judging.
 A label matches if there are a correspondence, outcomes of choices and values of hidden numbers with which all that is
-compared and required holds. What a label does not observe of motion is filled in at random, many times: where two
-fillings differ, the only right answer is unknown. Numbers are whole or halves, so that bounds are hit exactly; what
-comes close to a bound without hitting it is left out, as are bounds of angles.
+compared and required holds. Hidden points are tried one in each piece of the plane that conditions cut (`arrangement`);
+a heading that a label lacks is a hidden number of which the program gives the ends. What a label does not observe of
+motion is filled in at random, many times: where two fillings differ, the only right answer is unknown. Numbers are
+whole or halves, so that bounds are hit exactly; what comes close to a bound without hitting it is left out, as are
+bounds of angles.
 """
 
 from __future__ import annotations
@@ -12,9 +14,15 @@ from __future__ import annotations
 import itertools
 import math
 import random
+import re
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Literal
+
+sys.path.insert(0, str(Path(__file__).parent))
+from arrangement import Circle, representatives
 
 Truth = bool | Literal["either"] | None
 """None: it hangs on what is not observed; "either": on rounding."""
@@ -33,7 +41,10 @@ _MOST_TRIALS = 40_000
 
 @dataclass(frozen=True)
 class Thing:
-    """A label object; None is what nobody observed. Degrees, metres, metres a second."""
+    """A label object; None is what nobody observed. Degrees, metres, metres a second.
+
+    What is filled in is not compared: a label does not observe it.
+    """
 
     category: str
     x: float
@@ -44,6 +55,9 @@ class Thing:
     ahead: float | None
     acceleration: float | None = None
     turning: float | None = None
+    point: str = ""
+    """Of a hidden point, its name."""
+    filled: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,16 +87,27 @@ def random_scene(chance: random.Random) -> Scene:
     return Scene(ego, tuple(random_thing(chance, chance.choice(kinds)) for _ in range(chance.randrange(6))))
 
 
+Curve = Circle | tuple[str, float]
+
+
 # --- worlds in which a program has a meaning
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number; whether it is exact, and the hidden number that it is with something added."""
+    """A number.
+
+    Attributes:
+        value: What it is.
+        exact: Whether it is exact.
+        hidden: The hidden number that it is with something added.
+        curve: The hidden point, and whether it is its "x" or "y", or the place from which it is the distance.
+    """
 
     value: float
     exact: bool = True
     hidden: str = ""
+    curve: tuple[str, str | tuple[float, float]] | None = None
 
 
 @dataclass
@@ -95,6 +120,7 @@ class World:
         numbers: Outcomes of choices, and hidden numbers.
         hidden: Which of these are hidden.
         breaks: Gets values of hidden numbers at which conditions change.
+        curves: Gets circles, and lines as "x" or "y" with a number, at which conditions on hidden points change.
     """
 
     things: Mapping[str, Thing]
@@ -102,6 +128,11 @@ class World:
     numbers: dict[str, float]
     hidden: frozenset[str]
     breaks: dict[str, set[float]] = field(default_factory=dict)
+    curves: dict[str, set[Curve]] = field(default_factory=dict)
+
+    def cut(self, point: str, curve: Curve) -> None:
+        """Note where something about a hidden point changes."""
+        self.curves.setdefault(point, set()).add(curve)
 
 
 @dataclass(frozen=True)
@@ -146,6 +177,12 @@ def compared(op: str, one: Number | None, other: Number | None, world: World) ->
         if mine.hidden and not rest.hidden:
             offset = mine.value - world.numbers[mine.hidden]
             world.breaks.setdefault(mine.hidden, set()).add(rest.value - offset)
+        if mine.curve is not None and rest.curve is None:
+            point, kind = mine.curve
+            if isinstance(kind, str):
+                world.cut(point, (kind, rest.value))
+            elif rest.value > 0:
+                world.cut(point, (*kind, rest.value))
     if not (one.exact and other.exact) and abs(one.value - other.value) < _CLOSE:
         return "either"
     a, b = one.value, other.value
@@ -185,13 +222,20 @@ _PROPERTIES: dict[str, Callable[[Thing], float | None]] = {
 
 
 def property_of(role: str, name: str) -> Term:
-    return Term(f"{role}.{name}", lambda world: _of(_PROPERTIES[name](world.things[role])))
+    def value(world: World) -> Number | None:
+        thing = world.things[role]
+        found = _of(_PROPERTIES[name](thing))
+        return found if found is None or not thing.point else replace(found, curve=(thing.point, name[-1]))
+
+    return Term(f"{role}.{name}", value)
 
 
 def distance(one: str, other: str) -> Term:
     def value(world: World) -> Number:
         a, b = world.things[one], world.things[other]
-        return square_root((a.x - b.x) ** 2 + (a.y - b.y) ** 2)
+        found = square_root((a.x - b.x) ** 2 + (a.y - b.y) ** 2)
+        a, b = (b, a) if b.point else (a, b)
+        return replace(found, curve=(a.point, (b.x, b.y))) if a.point and not b.point else found
 
     return Term(f"(distance from {one} to {other})", value)
 
@@ -202,7 +246,8 @@ def total(one: Term, other: Term, sign: int = 1) -> Term:
         if a is None or b is None:
             return None
         # a sum with two hidden numbers has no breaks of its own
-        return Number(a.value + sign * b.value, a.exact and b.exact, a.hidden if not b.hidden else "")
+        curve = a.curve if b.curve is None and not b.hidden else None
+        return Number(a.value + sign * b.value, a.exact and b.exact, a.hidden if not b.hidden else "", curve)
 
     return Term(f"({one.text} {'+' if sign > 0 else '-'} {other.text})", value)
 
@@ -276,23 +321,54 @@ def counted(roles: Sequence[str], about: Callable[[str], Fact], op: str, count: 
 def inside(role: str, region: Region) -> Fact:
     def truth(world: World) -> Truth:
         thing = world.things[role]
-        return region.distance_squared(thing.x, thing.y) == 0
+        if thing.point:
+            for curve in region.curves:
+                world.cut(thing.point, curve)
+        return region.within(thing.x, thing.y)
 
     return Fact(f"({role}.position in {region.text})", truth)
+
+
+def inside_drawn(role: str, name: str, options: Sequence[Region]) -> Fact:
+    """In a region that is drawn."""
+    facts = [inside(role, each) for each in options]
+
+    def truth(world: World) -> Truth:
+        for each in facts:
+            each.of(world)
+        return facts[int(world.numbers[name])].of(world)
+
+    return Fact(f"({role}.position in {name})", truth)
 
 
 def turned(one: str, other: str, degrees: float) -> Fact:
     def truth(world: World) -> Truth:
         a, b = (_heading(world, role) for role in (one, other))
-        return "either" if a is None or b is None else abs(math.remainder(a - b, 360.0)) < degrees
+        if a is None or b is None:
+            return "either"
+        for mine, rest in ((a, b), (b, a)):
+            if mine.hidden and not rest.hidden:
+                found = world.breaks.setdefault(mine.hidden, set())
+                found.update(rest.value + side * degrees + 360 * turn for side in (-1, 1) for turn in range(-2, 3))
+        off = abs(math.remainder(a.value - b.value, 360.0))
+        return "either" if abs(off - degrees) < _CLOSE or (a.hidden and b.hidden) else off < degrees
 
     return Fact(f"(abs(relative heading of {one} from {other}) < {degrees:g} deg)", truth)
 
 
-def _heading(world: World, role: str) -> float | None:
-    """The heading of a role: the label's, else that of the program if it has one alone."""
+def _heading(world: World, role: str) -> Number | None:
+    """The heading of a role: the label's, else that of the program, which may be hidden."""
     found = world.things[role].heading
-    return world.facing.get(role) if found is None else found
+    if found is not None:
+        return Number(found)
+    if (name := heading_of(role)) in world.hidden:
+        return Number(world.numbers[name], hidden=name)
+    return _of(world.facing.get(role))
+
+
+def heading_of(role: str) -> str:
+    """The name of the hidden number that the heading of a role is."""
+    return f"heading of {role}"
 
 
 # --- what a program says of objects
@@ -306,6 +382,20 @@ class Region:
     center: tuple[float, float]
     radius: float = 0.0
     half: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def curves(self) -> list[Curve]:
+        """Its edge."""
+        (x, y), (a, b) = self.center, self.half
+        return [(x, y, self.radius)] if self.radius else [("x", x - a), ("x", x + a), ("y", y - b), ("y", y + b)]
+
+    def within(self, x: float, y: float) -> Truth:
+        """Whether a point is in it."""
+        if self.radius:
+            off = math.hypot(x - self.center[0], y - self.center[1]) - self.radius
+            exact = (2 * x).is_integer() and (2 * y).is_integer()
+            return "either" if abs(off) < _CLOSE and not exact else self.distance_squared(x, y) == 0
+        return self.distance_squared(x, y) == 0
 
     def distance_squared(self, x: float, y: float) -> float:
         """To a point, 0 inside."""
@@ -329,14 +419,14 @@ class Role:
 
     Attributes:
         name, category: As in the program.
-        place: Its position: a region, two terms, or None for everywhere.
+        place: Its position: a region, the name and the options of a drawn one, two terms, or None for everywhere.
         facing: Degrees from and to; None for all.
         speed: What the program sets, None if nothing.
     """
 
     name: str
     category: str
-    place: Region | tuple[Term, Term] | None = None
+    place: Region | tuple[str, tuple[Region, ...]] | tuple[Term, Term] | None = None
     facing: tuple[float, float] | None = None
     speed: Term | tuple[float, float] | None = None
 
@@ -346,7 +436,9 @@ class Role:
         match self.place:
             case Region():
                 where = f"in {self.place.text}"
-            case (x, y):
+            case (str(name), _):
+                where = f"in {name}"
+            case (Term() as x, Term() as y):
                 where = f"at ({x.text}, {y.text})"
             case _:
                 where = "in everywhere"
@@ -366,7 +458,9 @@ class Role:
         match self.place:
             case Region():
                 found.append(self.place.near(thing.x, thing.y))
-            case (x, y):
+            case (str(name), options):
+                found.append(options[int(world.numbers[name])].near(thing.x, thing.y))
+            case (Term() as x, Term() as y):
                 found.append(self._near(world, x.of(world), y.of(world)))
             case _:
                 pass
@@ -374,7 +468,7 @@ class Role:
             low, high = self.facing
             off = math.remainder(thing.heading - (low + high) / 2, 360.0)
             found.append(abs(off) <= (high - low) / 2 + TOLERANCE_DEG)
-        if self.speed is not None and thing.speed is not None:
+        if self.speed is not None and thing.speed is not None and not thing.filled:
             found.append(self._fast(world, thing.speed))
         return both(found)
 
@@ -388,6 +482,11 @@ class Role:
                 best = world.numbers[number.hidden] + mine
                 reach = math.sqrt(TOLERANCE_M**2 - other * other)
                 world.breaks.setdefault(number.hidden, set()).update((best - reach, best, best + reach))
+        if x.curve is not None and y.curve is not None:
+            # the point is what it adds to less than the number: (value - point) is known
+            point = world.things[x.curve[0]]
+            middle = thing.x - (x.value - point.x), thing.y - (y.value - point.y)
+            world.cut(x.curve[0], (*middle, TOLERANCE_M))
         squared = off[0] ** 2 + off[1] ** 2
         exact = x.exact and y.exact and all((value * 64).is_integer() for value in off)
         if not exact and abs(squared - TOLERANCE_M**2) < _CLOSE:
@@ -409,6 +508,11 @@ class Program:
     Attributes:
         choices: Outcomes of each choice, and its text.
         hidden: The ends of each hidden number.
+        nested: Choices that hang on others: the options of each by their values, and its text.
+        regions: Choices of regions: their options.
+        objects: Choices of objects: their options.
+        points: Hidden points, and where they are.
+        hoped: What is required with a probability, which excludes nothing.
         roles: The objects, the ego first.
         required: What is required.
     """
@@ -417,15 +521,32 @@ class Program:
     hidden: Mapping[str, tuple[float, float]]
     roles: tuple[Role, ...]
     required: tuple[Fact, ...]
+    nested: Mapping[str, tuple[tuple[Term, ...], str]] = field(default_factory=dict)
+    regions: Mapping[str, tuple[Region, ...]] = field(default_factory=dict)
+    objects: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    points: Mapping[str, tuple[Region, str]] = field(default_factory=dict)
+    hoped: tuple[Fact, ...] = ()
+
+    @property
+    def plain(self) -> list[Fact]:
+        """What is required that hangs on no hidden point."""
+        return [fact for fact in self.required if not re.search(r"\bp\b", fact.text)]
 
     @property
     def text(self) -> str:
         """The program."""
         lines = ["model scenic.domains.driving.model"]
-        lines += [f"{name} = {text}" for name, (_, text) in self.choices.items()]
+        lines += [f"{name} = {text}" for name, (_, text) in self.choices.items() if text]
         lines += [f"{name} = Range({low:g}, {high:g})" for name, (low, high) in self.hidden.items()]
+        lines += [f"{name} = {text}" for name, (_, text) in self.nested.items()]
+        lines += [
+            f"{name} = Uniform({', '.join(each.text for each in options)})" for name, options in self.regions.items()
+        ]
+        lines += [f"{name} = new Point {text}" for name, (_, text) in self.points.items()]
         lines += ["def faster(o, c):", "    if o.speed > c:", "        return True", "    return False"]
         lines += [role.text for role in self.roles]
+        lines += [f"{name} = Uniform({', '.join(options)})" for name, options in self.objects.items()]
+        lines += [f"require[0.5] {fact.text}" for fact in self.hoped]
         lines += [f"require {fact.text}" for fact in self.required]
         return "\n".join(lines) + "\n"
 
@@ -442,21 +563,44 @@ class Maker:
         self.chance = chance
         self.choices: dict[str, tuple[tuple[float, ...], str]] = {}
         self.hidden: dict[str, tuple[float, float]] = {}
+        self.nested: dict[str, tuple[tuple[Term, ...], str]] = {}
+        self.regions: dict[str, tuple[Region, ...]] = {}
+        self.objects: dict[str, tuple[str, ...]] = {}
+        self.points: dict[str, tuple[Region, str]] = {}
 
     def program(self) -> Program:
         chance = self.chance
-        if chance.random() < 0.3:
-            options = tuple(chance.randrange(-6, 7) / 1.0 for _ in range(chance.choice((2, 3))))
+        if chance.random() < 0.35:
+            options = tuple(dict.fromkeys(chance.randrange(-6, 7) / 1.0 for _ in range(chance.choice((2, 3)))))
             listed = ", ".join(f"{each:g}" for each in options)
-            self.choices["k"] = options, f"Uniform({listed})"
+            weighted = ", ".join(f"{each:g}: {chance.choice((1, 2))}" for each in options)
+            text = chance.choice((f"Uniform({listed})", f"Discrete({{{weighted}, 77: 0}})"))
+            self.choices["k"] = options, text
             if chance.random() < 0.3:
-                self.choices["n"] = (1.0, 2.0, 3.0), "DiscreteRange(1, 3)"
+                low = chance.randrange(-2, 3)
+                self.choices["n"] = tuple(map(float, range(low, low + 3))), f"DiscreteRange({low}, {low + 2})"
         if chance.random() < 0.45:
             low = chance.randrange(-8, 8) / 2
             self.hidden["d"] = low, low + chance.choice((1.0, 2.0, 4.5))
             if chance.random() < 0.3:
                 low = chance.randrange(-8, 8) / 2
                 self.hidden["e"] = low, low + chance.choice((1.0, 3.0))
+        known = (*self.choices, *self.hidden)
+        if known and chance.random() < 0.3:
+            one = chance.choice(known)
+            terms = (drawn(one), total(drawn(one), constant(2.0)), constant(chance.randrange(-3, 4) / 1.0))
+            self.choices["m index"] = (0.0, 1.0, 2.0), ""
+            self.nested["m"] = terms, f"Uniform({', '.join(each.text for each in terms)})"
+        if chance.random() < 0.15:
+            self.regions["w"] = tuple(self._region() for _ in range(2))
+            self.choices["w"] = (0.0, 1.0), ""
+        if not self.hidden and chance.random() < 0.4:
+            region = self._region()
+            text = f"in {region.text}"
+            if not region.radius and chance.random() < 0.5:
+                (x, y), (a, b) = region.center, region.half
+                text = f"at (Range({x - a:g}, {x + a:g}), Range({y - b:g}, {y + b:g}))"
+            self.points["p"] = region, text
         names = ["ego", *(f"o{number}" for number in range(chance.choice((0, 1, 1, 2, 2, 3))))]
         alike = Role("", "Car") if chance.random() < 0.3 else None
         roles: list[Role] = []
@@ -465,15 +609,36 @@ class Maker:
                 roles.append(Role(name, "Car"))
             else:
                 roles.append(self._role(name, names[:number]))
+        if len(names) > 1 and chance.random() < 0.15:
+            some = tuple(chance.sample(names, 2))
+            self.objects["t"], self.choices["t"] = some, ((0.0, 1.0), "")
         required = tuple(self._fact(names, 2) for _ in range(chance.choice((0, 1, 1, 2, 3))))
-        return Program(self.choices, self.hidden, tuple(roles), required)
+        hoped = (self._fact(names, 1),) if chance.random() < 0.05 else ()
+        return Program(
+            self.choices,
+            self.hidden,
+            tuple(roles),
+            required,
+            self.nested,
+            self.regions,
+            self.objects,
+            self.points,
+            hoped,
+        )
 
     def _role(self, name: str, before: Sequence[str]) -> Role:
         chance = self.chance
         category = chance.choice(("Car", "Car", "Vehicle")) if name == "ego" else chance.choice(tuple(CLASSES))
-        place: Region | tuple[Term, Term] | None = None
+        place: Region | tuple[str, tuple[Region, ...]] | tuple[Term, Term] | None = None
         kind = chance.random()
-        if kind < 0.35:
+        if self.points and chance.random() < 0.35:
+            offset = (constant(chance.randrange(-6, 7) / 2) for _ in range(2))
+            parts = (property_of("p", "position.x"), property_of("p", "position.y"))
+            x, y = (total(part, off) for part, off in zip(parts, offset, strict=True))
+            place = x, y
+        elif self.regions and chance.random() < 0.4:
+            place = "w", self.regions["w"]
+        elif kind < 0.35:
             place = self._region()
         elif kind < 0.55 and before:
             owner = chance.choice(before)
@@ -492,15 +657,52 @@ class Maker:
         speed: Term | tuple[float, float] | None = None
         if chance.random() < 0.15:
             low = chance.randrange(0, 6) / 1.0
-            names = [constant(low), *map(drawn, (*self.choices, *self.hidden))]
+            names = [constant(low), *map(self._drawn, self._numbers())]
             speed = chance.choice((chance.choice(names), (low, low + 2)))
         return Role(name, category, place, facing, speed)
 
     def _offset(self) -> Term:
-        names = (*self.choices, *self.hidden)
+        names = self._numbers()
         if names and self.chance.random() < 0.5:
-            return drawn(self.chance.choice(names))
+            return self._drawn(self.chance.choice(names))
         return constant(self.chance.randrange(-12, 13) / 4)
+
+    def _numbers(self) -> list[str]:
+        """The names of choices of numbers, and of hidden numbers."""
+        named = [name for name, (_, text) in self.choices.items() if text]
+        return [*named, *self.hidden, *self.nested]
+
+    def _drawn(self, name: str) -> Term:
+        """The number that a name stands for."""
+        if name not in self.nested:
+            return drawn(name)
+        terms = self.nested[name][0]
+        return Term(name, lambda world: terms[int(world.numbers[f"{name} index"])].of(world))
+
+    def _about_drawn(self, names: Sequence[str]) -> list[Fact]:
+        """Conditions about what is drawn and no number: one of each kind that there is."""
+        chance = self.chance
+        found: list[Fact] = []
+        op, bound = chance.choice(_OPERATORS[:4]), constant(chance.randrange(-6, 7) / 2)
+        if self.regions:
+            found.append(inside_drawn(chance.choice(names), "w", self.regions["w"]))
+        if self.objects:
+            name = chance.choice(("speed", "position.x", "position.y"))
+            options = [comparison(op, property_of(each, name), bound) for each in self.objects["t"]]
+
+            def truth(world: World) -> Truth:
+                return [each.of(world) for each in options][int(world.numbers["t"])]
+
+            found.append(Fact(f"(t.{name} {op} {bound.text})", truth))
+        if self.points:
+            reach = constant(chance.choice((1.0, 2.5, 4.0)))
+            found += [
+                comparison(op, property_of("p", chance.choice(("position.x", "position.y"))), bound),
+                comparison(op, distance("p", chance.choice(names)), reach),
+                inside("p", self._region()),
+                comparison(op, property_of("p", "position.x"), property_of(chance.choice(names), "position.x")),
+            ]
+        return found
 
     def _region(self) -> Region:
         chance = self.chance
@@ -542,15 +744,18 @@ class Maker:
 
     def _bound(self, names: Sequence[str]) -> Term:
         chance = self.chance
-        known = (*self.choices, *self.hidden)
+        known = self._numbers()
         if known and chance.random() < 0.4:
             name = chance.choice(known)
-            return drawn(name) if chance.random() < 0.7 else total(drawn(name), constant(chance.randrange(-4, 5) / 2))
+            one = self._drawn(name)
+            return one if chance.random() < 0.7 else total(one, constant(chance.randrange(-4, 5) / 2))
         return constant(chance.randrange(-4, 13) / 2) if chance.random() < 0.8 else self._term(names, 0)
 
     def _atom(self, names: Sequence[str]) -> Fact:
         chance = self.chance
         kind = chance.random()
+        if (drawn_ones := self._about_drawn(names)) and chance.random() < 0.5:
+            return chance.choice(drawn_ones)
         if kind < 0.1:
             return inside(chance.choice(names), self._region())
         if kind < 0.17 and len(names) > 1:
@@ -588,42 +793,76 @@ class TooManyError(Exception):
     """There are too many cases to go through."""
 
 
+Correspondence = tuple[int, ...]
+"""Which object of a label plays each role but the ego, in order."""
+
+
 def judged(program: Program, scene: Scene) -> Truth:
     """Whether a label matches, as far as what it observes tells (Kleene's logic)."""
+    found = judged_each(program, scene, first=True)
+    return some(list(found.values())) if found else False
+
+
+def judged_each(program: Program, scene: Scene, *, first: bool = False) -> dict[Correspondence, Truth]:
+    """Whether a label matches by each correspondence; not more than the first by which it does, if that is enough."""
+    found: dict[Correspondence, Truth] = {}
     if scene.ego is None:
-        return False
-    found = [_with(program, things) for things in _correspondences(program, scene)]
-    return some(found) if found else False
-
-
-def _correspondences(program: Program, scene: Scene) -> Iterator[dict[str, Thing]]:
+        return found
     # the ego of a program is the label's, whatever its class
     ego, *others = program.roles
-    assert scene.ego is not None
     for chosen in itertools.permutations(range(len(scene.others)), len(others)):
         things = [scene.others[number] for number in chosen]
         if all(thing.category in CLASSES[role.category] for role, thing in zip(others, things, strict=True)):
-            yield {ego.name: scene.ego} | {role.name: thing for role, thing in zip(others, things, strict=True)}
+            named = {role.name: thing for role, thing in zip(others, things, strict=True)}
+            found[chosen] = _with(program, {ego.name: scene.ego, **named})
+            if first and found[chosen] is True:
+                break
+    return found
 
 
 def _with(program: Program, things: Mapping[str, Thing]) -> Truth:
     """Whether a correspondence matches with some outcomes."""
     facing = {role.name: role.facing[0] for role in program.roles if role.facing and role.facing[0] == role.facing[1]}
+    hidden = dict(program.hidden)
+    for role in program.roles:
+        if things[role.name].heading is None and role.name not in facing:
+            hidden[heading_of(role.name)] = role.facing or (0.0, 360.0)
+    middles = {
+        name: Thing("Point", *region.center, *[None] * 4, point=name) for name, (region, _) in program.points.items()
+    }
     found: list[Truth] = []
     for outcome in itertools.product(*(options for options, _ in program.choices.values())):
         chosen = dict(zip(program.choices, outcome, strict=True))
-        start = chosen | {name: low for name, (low, _) in program.hidden.items()}
-        world = World(things, facing, start, frozenset(program.hidden))
+        start = chosen | {name: low for name, (low, _) in hidden.items()}
+        world = World({**things, **middles}, facing, start, frozenset(hidden))
+        if both([each.of(world) for each in program.plain]) is False and not (program.hidden or world.breaks):
+            found.append(False)
+            continue
         _holds(program, world)
-        values = [_values(*program.hidden[name], world.breaks.get(name, set())) for name in program.hidden]
-        if math.prod(map(len, values)) > _MOST_TRIALS:
+        values = [
+            [low] if name not in program.hidden and name not in world.breaks
+            else _values(low, high, world.breaks.get(name, set()))
+            for name, (low, high) in hidden.items()
+        ]  # fmt: skip
+        places = [_places(name, region, world.curves.get(name, set())) for name, (region, _) in program.points.items()]
+        if math.prod(map(len, [*values, *places])) > _MOST_TRIALS:
             raise TooManyError
-        for numbers in itertools.product(*values):
-            world = World(things, facing, chosen | dict(zip(program.hidden, numbers, strict=True)), world.hidden)
-            found.append(_holds(program, world))
+        for numbers, points in itertools.product(itertools.product(*values), itertools.product(*places)):
+            numbered = chosen | dict(zip(hidden, numbers, strict=True))
+            placed = {**things, **{each.point: each for each in points}}
+            found.append(_holds(program, World(placed, facing, numbered, world.hidden)))
             if found[-1] is True:
                 return True
     return some(found)
+
+
+def _places(name: str, region: Region, curves: set[Curve]) -> list[Thing]:
+    """Where a hidden point may be, once in each piece that conditions on it cut."""
+    every = [*curves, *region.curves]
+    lines = {axis: [each[1] for each in every if each[0] == axis] for axis in ("x", "y")}
+    circles = [each for each in every if len(each) == 3]
+    found = representatives(circles, lines["x"], lines["y"]).tolist()
+    return [Thing("Point", x, y, *[None] * 4, point=name) for x, y in found if region.within(x, y) is True]
 
 
 def _holds(program: Program, world: World) -> Truth:
@@ -648,27 +887,48 @@ def fillings(scene: Scene, chance: random.Random) -> Iterator[Scene]:
 def _filled(thing: Thing, chance: random.Random, number: int) -> Thing:
     if thing.speed is None:
         size = (0.0, 60.0)[number] if number < 2 else chance.choice((0.0, 0.75, 2.25, 3.75, 5.25, 8.25))
-        across, ahead = chance.choice(((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)))
-        thing = Thing(thing.category, thing.x, thing.y, thing.heading, size, across, ahead)
+        ways = ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0), (size * 0.6, size * 0.8))
+        across, ahead = chance.choice(ways)
+        thing = replace(thing, speed=size, across=across, ahead=ahead, filled=True)
     rates = (chance.choice((-20.0, -1.25, 0.25, 1.75, 20.0)) for _ in range(2))
-    return Thing(
-        thing.category, thing.x, thing.y, thing.heading, thing.speed, thing.across, thing.ahead, *rates
-    )  # fmt: skip
+    return replace(thing, acceleration=next(rates), turning=next(rates))
 
 
-def unmatched_answers(program: Program, scene: Scene, answer: bool | None, chance: random.Random) -> str:
+def possible(program: Program, scene: Scene, chance: random.Random) -> set[Truth]:
+    """What a label may turn out to be, whatever it does not observe."""
+    known = judged(program, scene)
+    return {known} if known is not None else {judged(program, filled) for filled in fillings(scene, chance)}
+
+
+def wrong_answer(found: set[Truth], answer: bool | None) -> str:
     """What is wrong with an answer (None: unknown): "" if nothing is, "?" where rounding decides.
 
     "unneeded" is an unknown where no two fillings differ.
     """
-    known = judged(program, scene)
-    if known == "either":
-        return "?"
-    if known is not None:
-        return "" if answer is known else "unneeded" if answer is None else f"is {known}"
-    found = {judged(program, filled) for filled in fillings(scene, chance)}
     if "either" in found:
         return "?"
     if answer is None:
         return "unneeded" if len(found) == 1 else ""
     return "" if found == {answer} else f"may be {' and '.join(map(str, found))}"
+
+
+def wrong_correspondences(program: Program, scene: Scene, told: set[Correspondence]) -> str:
+    """What is wrong with all by which a label is told to match; "" if nothing is.
+
+    One that is not told must be another order of interchangeable roles: of all of the label, each is what the other is.
+    """
+    truths = judged_each(program, scene)
+    for each in told:
+        if truths.get(each, False) is False:
+            return f"{each} is none of the matches"
+    for each, truth in truths.items():
+        if truth is not True or each in told:
+            continue
+        for order in itertools.permutations(range(len(each))):
+            if tuple(each[place] for place in order) in told and all(
+                truths.get(tuple(other[place] for place in order)) == value for other, value in truths.items()
+            ):
+                break
+        else:
+            return f"{each} is a match that is not told"
+    return ""

@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import os
 import random
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections import Counter
@@ -19,14 +21,27 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "fuzz"))
-from frames import Maker, Program, Scene, Thing, TooManyError, random_scene, unmatched_answers
+from frames import (
+    Correspondence,
+    Maker,
+    Program,
+    Scene,
+    Thing,
+    TooManyError,
+    Truth,
+    possible,
+    random_scene,
+    wrong_answer,
+    wrong_correspondences,
+)
 from rounds import Round, cpu_seconds
 
 from scenicq.errors import ScenarioError, Source
 from scenicq.geometry.default_street import street
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.match.verdict import NoMatch, Unknown
+from scenicq.match.verdict import Match, NoMatch, Unknown
+from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
@@ -68,21 +83,61 @@ def _object(id_: str, thing: Thing) -> LabelObject:
     return LabelObject(id_, thing.category, "", thing.x, thing.y, heading, 2.0, 4.0, 1.5, velocity)
 
 
+ALL = "all matches"
+ASKED: Mapping[str, tuple[str, ...]] = {
+    "asked": (),
+    "asked of two processes": ("--jobs", "2", "--no-prefilter"),
+    "asked by smt": ("--method", "smt", "--jobs", "2"),
+    "asked by monolithic": ("--method", "monolithic"),
+}
+"""Ways of the installed command, which take seconds for themselves: one of them for one program in `EACH`."""
+EACH = 12
+
+
 def answers(dataset: Dataset, text: str, options: QueryOptions) -> tuple[dict[str, bool | None], Counter[str]]:
     """Whether each frame matches, None for unknown; and the reasons of these."""
     found: dict[str, bool | None] = {}
     reasons: Counter[str] = Counter()
-    try:
-        results = list(Query(dataset, Source("oracle.scenic", text), options).results())
-    except ScenarioError as error:
-        if error.diagnostics[0].code != "impossible-requirement":
-            raise
-        results = []  # no label matches
-    for result in results:
+    for result in _results(dataset, text, options):
         unknown = isinstance(result.verdict, Unknown)
         reasons.update([result.verdict.reason] if isinstance(result.verdict, Unknown) else [])
         found[result.frame] = None if unknown else not isinstance(result.verdict, NoMatch)
     return found, reasons
+
+
+def _results(dataset: Dataset, text: str, options: QueryOptions) -> list[Result]:
+    try:
+        return list(Query(dataset, Source("oracle.scenic", text), options).results())
+    except ScenarioError as error:
+        if error.diagnostics[0].code != "impossible-requirement":
+            raise
+        return []  # no label matches
+
+
+def all_answers(dataset: Dataset, text: str, roles: Sequence[str]) -> dict[str, set[Correspondence]]:
+    """All correspondences by which each frame matches, in the order of the roles but the ego."""
+    found: dict[str, set[Correspondence]] = {}
+    for result in _results(dataset, text, replace(_USUAL, all_matches=True)):
+        if isinstance(result.verdict, Match):
+            one = tuple(int(result.verdict.correspondence[role][1:]) for role in roles)
+            assert one not in found.setdefault(result.frame, set()), (result.frame, one)
+            found[result.frame].add(one)
+    return found
+
+
+def asked_answers(dataset: Dataset, text: str, words: Sequence[str]) -> tuple[dict[str, bool | None], Counter[str]]:
+    """What the installed command says."""
+    command = Path(sys.executable).with_name("scenicq")
+    options = ("--tolerance", "position=0.25,heading=5deg,speed=0.5", "--timeout", "20", "--solver", "portable")
+    run = subprocess.run(
+        [command, "match", "-", dataset.path, "--format", "jsonl", "--exit-zero", *options, *words],
+        input=text, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if run.returncode and "impossible-requirement" not in run.stderr:
+        raise AssertionError(run.stderr)
+    lines = [json.loads(line) for line in run.stdout.splitlines()]
+    kinds = {"match": True, "unknown": None, "no_match": False}
+    return {each["frame"]: kinds[each["verdict"]] for each in lines}, Counter()
 
 
 def differences(
@@ -90,23 +145,47 @@ def differences(
 ) -> list[str]:
     """The frames of which some way says what is not so."""
     told: list[str] = []
+    right: list[set[Truth]] = []
+    for number, scene in enumerate(scenes):
+        try:
+            right.append(possible(program, scene, random.Random(f"{seed}/{number}")))
+        except TooManyError:
+            right.append({"either"})
     for way in ways:
-        found, reasons = answers(dataset, program.text, WAYS[way])
+        if way == ALL:
+            told += _wrong_correspondences(program, scenes, dataset, right, counts)
+            continue
+        if way in ASKED:
+            found, reasons = asked_answers(dataset, program.text, ASKED[way])
+        else:
+            found, reasons = answers(dataset, program.text, WAYS[way])
         counts.update({f"reason {reason}": number for reason, number in reasons.items()})
         for number, scene in enumerate(scenes):
             answer = found.get(f"f{number:03}", False)
-            try:
-                wrong = unmatched_answers(program, scene, answer, random.Random(f"{seed}/{number}"))
-            except TooManyError:
-                wrong = "?"
+            wrong = wrong_answer(right[number], answer)
             said = "unknown" if answer is None else "match" if answer else "no match"
             counts[f"{way}: {'left out' if wrong == '?' else said}"] += 1
             if wrong == "unneeded":
                 if SHOW_UNNEEDED:
-                    print(f"unneeded: {way}: f{number:03}: {scene}\n{program.text}")
+                    print(f"unneeded: {way}: f{number:03}: {reasons}: {scene}\n{program.text}", flush=True)
                 counts[f"{way}: unknown, although no two fillings differ"] += 1
             elif wrong and wrong != "?":
                 told.append(f"{way}: f{number:03} is told as {said}, but {wrong}\n{scene}")
+    return told
+
+
+def _wrong_correspondences(
+    program: Program, scenes: Sequence[Scene], dataset: Dataset, right: Sequence[set[Truth]], counts: Counter[str]
+) -> list[str]:
+    """The frames of which not all is told by which they match, or something else."""
+    told: list[str] = []
+    found = all_answers(dataset, program.text, [role.name for role in program.roles[1:]])
+    for number, scene in enumerate(scenes):
+        mine = found.get(f"f{number:03}", set())
+        if right[number] in ({True}, {False}):
+            counts[f"{ALL}: {'match' if mine else 'no match'}"] += 1
+            if wrong := wrong_correspondences(program, scene, mine):
+                told.append(f"{ALL}: f{number:03} is told as {sorted(mine)}, but {wrong}\n{scene}")
     return told
 
 
@@ -116,7 +195,7 @@ def main() -> None:
     parser.add_argument("--seed", default="1")
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--programs", type=int, default=10**9)
-    parser.add_argument("--ways", default=",".join(WAYS))
+    parser.add_argument("--ways", default=",".join([*WAYS, ALL]))
     parser.add_argument("--only", help="the name of one program, as a difference is told with it")
     given = parser.parse_args()
     counts: Counter[str] = Counter()
@@ -138,7 +217,8 @@ def main() -> None:
             name, before = f"{seed}-{number}", cpu_seconds()
             program = Maker(random.Random(name)).program()
             try:
-                told = differences(program, scenes, dataset, given.ways.split(","), name, counts)
+                ways = [*given.ways.split(","), *([] if number % EACH else [[*ASKED][number // EACH % len(ASKED)]])]
+                told = differences(program, scenes, dataset, ways, name, counts)
             except Exception as error:
                 told = [f"{type(error).__name__}: {error}"]
             for each in told[:3]:

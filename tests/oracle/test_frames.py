@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 from frames import Maker, Number, both, compared, random_scene, some
-from frames_attack import WAYS, dataset_of, differences
+from frames_attack import ALL, WAYS, dataset_of, differences
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -21,7 +21,7 @@ def test_every_way_says_what_the_definition_says(seed, tmp_path):
     dataset = dataset_of(scenes, tmp_path / "d")
     for number in range(8):
         program = Maker(random.Random(f"frames-{seed}-{number}")).program()
-        assert differences(program, scenes, dataset, tuple(WAYS), f"{seed}", counts) == [], program.text
+        assert differences(program, scenes, dataset, (*WAYS, ALL), f"{seed}", counts) == [], program.text
     for way in WAYS:
         assert counts[f"{way}: match"] > 0
 

@@ -1,5 +1,10 @@
 """Choices over time, one program at a time: the outcome is one for all that reads it, by every method."""
 
+import json
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 from interval_definition import Sample
 from interval_definition import recording_of as of_samples
@@ -21,9 +26,37 @@ DISCS = "w = Uniform(CircularRegion((0, 0), 3), CircularRegion((20, 0), 3))\nreq
 OBJECT = "t = Uniform(ego, o1)\nrequire t.position.x > 5\n"
 NESTED = "a = Uniform(-1, 1)\nb = Uniform(a, 5 * a)\nrequire b > 0\n"
 NUMBER = "D = Uniform(Range(1, 3), Range(6, 8))\n"
+IN_DISC = "P = new Point in CircularRegion((0, 0), 3)\n"
 STEADY = (
     "monitor Steady():\n    while True:\n        require ego.position.x < 5\n        wait\nrequire monitor Steady()\n"
 )
+
+ONE_OUTCOME = [
+    (OBJECTS + "side = Uniform(-1, 1)\nrequire side > 0\nrequire eventually side < 0\n", set()),
+    (OBJECTS + "side = Discrete({-1: 1, 1: 2})\nrequire side > 0\nrequire eventually side < 0\n", set()),
+    (OBJECTS + "side = DiscreteRange(-1, 1)\nrequire side > 0\nrequire eventually side < 0\n", set()),
+    (OBJECTS + DISCS + "require eventually not (ego.position in w)\n", {"goes-0"}),
+    (OBJECTS + OBJECT + "require eventually t.position.x < 5\n", set()),
+    (OBJECTS + "t = Uniform(ego, o1)\nrequire t.position.x < 5\nrequire eventually t.position.x > 5\n", {"goes-0"}),
+    (TURNED + "require eventually side > 0\n", set()),
+    (TURNED + "require eventually side < 0\n", set()),
+    (OBJECTS + NESTED + "require eventually a < 0\n", set()),
+    (OBJECTS + NUMBER + "require always D > 8\n", set()),
+    (OBJECTS + "k = Uniform(2, 9)\nrequire ego.position.x > k\nrequire always ego.position.x < k\n", set()),
+]
+EVERYWHERE = [
+    NESTED + "require eventually a > 0\n",
+    NUMBER + "require always D > 0\n",
+    "n = Discrete({1: 1, 1.25: 1, 2: 1})\nrequire n <= 1.25\nrequire n != 1\nrequire always n > 0\n",
+]
+POINTS = [
+    ("require eventually (distance from ego to P) > 16\n", {f"goes-{n}" for n in range(4)}),
+    ("require always (distance from ego to P) < 0.5\nrequire eventually P.position.x > 0.6\n", set()),
+    ("require always P.position.x > 1\nrequire eventually P.position.x < 0\n", set()),
+    ("require always P.position.x > 4\n", set()),
+    ("require eventually ego.position.x - P.position.x > 19\n", {f"goes-{n}" for n in range(4)}),
+]
+EVERY_FRAME = {f"{name}-{n}" for name in ("goes", "stands", "lone") for n in range(4)}
 
 
 @pytest.fixture(scope="module")
@@ -49,59 +82,58 @@ def told(dataset: Dataset, text: str, method: str) -> list[tuple[str, str, str]]
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(
-    ("text", "frames"),
-    [
-        (OBJECTS + "side = Uniform(-1, 1)\nrequire side > 0\nrequire eventually side < 0\n", set()),
-        (OBJECTS + "side = Discrete({-1: 1, 1: 2})\nrequire side > 0\nrequire eventually side < 0\n", set()),
-        (OBJECTS + "side = DiscreteRange(-1, 1)\nrequire side > 0\nrequire eventually side < 0\n", set()),
-        (OBJECTS + DISCS + "require eventually not (ego.position in w)\n", {"goes-0"}),
-        (OBJECTS + OBJECT + "require eventually t.position.x < 5\n", set()),
-        (OBJECTS + "t = Uniform(ego, o1)\nrequire t.position.x < 5\nrequire eventually t.position.x > 5\n", {"goes-0"}),
-        (TURNED + "require eventually side > 0\n", set()),
-        (TURNED + "require eventually side < 0\n", set()),
-        (OBJECTS + NESTED + "require eventually a < 0\n", set()),
-        (OBJECTS + NUMBER + "require always D > 8\n", set()),
-        (OBJECTS + "k = Uniform(2, 9)\nrequire ego.position.x > k\nrequire always ego.position.x < k\n", set()),
-    ],
-)
+@pytest.mark.parametrize(("text", "frames"), ONE_OUTCOME)
 @pytest.mark.one_in(4)
 def test_an_outcome_is_one_for_the_start_and_for_all_that_follows(dataset, text, frames, method):
     assert {first for first, _, _ in told(dataset, text, method)} == frames
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(
-    "text",
-    [
-        NESTED + "require eventually a > 0\n",
-        NUMBER + "require always D > 0\n",
-        "n = Discrete({1: 1, 1.25: 1, 2: 1})\nrequire n <= 1.25\nrequire n != 1\nrequire always n > 0\n",
-    ],
-)
+@pytest.mark.parametrize("text", EVERYWHERE)
 def test_outcomes_that_do_not_hang_on_the_label_match_everywhere(dataset, text, method):
     found = told(dataset, OBJECTS + text, method)
     assert {verdict for _, _, verdict in found} == {"Match"}
-    assert {first for first, _, _ in found} == {f"{name}-{n}" for name in ("goes", "stands") for n in range(4)} | {
-        f"lone-{n}" for n in range(4)
-    }
+    assert {first for first, _, _ in found} == EVERY_FRAME
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("text", "frames"), POINTS)
+@pytest.mark.one_in(4)
+def test_a_point_of_which_the_start_says_nothing_is_one_for_all_that_follows(dataset, text, frames, method):
+    found = told(dataset, OBJECTS + IN_DISC + text, method)
+    assert {(first, verdict) for first, _, verdict in found} == {(first, "Match") for first in frames}
+
+
 @pytest.mark.parametrize(
     ("text", "frames"),
     [
-        ("require eventually (distance from ego to P) > 16\n", {f"goes-{n}" for n in range(4)}),
-        ("require always (distance from ego to P) < 0.5\nrequire eventually P.position.x > 0.6\n", set()),
-        ("require always P.position.x > 1\nrequire eventually P.position.x < 0\n", set()),
-        ("require always P.position.x > 4\n", set()),
-        ("require eventually ego.position.x - P.position.x > 19\n", {f"goes-{n}" for n in range(4)}),
+        *ONE_OUTCOME,
+        *((OBJECTS + text, EVERY_FRAME) for text in EVERYWHERE),
+        *((OBJECTS + IN_DISC + text, frames) for text, frames in POINTS),
+        (OBJECTS + STEADY + "terminate when ego.position.x > 5\n", {f"goes-{n}" for n in range(4)}),
+        (OBJECTS + "require always ego.position.x > 5\nterminate when o1.speed > 1\n", set()),
+        (OBJECTS + STEADY + "terminate simulation when ego.position.x > 5\n", set()),
     ],
 )
-@pytest.mark.one_in(4)
-def test_a_point_of_which_the_start_says_nothing_is_one_for_all_that_follows(dataset, text, frames, method):
-    found = told(dataset, f"{OBJECTS}P = new Point in CircularRegion((0, 0), 3)\n{text}", method)
-    assert {(first, verdict) for first, _, verdict in found} == {(first, "Match") for first in frames}
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--method", "auto"), ("--method", "smt"), ("--method", "monolithic"), ("--method", "auto", "--no-prefilter"),
+        ("--method", "smt", "--no-prefilter", "--jobs", "2"), ("--method", "auto", "--jobs", "2"),
+    ],
+    ids=" ".join,
+)  # fmt: skip
+@pytest.mark.one_in(70)
+def test_the_installed_command_says_so_by_every_method(dataset, tmp_path, text, frames, words):
+    (tmp_path / "p.scenic").write_text(text)
+    command = Path(sys.executable).with_name("scenicq")
+    words = ["match", tmp_path / "p.scenic", dataset.path, *words, "--intervals", "all", "--format", "jsonl"]
+    run = subprocess.run([command, *words, "--exit-zero"], capture_output=True, text=True, check=False)
+    assert run.returncode == 0 or "error[impossible-requirement]" in run.stderr, run.stderr
+    lines = [json.loads(line) for line in run.stdout.splitlines()]
+    assert {(each["frames"]["first"], each["verdict"]) for each in lines} == {(first, "match") for first in frames}
+    if "terminate when" in text:
+        assert [each["frames"]["last"] for each in lines if each["frames"]["first"] == "goes-0"] in ([], ["goes-1"])
 
 
 @pytest.mark.parametrize("method", METHODS)
