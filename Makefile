@@ -68,6 +68,9 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/bench/evaluation.py
 	$(BIN)/python tests/bench/steps.py
 	$(BIN)/python tests/bench/by_hand.py
+	$(BIN)/python tests/bench/intervals_by_hand.py
+	$(BIN)/python tests/bench/intervals.py
+	$(BIN)/python tests/bench/verdicts.py
 ifdef SCENIC
 	$(BIN)/python tests/bench/published.py $(SCENIC) $(DATASETS)
 endif

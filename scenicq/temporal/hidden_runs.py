@@ -39,7 +39,7 @@ Detail = tuple[str, Mapping[str, WitnessValue]]
 
 _MOST_JOINT = 32
 """Starts of one binding that are matched again with values of random variables that the initial scene has, too."""
-_THIN = 1e-9
+_THIN = 4e-12
 """Relative width of a piece of values below which rounding may decide: there, a run is followed again with a value."""
 
 
@@ -187,15 +187,23 @@ class HiddenRuns:
         """Follow runs again with a value each where so few values match that rounding may decide."""
         with np.errstate(invalid="ignore"):
             thin = (pieces.high - pieces.low <= _THIN * (1 + np.abs(pieces.low))).any(axis=1)
-        for each in np.flatnonzero(thin & (pieces.runs.truth == TRUE)).tolist():
+        runs, found = pieces.runs, np.zeros(len(stretches.starts), np.int64)
+        # the longest first: what is shorter than one that is sure is not asked for
+        for each in np.lexsort((-runs.ends, pieces.of)).tolist() if (thin & (runs.truth == TRUE)).any() else ():
+            if runs.truth[each] != TRUE or (found[pieces.of[each]] and not self.every):
+                continue
+            found[pieces.of[each]] = 1
+            if not thin[each]:
+                continue
             look()
             start = int(pieces.of[each])
             one = stretches.alone(start)
             own = AtomColumns(self.scenario, one.places, _values(hidden, pieces, each), start=one.heads())
             run = self._run(one, own, expanded, {})
             first = int(stretches.starts[start]) - int(one.starts[0])
-            if run.truth != TRUE or run.end + first != pieces.runs.ends[each]:
-                pieces.runs.truth[each] = FALSE
+            if run.truth != TRUE or run.end + first != runs.ends[each]:
+                runs.truth[each] = FALSE
+                found[start] = 0
 
     def _by_examples(
         self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: Remembered, unclear: str
