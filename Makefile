@@ -70,7 +70,7 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/bench/by_hand.py
 	$(BIN)/python tests/bench/intervals_by_hand.py
 	$(BIN)/python tests/bench/intervals.py
-	$(BIN)/python tests/bench/verdicts.py
+	$(BIN)/python tests/bench/verdicts.py record bench-results/verdicts.jsonl
 ifdef SCENIC
 	$(BIN)/python tests/bench/published.py $(SCENIC) $(DATASETS)
 endif

@@ -186,7 +186,8 @@ class HiddenRuns:
     ) -> None:  # fmt: skip
         """Follow runs again with a value each where so few values match that rounding may decide."""
         with np.errstate(invalid="ignore"):
-            thin = (pieces.high - pieces.low <= _THIN * (1 + np.abs(pieces.low))).any(axis=1)
+            narrow: NDArray[np.bool_] = pieces.high - pieces.low <= _THIN * (1 + np.abs(pieces.low))
+        thin = np.any(narrow, axis=1)
         runs, found = pieces.runs, np.zeros(len(stretches.starts), np.int64)
         # the longest first: what is shorter than one that is sure is not asked for
         for each in np.lexsort((-runs.ends, pieces.of)).tolist() if (thin & (runs.truth == TRUE)).any() else ():

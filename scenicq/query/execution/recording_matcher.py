@@ -140,9 +140,11 @@ class RecordingMatcher:
 
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
-        whole, *self._matchers = start_matchers(
-            self.matcher, [Outcome(self.matcher.scenario, {}), *self.intervals.outcomes]
-        )
+        outcomes = self.intervals.outcomes
+        if len(outcomes) == 1:
+            # what is decided over time alone is no matter of the initial scene
+            self.matcher = Matcher(outcomes[0].scenario, self.matcher.options, self.matcher.solver)
+        whole, *self._matchers = start_matchers(self.matcher, [Outcome(self.matcher.scenario, {}), *outcomes])
         self.matcher = whole
         self._search = StartSearch(whole)
         self._searches: dict[int, StartSearch] = {}
