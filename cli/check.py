@@ -24,7 +24,7 @@ from scenicq.match.problem.preprocess import ready
 from scenicq.query.execution.compiled_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.option_texts import VERSIONS
-from scenicq.query.execution.program_files import sibling_loader
+from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.store.dataset import Dataset
 
 from .cache import user_cache
@@ -134,7 +134,7 @@ def _found(
     compiled: list[tuple[Scenario, Network | None]] = []
     for network in networks:
         try:
-            loader = sibling_loader(Path(source.name))
+            loader = SiblingFiles(Path(source.name))
             scenario = compile_scenario(
                 source, network, version=version, initial=initial, behaviors="ignore", loader=loader, model=asked.model
             )

@@ -10,7 +10,7 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.errors import plain_json
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
 from scenicq.query.execution.option_texts import read_built_ins
-from scenicq.query.execution.program_files import sibling_loader
+from scenicq.query.execution.program_files import SiblingFiles
 
 from .check import networks_of, read_version
 from .manual import Manual
@@ -67,7 +67,7 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
     version = read_version(scenic)
     network = next(networks_of(target, map_file, source, version))
     compiled = compile_scenario(
-        source, network, version=version, initial=initial, loader=sibling_loader(Path(source.name)), model=model
+        source, network, version=version, initial=initial, loader=SiblingFiles(Path(source.name)), model=model
     )
     labels = sample_labels(compiled, number, seed, read_built_ins(waive), timeout_s=timeout)
     if output is not None:

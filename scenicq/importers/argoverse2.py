@@ -66,6 +66,9 @@ class Argoverse2:
         logs = argoverse2_logs(path)
         if not logs:
             raise missing(path, "no log with `annotations.feather`")
+        beside = {folder for above in {log.parent for log in logs if log != path} for folder in above.iterdir()}
+        bare = [folder for folder in beside - {*logs} if (folder / _POSES).is_file()]
+        report.not_read(f"log without {_BOXES}", len(bare))
         maps = read_maps(options.maps, report)
         for log in logs:
             if (file := archive_of(log / "map")) is not None:

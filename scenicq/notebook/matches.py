@@ -164,7 +164,7 @@ class Matches(Sequence[FrameResult]):
     def __reduce__(self) -> tuple[Callable[..., Matches], tuple[Query, str, list[Result] | None]]:
         """Pickled with all its results; of a query that was not asked yet, without."""
         query = self.query
-        bare = Query(query.dataset, query.source, query.options, query.recordings, query.funnel, query.file)
+        bare = Query(query.dataset, query.source, query.options, query.recordings, query.funnel, query.siblings)
         return Matches.restored, (
             bare,
             self.origin,

@@ -14,7 +14,7 @@ import pytest
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.geometry.default_street import street
-from scenicq.query.execution.program_files import sibling_loader
+from scenicq.query.execution.program_files import SiblingFiles
 
 Files = dict[str, str]
 """The files of a program by their names without endings; `main` is the program, which gives `result` a number."""
@@ -59,7 +59,7 @@ def _by_scenic(folder: Path) -> float | None:
     path = folder / "main.scenic"
     text = path.read_text(encoding="utf-8") + "ego = new Object at (result, 0)\n"
     try:
-        scenario = compile_scenario(Source(str(path), text), street(), version=3, loader=sibling_loader(path))
+        scenario = compile_scenario(Source(str(path), text), street(), version=3, loader=SiblingFiles(path))
     except ScenarioError as error:
         if error.diagnostics[0].code not in ("unknown-model", "unknown-name", "unknown-attribute"):
             raise

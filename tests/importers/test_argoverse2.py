@@ -49,6 +49,17 @@ def change(source: Path, name: str, edit: Callable[[list[dict[str, Any]]], objec
     pyarrow.feather.write_feather(pa.Table.from_pylist(rows), str(file))
 
 
+def test_logs_without_boxes_are_counted(source: Path) -> None:
+    """As those for testing are, which lie where the others do once all of the dataset is there."""
+    bare = Path(shutil.copytree(source / "val" / LOG, source / "val" / "bare"))
+    (bare / "annotations.feather").unlink()
+    report = Report()
+    Argoverse2().read(source, Options(), report)
+    assert [(entry.name, entry.count) for entry in report.counts if "log" in entry.name] == [
+        ("log without annotations.feather", 1)
+    ]
+
+
 def test_lanes_know_their_groups_roads_and_intersection() -> None:
     source = Argoverse2().read(SAMPLE, Options(), Report())
     network = Network(LOG, source.maps[LOG])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from scenicq.compiler.imported_files import ImportedFiles
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.syntax.parser import parse
 
-__all__ = ["program_text", "read_program", "sibling_loader"]
+__all__ = ["SiblingFiles", "program_text", "read_program"]
 
 
 def read_program(path: str | Path) -> Source:
@@ -28,15 +28,31 @@ def read_program(path: str | Path) -> Source:
         raise DataError(Diagnostic("file-invalid", f"{path} is not text in UTF-8")) from None
 
 
-def sibling_loader(path: Path) -> Callable[[str], Source | None]:
-    """What reads the files that a program imports: those in its own folder, nothing else.
+@dataclass(eq=False)
+class SiblingFiles:
+    """What reads the files that a program imports: those in its own folder, nothing else, and each once.
 
-    Args:
+    So whoever has it, copies in other processes included, compiles one program, whatever is written meanwhile.
+
+    Attributes:
         path: Of the program.
     """
-    folder = path.resolve().parent
 
-    def load(name: str) -> Source | None:
+    path: Path
+    _found: dict[str, Source | None] = field(default_factory=dict[str, "Source | None"], repr=False)
+
+    def __call__(self, name: str) -> Source | None:
+        """The text of a file of the folder; see `Loader`.
+
+        Raises:
+            DataError: file-missing or file-invalid.
+        """
+        if name not in self._found:
+            self._found[name] = self._read(name)
+        return self._found[name]
+
+    def _read(self, name: str) -> Source | None:
+        folder = self.path.resolve().parent
         file = (folder / name).resolve()
         if not file.is_relative_to(folder):
             return None
@@ -44,21 +60,19 @@ def sibling_loader(path: Path) -> Callable[[str], Source | None]:
             return Source(str(file), "") if file.is_dir() else None
         return read_program(file) if file.is_file() else None
 
-    return load
 
-
-def program_text(source: Source, path: Path, version: int | None) -> str:
+def program_text(source: Source, files: SiblingFiles, version: int | None) -> str:
     """The text of a program and of all files that it imports: where one of them differs, the program is another.
 
     Args:
         source: The program.
-        path: Its file.
+        files: What reads its files.
         version: The version of Scenic, if it is known.
     """
-    files = ImportedFiles(sibling_loader(path), version)
+    imported = ImportedFiles(files, version)
     texts: dict[str, str] = {}
     try:
-        for name, file in files.reach(parse(source, version)):
+        for name, file in imported.reach(parse(source, version)):
             if file is not None:
                 texts[name] = file.program.source.text
     except ScenarioError:

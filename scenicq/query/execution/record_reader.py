@@ -14,7 +14,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.partitions import fingerprint
-from scenicq.query.execution.program_files import program_text
+from scenicq.query.execution.program_files import SiblingFiles, program_text
 from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.atomic_files import write_whole
@@ -63,7 +63,7 @@ def _span(place: str, source: Source) -> Span | None:
 
 def name_question(query: Query) -> str:
     """The name of what a query asks: another dataset, program, imported file or option makes it another."""
-    text = program_text(query.source, query.file or Path(query.source.name), query.options.version)
+    text = program_text(query.source, query.siblings, query.options.version)
     return fingerprint(query.dataset, text, query.options)
 
 
@@ -81,7 +81,7 @@ def note_question(folder: Path, query: Query) -> None:
         "dataset": query.dataset.address,
         "scenario": query.source.name,
         "program": query.source.text,
-        "file": str((query.file or Path(query.source.name)).resolve()),
+        "file": str(query.siblings.path.resolve()),
         "options": asdict(query.options),
     }
     try:
@@ -111,7 +111,7 @@ def noted_question(folder: Path, question: str) -> Query:
         raise DataError(Diagnostic("file-missing", f"{file} cannot be read", hints=(hint,))) from None
     except (ValueError, TypeError, KeyError, AttributeError):
         raise DataError(Diagnostic("file-invalid", f"{file} does not say what was asked")) from None
-    query = Query(open_dataset(address), source, options, file=Path(path))
+    query = Query(open_dataset(address), source, options, files=SiblingFiles(Path(path)))
     if name_question(query) != question:
         message = f"the pieces in {folder} are of another version of {address} or of what {path} imports"
         raise DataError(Diagnostic("store-damaged", message, hints=("match again",)))

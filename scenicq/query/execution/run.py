@@ -33,7 +33,7 @@ from scenicq.query.execution.compiled_map import (
 from scenicq.query.execution.frames_ahead import FramesAhead, telling
 from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
 from scenicq.query.execution.never_compared import Coverage, coverage
-from scenicq.query.execution.program_files import sibling_loader
+from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
@@ -123,7 +123,7 @@ class Query:
         options: The options.
         recordings: What to look at on which map; everything if None.
         funnel: Filled while results are taken.
-        file: Of the program, whose folder has the files that it imports; by its name if None.
+        files: What reads the files that it imports; those of the folder that the program is named in if None.
     """
 
     dataset: Dataset
@@ -131,8 +131,15 @@ class Query:
     options: QueryOptions = QueryOptions()
     recordings: Mapping[str, RecordingRange] | None = None
     funnel: Funnel = field(default_factory=Funnel)
-    file: Path | None = None
+    files: SiblingFiles | None = None
     _known: _Known = field(default_factory=_Known, repr=False)
+
+    @property
+    def siblings(self) -> SiblingFiles:
+        """What reads the files that the program imports."""
+        if self.files is None:
+            self.files = SiblingFiles(Path(self.source.name))
+        return self.files
 
     def compile(self, map_name: str) -> tuple[Scenario, Network]:
         """The scenario over one of the dataset's maps, ready to be matched.
@@ -144,7 +151,7 @@ class Query:
         try:
             scenario = compile_scenario(
                 self.source, network, version=self.options.version, initial=self.options.initial,
-                behaviors=self.options.behaviors, loader=sibling_loader(self.file or Path(self.source.name)),
+                behaviors=self.options.behaviors, loader=self.siblings,
                 model=self.options.model,
             )  # fmt: skip
             check_enforced(scenario, self.options.match.enforce)
@@ -266,7 +273,7 @@ class Query:
         known = replace(self._known, compiled={**self._known.compiled, map_name: compiled})
         options = replace(self.options, match=match, jobs=1, limit=None, every=False)
         chosen = {map_name: RecordingRange(recording, recording, self.dataset.manifest.by_recording[recording].frames)}
-        return Query(self.dataset, self.source, options, chosen, file=self.file, _known=known)
+        return Query(self.dataset, self.source, options, chosen, files=self.files, _known=known)
 
     def frames(self, map_name: str) -> int:
         """How many frames of a map are looked at."""
@@ -349,7 +356,7 @@ class Query:
         left, ahead = self.options.limit, FramesAhead(progress)
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
-            setup = (self.dataset.reference, self.source, self.options, self.file)
+            setup = (self.dataset.reference, self.source, self.options, self.siblings)
             decider = self.decider()
             executor = BlockExecutor(self.dataset, self.options.jobs, decider, _start_worker, setup)
             hands = stack.enter_context(executor)
@@ -386,10 +393,10 @@ class Query:
 
 
 def _start_worker(
-    dataset: DatasetReference, source: Source, options: QueryOptions, file: Path | None
+    dataset: DatasetReference, source: Source, options: QueryOptions, files: SiblingFiles
 ) -> Callable[[Block, Callable[[object], None]], Decided]:
     """What a worker process keeps between blocks."""
-    decider = Query(dataset.open(), source, options, file=file).decider(threads=1)
+    decider = Query(dataset.open(), source, options, files=files).decider(threads=1)
 
     def work(block: Block, tell: Callable[[object], None]) -> Decided:
         decided = decider.decide(block)

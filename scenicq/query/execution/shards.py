@@ -11,6 +11,7 @@ from scenicq.errors import Source
 from scenicq.match.verdict import Match
 from scenicq.processes import Lost, Workers, as_many_as_pay
 from scenicq.query.execution.partitions import Partition, gather, is_done, partitions, write_partition
+from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.record_reader import name_question, read_record
 from scenicq.query.execution.results import Funnel, Result, record
 from scenicq.query.execution.run import Query, QueryOptions
@@ -45,14 +46,14 @@ class Question:
         dataset: The dataset.
         fingerprint: Of dataset, program and options.
         source: The program.
-        file: Of the program.
+        files: What reads the files that it imports.
         options: The options.
     """
 
     dataset: DatasetReference
     fingerprint: str
     source: Source
-    file: Path
+    files: SiblingFiles
     options: QueryOptions
 
     @classmethod
@@ -62,7 +63,7 @@ class Question:
             dataset=query.dataset.reference,
             fingerprint=name_question(query),
             source=query.source,
-            file=(query.file or Path(query.source.name)).resolve(),
+            files=query.siblings,
             options=replace(query.options, jobs=1),
         )
 
@@ -72,7 +73,7 @@ class Question:
         Raises:
             DataError: store-missing, or store-damaged where the dataset is not the one that was asked about.
         """
-        return Query(self.dataset.open(), self.source, self.options, file=self.file)
+        return Query(self.dataset.open(), self.source, self.options, files=self.files)
 
 
 Asked = tuple[Question, Partition]

@@ -56,7 +56,7 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
     Raises:
         ScenarioError: The program is wrong.
     """
-    every = Query(query.dataset, query.source, replace(query.options, every=True, limit=None), file=query.file)
+    every = Query(query.dataset, query.source, replace(query.options, every=True, limit=None), files=query.siblings)
     results = [each for each in every.results() if each.interval is not None]
     matching = {each.recording for each in results if isinstance(each.verdict, Match)}
     near: dict[str, _Near] = {}
@@ -104,7 +104,7 @@ def _bound(near: dict[str, _Near], count: int) -> float:
 def _under(query: Query, tolerance: Tolerance) -> Iterable[Result]:
     """The intervals that match under another tolerance."""
     options = replace(query.options, match=replace(query.options.match, tolerance=tolerance), every=False)
-    other = Query(query.dataset, query.source, options, file=query.file)
+    other = Query(query.dataset, query.source, options, files=query.siblings)
     return [each for each in other.results() if _is_match(each)]
 
 

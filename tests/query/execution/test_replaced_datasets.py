@@ -161,3 +161,24 @@ def test_nothing_opens_a_dataset_in_another_process_by_its_address() -> None:
         "scenicq/query/execution/record_reader.py",
         "scenicq/store/dataset.py",
     }
+
+
+@pytest.mark.parametrize("ways", [by_blocks, by_shards, pytest.param(by_dask, marks=pytest.mark.slow)])
+def test_a_file_that_a_program_imports_is_read_once(ways: Callable[[Query], Iterator[Result]], tmp_path: Path) -> None:
+    """Whoever does the work, the answers are those of the program as it was when the query began."""
+    ingest(SAMPLES / "crossroads", tmp_path / "d")
+    program, library = tmp_path / "program.scenic", tmp_path / "lib.scenic"
+    program.write_text(
+        "model scenic.domains.driving.model\nfrom lib import nearest\nego = new Car\no = new Car\n"
+        "require (distance to o) < nearest\n"
+    )
+    library.write_text("nearest = 25\n")
+    query = Query(open_dataset(tmp_path / "d"), read_program(program), replace(OPTIONS, match=MatchOptions()))
+    expected = [
+        record(result) for result in Query(query.dataset, query.source, replace(query.options, jobs=1)).results()
+    ]
+    query = Query(open_dataset(tmp_path / "d"), read_program(program), replace(OPTIONS, match=MatchOptions()))
+    query.compile("crossroads")
+    library.write_text("nearest = 0\n")
+    assert [record(result) for result in ways(query)] == expected
+    assert len({each["verdict"] for each in expected}) == 2
