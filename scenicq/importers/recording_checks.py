@@ -7,6 +7,8 @@ from collections import Counter, defaultdict
 from collections.abc import Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from scenicq.importers.report import Report
 from scenicq.store.columns import RecordingColumns
 
@@ -20,6 +22,9 @@ _LARGEST_ANGLE = 4 * math.pi
 
 _NO_ANGLE = 1e9
 """From here on a number is no angle in any unit; that is for the reader of the field to tell."""
+
+_SHORTEST_JUMP_M, _FASTEST_M_S = 5.0, 100.0
+"""Metres beyond which a step is no inaccuracy of labels, and a speed that nothing on a road has."""
 
 _FEWEST_STEPS, _MOST_STEPS_BACK = 9, 0.1
 """Where nothing numbers labels, with fewer steps, or a larger share of them back, they may be in no order at all."""
@@ -59,7 +64,7 @@ def tell_order(name: str, times_us: Sequence[int], report: Report, *, numbered: 
 
 
 def tell_recording(columns: RecordingColumns, report: Report) -> None:
-    """Tell a rate that no recorder has, and tracks whose class changes.
+    """Tell a rate that no recorder has, and tracks whose class changes or that jump.
 
     Args:
         columns: The columns of the recording.
@@ -83,3 +88,27 @@ def tell_recording(columns: RecordingColumns, report: Report) -> None:
             listed = " and ".join(f"`{kind}` in {count} frames" for kind, count in sorted(found))
             message = f"track `{track}` of recording `{columns.name}` is {listed}"
             report.assumed("track", "tracks that change their class", message)
+    _tell_jumps(columns, report)
+
+
+def _tell_jumps(columns: RecordingColumns, report: Report) -> None:
+    """Tell tracks that are twice somewhere nothing gets from one place to the other in time."""
+    objects = columns.objects
+    names = list(dict.fromkeys(track for track in objects.track if track is not None))
+    numbers: dict[str | None, int] = {name: number for number, name in enumerate(names)} | {None: -1}
+    track = np.array([numbers[each] for each in objects.track], dtype=np.int64)
+    time_us = np.repeat(np.array(columns.times_us, dtype=np.int64), columns.object_counts)
+    order = np.lexsort((time_us, track))
+    order = order[track[order] >= 0]
+    track, time_us, x, y = track[order], time_us[order], objects.x[order], objects.y[order]
+    away_m, passed_s = np.hypot(np.diff(x), np.diff(y)), np.diff(time_us) / 1e6
+    with np.errstate(divide="ignore", invalid="ignore"):
+        jumps = (np.diff(track) == 0) & (away_m > _SHORTEST_JUMP_M) & (away_m / passed_s > _FASTEST_M_S)
+    (places,) = np.nonzero(jumps)
+    for number, first in zip(*np.unique(track[places], return_index=True), strict=True):
+        place = places[first]
+        message = (
+            f"track `{names[number]}` of recording `{columns.name}` is {away_m[place]:.0f} m away "
+            f"{passed_s[place]:g} s later; what is derived from its motion is as absurd"
+        )
+        report.assumed("track", "tracks that jump", message)

@@ -119,3 +119,29 @@ def test_a_track_that_changes_its_class(tmp_path: Path) -> None:
     assert told(source, rows, tmp_path / "d") == {"tracks that change their class": 1}
     (warning,) = ingest(source, tmp_path / "e").diagnostics
     assert warning.message == "track `a` of recording `r` is `Car` in 3 frames and `Truck` in 1 frames"
+
+
+@pytest.mark.parametrize(
+    ("step_m", "step_us", "jumps"),
+    [
+        (3.0, 100_000, False),  # 108 km/h at 10 Hz
+        (4.0, 10_000, False),  # a label that is off by metres
+        (40.0, 500_000, False),  # 288 km/h
+        (80.0, 500_000, True),
+        (11.0, 100_000, True),
+    ],
+)
+def test_tracks_that_jump(step_m: float, step_us: int, jumps: bool, tmp_path: Path) -> None:
+    """Of two cars and a thing without a track, one car is somewhere else from the third label on."""
+    folder = write(tmp_path / "s", step_us)
+    rows = [json.loads(line) for line in (folder / "labels.jsonl").read_text().splitlines()]
+    size = {"width": 2.0, "length": 4.0, "heading": 0.0, "class": "Car"}
+    for number, row in enumerate(rows):
+        moved = step_m if number >= 2 else 0.0
+        row["objects"] = [
+            {"id": f"a{number}", "track": "a", "position": [0.0, 9.0 + moved], **size},
+            {"id": f"b{number}", "track": "b", "position": [number * 1e-3, 30.0], **size},
+            {"id": f"c{number}", "position": [500.0 * number, 60.0], **size},
+        ]
+    found = told(folder, rows, tmp_path / "d")
+    assert found.get("tracks that jump", 0) == int(jumps)
