@@ -189,6 +189,8 @@ def features_of(network: Any, directions: Directions) -> list[dict[str, Any]]:
             left = keeps_left(element)
             links = {"road": element.road.uid, "centerline": _points(element.centerline, left)}
             found.append(_feature(element, kind, {**links, **_edges(element, left), **_ends(element, left)}))
+    # without the cracks between elements, which Scenic closes here alone
+    found.append(_shaped("drivable", "drivable", network.drivableRegion.polygons, {}))
     return found
 
 

@@ -26,12 +26,12 @@ from scenicq.importers.report import MOST_TOLD, Report
 from scenicq.processes import Lost, Workers, as_many_as_pay
 from scenicq.store.columns import columns_of
 from scenicq.store.labels import Recording
-from scenicq.store.part_rows import PartRows
 from scenicq.store.schema import SCHEMA_VERSION, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import MapIndexes, Segment, SegmentWriter, SourceRecording
 
 if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature
+    from scenicq.store.part_rows import PartRows
 
 __all__ = ["Job", "RecordingTask", "SegmentPlace", "World", "fingerprint", "maps_digest", "write_segments"]
 
@@ -245,6 +245,8 @@ class _OldRows:
         key, rows = (place.folder, place.number), place.segment.rows
         if key not in self._open:
             files = {table: place.segment.part(table, place.number).path for table in SEGMENT_TABLES}
+            from scenicq.store.part_rows import PartRows  # noqa: PLC0415 - slow to load, and for updates
+
             tables = {table: PartRows(table, place.folder / path, path) for table, path in files.items()}
             self._open[key] = {table: self._files.enter_context(closing(each)) for table, each in tables.items()}
             firsts = accumulate(

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowTable
@@ -90,6 +89,8 @@ class PartRows:
             DataError: dataset-invalid.
             OSError: The file cannot be read.
         """
+        import pyarrow.compute as pc  # noqa: PLC0415 - takes longer to load than a small ingest does
+
         with decoding(self.name), open_parquet(self._file, read_dictionary=[column]) as parquet:
             codes = pc.run_end_encode(parquet.read([column]).column(0).unify_dictionaries().combine_chunks().indices)
         return np.diff(codes.run_ends.to_numpy(), prepend=0).tolist()

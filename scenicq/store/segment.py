@@ -20,10 +20,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns
@@ -163,6 +162,15 @@ class MapIndexes:
         return self._made.get(name)
 
 
+class _Tally(NamedTuple):
+    """What is counted of a recording: objects of each class, tracks, and the times of its labels."""
+
+    classes: Counter[str]
+    source_classes: Counter[str]
+    tracks: int
+    times_us: Sequence[int]
+
+
 @dataclass(slots=True)
 class SegmentWriter:
     """Writes one segment of a dataset.
@@ -202,7 +210,11 @@ class SegmentWriter:
         """
         tables = self._tables
         first = {"first_object": tables["objects"].rows, "first_sensor": tables["sensors"].rows}
-        self._append(columns.name, recording_rows(columns, index, **first))
+        objects = columns.objects
+        tally = _Tally(
+            Counter(objects.category), Counter(objects.source_class), len({*objects.track} - {None}), columns.times_us
+        )
+        self._append(columns.name, recording_rows(columns, index, **first), tally)
 
     def copy(self, name: str, rows: Mapping[str, ArrowTable]) -> None:
         """Append a recording that another segment has.
@@ -214,6 +226,8 @@ class SegmentWriter:
         Raises:
             OSError: The folder cannot be written.
         """
+        import pyarrow.compute as pc  # noqa: PLC0415 - takes longer to load than a small ingest does
+
         labels = rows["labels"]
         for column, table in (("first_object", "objects"), ("first_sensor", "sensors")):
             place = labels.schema.get_field_index(column)
@@ -221,9 +235,16 @@ class SegmentWriter:
                 pc.subtract(labels[column], labels[column][0]), pa.scalar(self._tables[table].rows, pa.int32())
             )
             labels = labels.set_column(place, labels.schema.field(place), moved)
-        self._append(name, {**rows, "labels": labels})
+        objects = rows["objects"]
+        classes, source_classes = (
+            Counter({each["values"]: each["counts"] for each in objects[column].value_counts().to_pylist()})
+            for column in ("class", "source_class")
+        )
+        tracks = pc.count_distinct(objects["track"], mode="only_valid").as_py()
+        tally = _Tally(classes, source_classes, tracks, labels["timestamp_us"].to_pylist())
+        self._append(name, {**rows, "labels": labels}, tally)
 
-    def _append(self, name: str, rows: Mapping[str, ArrowTable]) -> None:
+    def _append(self, name: str, rows: Mapping[str, ArrowTable], tally: _Tally) -> None:
         for table in SEGMENT_TABLES:
             self._tables[table].add(rows[table])
         labels, objects = rows["labels"], rows["objects"]
@@ -233,12 +254,10 @@ class SegmentWriter:
         map_name = labels["map"][0].as_py() if len(labels) else ""
         before = self._by_map.get(map_name, Counts())
         self._by_map[map_name] = Counts(before.frames + counts.frames, before.objects + counts.objects)
-        for column, found in (("class", self._by_class), ("source_class", self._by_source_class)):
-            for each in objects[column].value_counts().to_pylist():
-                found[each["values"]] += each["counts"]
-        self._tracks += pc.count_distinct(objects["track"], mode="only_valid").as_py()
-        times = pc.min_max(labels["timestamp_us"]).as_py()
-        ends = [*self._times, *(time for time in times.values() if time is not None)]
+        self._by_class += tally.classes
+        self._by_source_class += tally.source_classes
+        self._tracks += tally.tracks
+        ends = [*self._times, *tally.times_us]
         self._times = [min(ends), max(ends)] if ends else []
 
     @property

@@ -19,8 +19,7 @@ CRACK = 5e-4
 
 def features_of(network: Any) -> list[dict[str, Any]]:
     """Every element of a network of Scenic's driving domain, as the importer writes it, with the cracks closed."""
-    drivable = mapping(network.drivableRegion.polygons)
-    found = [{"type": "Feature", "geometry": drivable, "properties": {"id": "drivable", "kind": "drivable"}}]
+    found: list[dict[str, Any]] = []
     for feature in opendrive_worker.features_of(network, opendrive_worker.Directions(ElementTree.Element("OpenDRIVE"))):
         if feature["properties"]["kind"] in ("sidewalk", "shoulder"):
             feature["geometry"] = mapping(shape(feature["geometry"]).buffer(CRACK))
