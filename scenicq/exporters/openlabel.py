@@ -22,6 +22,8 @@ from scenicq.store.labels import Label, LabelObject
 __all__ = ["write_openlabel"]
 
 _MAP = "map"
+_LONGEST_NAME = 200
+"""Bytes of a recording's name in that of its file; systems take 255 in all."""
 _UUID = re.compile("[0-9a-fA-F]{8}(-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}")
 """What an object may be called by, besides a whole number: other names of tracks are its `name` only."""
 
@@ -104,7 +106,9 @@ def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str,
             "tags": tags,
         }
     }
-    safe = "".join(char if char.isalnum() or char in "-_" else "_" for char in labels[0].recording)[:100]
+    safe = "".join(char if char.isalnum() or char in "-_" else "_" for char in labels[0].recording)
+    # a system counts bytes, of which one character may have four
+    safe = safe.encode()[:_LONGEST_NAME].decode(errors="ignore")
     file = folder / f"{number:05d}_{safe}.json"
     file.write_text(json.dumps(content, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
 

@@ -54,11 +54,11 @@ class Partial:
             while self._lock is None:
                 self.folder.mkdir(exist_ok=True)
                 self._lock = self._locked()
+            for link in find_links(self.folder):
+                link.unlink()  # what an earlier process left there is not ours to go on from
         except KeyboardInterrupt:
             self._abandon()
             raise
-        for link in find_links(self.folder):
-            link.unlink()  # what an earlier process left there is not ours to go on from
 
     def _locked(self) -> IO[bytes] | None:
         path = self.folder / _LOCK
@@ -70,16 +70,19 @@ class Partial:
                 if not path.exists() or path.stat().st_ino != os.fstat(file.fileno()).st_ino:
                     file.close()
                     return None
+            return file  # within: an interrupt may come here, too
         except BlockingIOError as error:
             file.close()
             message = f"another ingest is writing {self.target}"
             raise DataError(Diagnostic("target-exists", message, hints=("wait until it ends",))) from error
-        return file
+        except BaseException:
+            file.close()  # which else holds the lock as long as anybody looks at the error
+            raise
 
     def _abandon(self) -> None:
         """Remove a folder that was made and not yet held, unless somebody holds it or it is worth going on from."""
         with suppress(OSError, DataError):
-            self._lock = self._locked()
+            self._lock = self._lock or self._locked()
             if self._lock is not None and [path.name for path in self.folder.iterdir()] == [_LOCK]:
                 self.remove()
 

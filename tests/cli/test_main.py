@@ -197,6 +197,22 @@ def test_an_interrupted_match_leaves_no_file(command, crossroads, scenarios, tmp
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_shard_leaves_no_file(command, crossroads, scenarios, tmp_path, number):
+    solver, begun, pieces = tmp_path / "solver.sh", tmp_path / "begun", tmp_path / "pieces"
+    solver.write_text(f"touch {begun}\nsleep 60\n")
+    slow = ("--no-prefilter", "--method", "smt", "--solver", f"sh {solver}", "--timeout", "60", "--shard", "1/2")
+    words = [command, "match", str(scenarios / "04_two_lane_traffic.scenic"), str(crossroads), "-o", str(pieces), *slow]
+    with subprocess.Popen(words, **PIPES) as process:
+        assert _soon(lambda: begun.exists() or process.poll() is not None)
+        assert process.poll() is None
+        process.send_signal(number)
+        _, told = process.communicate(timeout=60)
+    assert (process.returncode, told.splitlines()[0]) == (130, "interrupted")
+    assert not pieces.exists() or list(pieces.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_an_interrupted_match_without_a_file_says_what_can_be_resumed(command, crossroads, scenarios, tmp_path):
     solver, begun = tmp_path / "solver.sh", tmp_path / "begun"
     solver.write_text(f"touch {begun}\nsleep 60\n")

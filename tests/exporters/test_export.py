@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -242,6 +243,32 @@ def test_openlabel_holds_what_is_known_and_counts_the_rest(tmp_path: Path) -> No
     assert {each["name"]: each["val"] for each in bicycle["num"]} == {"yaw": 0.25, "length": 1.8, "width": 0.6}
     assert frame["frame_properties"]["streams"] == {"CAM": {"uri": "a.jpg"}}
     assert content["tags"]["0"]["tag_data"]["boolean"] == [{"name": "rain", "val": True}]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["x" * 300, "字" * 100, "\U0001f697" * 70, "ab" + "字" * 99, "/" * 400],
+    ids=["long", "3 bytes", "4 bytes", "mixed", "odd"],
+)
+@pytest.mark.parametrize("kind", ["openlabel", "interchange", "paths"])
+def test_names_may_be_long(kind: str, name: str, tmp_path: Path) -> None:
+    """The name of a file is no longer than systems take, whatever recordings and frames are called."""
+    source = Path(shutil.copytree(SAMPLES / "crossroads", tmp_path / "source"))
+    lines = [json.loads(line) for line in (source / "labels.jsonl").read_text().splitlines()]
+    own = [
+        line | {"recording": name, "id": f"{name}{line['id']}"}
+        for line in lines
+        if line["recording"] == lines[0]["recording"]
+    ]
+    (source / "labels.jsonl").write_text("".join(json.dumps(line) + "\n" for line in own))
+    ingest(source, tmp_path / "d")
+    export(kind, open_dataset(tmp_path / "d"), results(open_dataset(tmp_path / "d")), tmp_path / "out")
+    files = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
+    assert files
+    assert max(len(path.name.encode()) for path in files) <= 255
+    if kind == "interchange":
+        ingest(tmp_path / "out", tmp_path / "again")
+        assert {label.recording for label in open_dataset(tmp_path / "again").labels()} == {name}
 
 
 def test_interchange_keeps_what_has_no_heading(tmp_path: Path) -> None:
