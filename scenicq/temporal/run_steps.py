@@ -155,8 +155,10 @@ class RunSteps:
                 self._exits.clear()
             self._exits[number] = self._leaves(number)
         leaves = self._exits[number]
-        found = leaves.first(ahead.at, ahead.low, ahead.high) if isinstance(leaves, FirstExits) else leaves[ahead.at]
-        return np.minimum(np.minimum(found, ahead.due), ahead.last + 1)
+        # a lane may stand behind the last place of all
+        at = np.minimum(ahead.at, len(self.code) - 1)
+        found = leaves.first(at, ahead.low, ahead.high) if isinstance(leaves, FirstExits) else leaves[at]
+        return np.minimum(np.minimum(np.maximum(found, ahead.at), ahead.due), ahead.last + 1)
 
     def _leaves(self, number: int) -> Places | FirstExits:
         """For each place the first one from there that leads elsewhere."""

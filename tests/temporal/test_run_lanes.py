@@ -116,6 +116,11 @@ def test_runs_by_values_of_hidden_numbers_are_those_with_each_value():
     assert compare_pieces(random.Random(1), 25) > 400
 
 
+def test_lanes_may_stand_behind_the_last_place_of_all():
+    """Several pieces of one start, of which one has run out of the last stretch before the others lead elsewhere."""
+    assert compare_pieces(random.Random(0), 60) > 0
+
+
 @pytest.mark.parametrize("least", [0, 1, 2])
 def test_a_limit_of_pieces_makes_unknown_at_most(monkeypatch, least):
     monkeypatch.setattr(run_lanes, "_MOST_PIECES", least)
