@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,7 +51,8 @@ def recording_rows(
     placed = _placed(index, xy)
     times = np.array(columns.times_us, dtype=np.int64)
     # no motion crosses a label without an ego
-    one_track = ["ego" if category else None for category in egos.category]
+    passages = accumulate(int(not category) for category in egos.category)
+    one_track = [f"ego {n}" if category else None for n, category in zip(passages, egos.category, strict=True)]
     return {
         "labels": _table(
             "labels",
