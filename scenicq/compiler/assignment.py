@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 from scenicq.compiler.arithmetic import hashed
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.items import items_of
-from scenicq.compiler.known_properties import decided
+from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
 from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
@@ -92,5 +92,5 @@ def _nest(
     for item in items_of(run, run.evaluate(clause.iterable, around), clause.iterable.span):
         run.budget.step(clause.span)
         assign(run, clause.target, item, inner)
-        if all(decided(run, condition(run, test, inner), test.span) for test in clause.conditions):
+        if all(known_truth(run, condition(run, test, inner), test.span) for test in clause.conditions):
             _nest(run, clauses[1:], inner, inner, visit)

@@ -67,7 +67,7 @@ def part_of(part: str, target: ModelValue, span: Span) -> Instance:
     )
     offset = build.vector(x, y, span)
     heading = to_heading(target, span)
-    return operators.oriented(build.offset_local(to_vector(target, span), heading, offset, span), heading)
+    return operators.make_oriented_point(build.offset_local(to_vector(target, span), heading, offset, span), heading)
 
 
 def attribute(run: Interpreter, value: ModelValue, name: str, span: Span) -> ModelValue:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 from scenicq.compiler.choices import map_choice
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.following import follow
-from scenicq.compiler.known_properties import settled
+from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.lanes_ahead import lanes_ahead
 from scenicq.compiler.lookups import among, look_up
 from scenicq.compiler.road_attributes import worked_out
@@ -116,7 +116,7 @@ def _finder(run: Interpreter, parts: Sequence[NetworkElement], name: str) -> Cal
 
 
 def _known_place(run: Interpreter, point: ModelValue, what: str, hint: str, span: Span) -> Vector:
-    where = settled(run, to_vector(point, span))
+    where = as_constant(run, to_vector(point, span))
     if not isinstance(where, Constant):
         raise fail("unsupported-construct", f"`{what}` of a random point is not supported", span,
                    "as many as there are there", (hint,))  # fmt: skip
@@ -128,7 +128,7 @@ def nominal_directions(run: Interpreter, owner: Network | NetworkElement) -> Bui
 
     def directions(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
         found = look_up(run, owner, "nominalDirectionsAt", point, reject, span) if isinstance(owner, Network) else owner
-        place = settled(run, to_vector(point, span))
+        place = as_constant(run, to_vector(point, span))
         return map_choice(found, lambda element: _directions(element, place, span), span)
 
     return Builtin("nominalDirectionsAt", directions)

@@ -23,9 +23,9 @@ from scenicq.compiler.courses import option_of
 from scenicq.compiler.distributions import interval
 from scenicq.compiler.environment import FIRST_NAMES, Environment
 from scenicq.compiler.items import items_of, length_of, subscript
-from scenicq.compiler.known_properties import decided, settled
-from scenicq.compiler.logic import condition, connected, inverted
-from scenicq.compiler.texts import checked_text, formatted
+from scenicq.compiler.known_properties import as_constant, known_truth
+from scenicq.compiler.logic import condition, connect, invert
+from scenicq.compiler.texts import checked_text, format_string
 from scenicq.compiler.unread import read
 from scenicq.compiler.values import (
     Builtin,
@@ -95,7 +95,7 @@ def call(
         run.budget.step(span, items if function.name in _ONE_BY_ONE else items // run.budget.ITEMS_PER_STEP)
         run.budget.step(span, function.cost)
         if function.known:
-            args = [settled(run, value) for value in args]
+            args = [as_constant(run, value) for value in args]
 
         def now(*values: ModelValue) -> ModelValue:
             given = dict(zip(named, values[len(args) :], strict=True))
@@ -183,7 +183,7 @@ def _unary(op: str, value: ModelValue, span: Span) -> ModelValue:
     if isinstance(value, Choice):
         return map_choice(value, lambda option: _unary(op, option, span), span)
     if op == "not":
-        return inverted(value, span)
+        return invert(value, span)
     if is_node(value):
         return operators.negate(value, span) if op == "-" else value
     return plain_unary(op, value, span)
@@ -236,9 +236,9 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
         case ast.ComparisonChain():
             return _compare_chain(run, node, scope)
         case ast.BoolOp():
-            return connected(run, node, scope)
+            return connect(run, node, scope)
         case ast.IfElse():
-            chosen = node.then if decided(run, condition(run, node.test, scope), node.test.span) else node.otherwise
+            chosen = node.then if known_truth(run, condition(run, node.test, scope), node.test.span) else node.otherwise
             return evaluate(run, chosen, scope)
         case ast.Tuple():
             return _tuple(run, node, scope)
@@ -270,7 +270,7 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
             go_through(run, node.clauses, scope, put)
             return table
         case ast.FormattedString():
-            return formatted(run, node, scope)
+            return format_string(run, node, scope)
         case ast.Walrus():
             value = evaluate(run, node.value, scope)
             assign_around(run, node.target, value, scope)

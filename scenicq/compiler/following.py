@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from scenicq.compiler.coerce import to_scalar, to_vector
-from scenicq.compiler.operators import direction_at, oriented
+from scenicq.compiler.operators import direction_at, make_oriented_point
 from scenicq.compiler.values import Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -50,7 +50,7 @@ def follow(
     fewest, most = _steps(length, run.version, span)
     run.budget.step(span, sum(range(fewest, most + 1)) // 4)
     position, heading = _ways(field, _later(run, field), point, length, fewest, most, span)
-    return oriented(position, heading)
+    return make_oriented_point(position, heading)
 
 
 def _later(run: Interpreter | SpecifierContext, field: ModelValue) -> ModelValue:

@@ -24,7 +24,7 @@ from scenicq.compiler.environment import Budget, Course, Environment
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.items import items_of
-from scenicq.compiler.known_properties import decided
+from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition
 from scenicq.compiler.placing import SpecifierContext, bind
@@ -33,7 +33,7 @@ from scenicq.compiler.scoping import own_names
 from scenicq.compiler.specifiers import construct
 from scenicq.compiler.temporal import TimedStatements
 from scenicq.compiler.timed_statements import leave_out, timed_statement
-from scenicq.compiler.unread import computed
+from scenicq.compiler.unread import evaluate_when_read
 from scenicq.compiler.values import (
     Choice,
     Delayed,
@@ -265,7 +265,7 @@ class Interpreter:
             case ast.ExpressionStatement():
                 self._value(node.value, scope)
             case ast.Assign():
-                value = computed(self, node.value, scope, lambda: self._value(node.value, scope))
+                value = evaluate_when_read(self, node.value, scope, lambda: self._value(node.value, scope))
                 for target in node.targets:
                     assign(self, target, value, scope)
             case ast.AugmentedAssign():
@@ -281,7 +281,7 @@ class Interpreter:
                 )
             case ast.While():
                 test = node.test
-                self._loop(node, iter(lambda: decided(self, condition(self, test, scope), test.span), False), scope)
+                self._loop(node, iter(lambda: known_truth(self, condition(self, test, scope), test.span), False), scope)
             case ast.Break():
                 raise _Break
             case ast.Continue():
@@ -306,7 +306,7 @@ class Interpreter:
             case ast.Mutate():
                 self._mutate(node, scope)
             case ast.Assert():
-                if not decided(self, condition(self, node.test, scope), node.test.span):
+                if not known_truth(self, condition(self, node.test, scope), node.test.span):
                     raise fail("runtime-error", "the assertion does not hold", node.span)
             case ast.Global() | ast.Nonlocal():
                 self._share(node, scope)
@@ -372,7 +372,7 @@ class Interpreter:
 
     def _branch(self, node: ast.If, scope: Environment) -> None:
         for branch in node.branches:
-            if decided(self, condition(self, branch.test, scope), branch.test.span):
+            if known_truth(self, condition(self, branch.test, scope), branch.test.span):
                 self.run(branch.body, scope)
                 return
         self.run(node.orelse, scope)

@@ -14,7 +14,7 @@ from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import kind_of_model, to_vector
 from scenicq.compiler.comparisons import compare, iterate
 from scenicq.compiler.courses import option_of
-from scenicq.compiler.known_properties import decided
+from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.region_attributes import corner
 from scenicq.compiler.values import Choice, ModelValue, Module, describe, fail, is_node
 from scenicq.errors import Span
@@ -60,12 +60,12 @@ def _index_on_course(run: Interpreter, value: ModelValue, index: ModelValue, spa
     """
     index = option_of(run, index, span)
     if kind_of_model(index) == "boolean":
-        return decided(run, index, span)
+        return known_truth(run, index, span)
     if not is_random(index):
         return index
     count = length_of(value)
     for each in list(cast("dict[ModelValue, ModelValue]", value)) if isinstance(value, dict) else range(-count, count):
-        if decided(run, compare("==", index, each, span), span):
+        if known_truth(run, compare("==", index, each, span), span):
             return each
     raise fail("map-lacks", "there is no item with this random index", span, "not found")
 

@@ -24,10 +24,10 @@ from scenicq.forest.walk import features, postorder
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["decided", "settled"]
+__all__ = ["as_constant", "known_truth"]
 
 
-def settled(run: Interpreter, value: ModelValue) -> ModelValue:
+def as_constant(run: Interpreter, value: ModelValue) -> ModelValue:
     """A value with known properties of objects put in, if that leaves nothing random; else the value itself."""
     if run.course is not None or not is_node(value) or isinstance(value, Constant):
         return value
@@ -78,14 +78,14 @@ def _put_in(node: Node, known: Mapping[tuple[int, str], Constant | None]) -> Con
     return found if isinstance(found, Constant) else None
 
 
-def decided(run: Interpreter, value: ModelValue, span: Span) -> bool:
+def known_truth(run: Interpreter, value: ModelValue, span: Span) -> bool:
     """The truth of a condition on which the program's course depends.
 
     Raises:
         ScenarioError: random-branch, where it is random, unless a condition on the scene is evaluated.
     """
     if run.course is None:
-        return truth(settled(run, value), span)
+        return truth(as_constant(run, value), span)
     test = as_test(value, span)
     if is_node(test) and not isinstance(test, Constant) and kind_of_model(test) == "boolean":
         return run.course.decide(test, span)

@@ -17,7 +17,7 @@ from scenicq.compiler.choices import distribute, is_choice
 from scenicq.compiler.coerce import kind_of_model, to_boolean
 from scenicq.compiler.courses import as_test, split
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.known_properties import decided
+from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.values import Delayed, ModelValue, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
@@ -27,7 +27,7 @@ from scenicq.syntax.walk import walk
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["condition", "connected", "inverted"]
+__all__ = ["condition", "connect", "invert"]
 
 
 def condition(run: Interpreter, node: ast.Expression, scope: Environment) -> ModelValue:
@@ -39,7 +39,7 @@ def condition(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
             values = (_operand(run, part, scope) if alone else condition(run, part, scope) for part in node.values)
             return _joined(node.operator, _until_decided(run, node.operator, values, node.span), node.span)
         case ast.UnaryOp(operator="not"):
-            return inverted(condition(run, node.operand, scope), node.span)
+            return invert(condition(run, node.operand, scope), node.span)
         case _:
             return run.evaluate(node, scope)
 
@@ -50,12 +50,12 @@ def _operand(run: Interpreter, node: ast.Expression, scope: Environment) -> Mode
     return found.value if isinstance(found, Constant) and isinstance(found.value, bool) else found
 
 
-def inverted(value: ModelValue, span: Span) -> ModelValue:
+def invert(value: ModelValue, span: Span) -> ModelValue:
     """`not value`."""
     return operators.combine("not", [value], span) if is_random(value) else not truth(value, span)
 
 
-def connected(run: Interpreter, node: ast.BoolOp, scope: Environment) -> ModelValue:
+def connect(run: Interpreter, node: ast.BoolOp, scope: Environment) -> ModelValue:
     """The value of `a and b` or `a or b`: the operand that decides, else the last one."""
     values = (run.evaluate(part, scope) for part in node.values)
     return _deciding(run, node.operator, _until_decided(run, node.operator, values, node.span), node.span)
@@ -105,6 +105,6 @@ def _deciding(run: Interpreter, op: str, values: list[ModelValue], span: Span) -
 
         return distribute(taken, tuple(left), span, spread=is_choice)
     if run.course is not None:
-        return next((value for value in left[:-1] if decided(run, value, span) == (op == "or")), left[-1])
+        return next((value for value in left[:-1] if known_truth(run, value, span) == (op == "or")), left[-1])
     raise fail("random-branch", f"which operand `{op}` gives depends on a random value", span, "random here",
                ("compare the values, as in `a > 0`", "state conditions with `require`"))  # fmt: skip

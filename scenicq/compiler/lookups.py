@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.element_lookups import LOOKUPS, LookupTable, own
-from scenicq.compiler.known_properties import settled
+from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.values import Choice, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant, Vector
@@ -72,7 +72,7 @@ def _at(
 ) -> ModelValue:
     run.budget.step(span, run.budget.LOOK_UP_STEPS)
     place = to_vector(point, span)
-    certain = settled(run, place)
+    certain = as_constant(run, place)
     options = (*table.options, None)
     if isinstance(certain, Constant):
         x, y = cast(Vector, certain.value)

@@ -62,10 +62,10 @@ __all__ = [
     "existing",
     "intersects",
     "is_field",
+    "make_oriented_point",
     "negate",
     "object_box",
     "offset",
-    "oriented",
     "region_difference",
     "region_intersection",
     "region_union",
@@ -197,7 +197,7 @@ def offset(origin: ModelValue, by: ModelValue, span: Span) -> ModelValue:
     (start, base), (away, height) = apart_from_height(origin), apart_from_height(by)
     if isinstance(start, Instance) and start.oriented:
         position = build.offset_local(to_vector(start, span), to_heading(start, span), to_vector(away, span), span)
-        return oriented(_raised(position, base, height, span), to_heading(start, span))
+        return make_oriented_point(_raised(position, base, height, span), to_heading(start, span))
     return _raised(build.vector_sum(to_vector(start, span), to_vector(away, span), span), base, height, span)
 
 
@@ -217,7 +217,7 @@ def _raised(place: Node, base: ModelValue, height: ModelValue, span: Span) -> Mo
     return build.coordinate(place, 0, span), build.coordinate(place, 1, span), up
 
 
-def oriented(position: ModelValue, heading: Node) -> Instance:
+def make_oriented_point(position: ModelValue, heading: Node) -> Instance:
     """An oriented point."""
     return oriented_point({"position": position, "heading": heading})
 

@@ -46,7 +46,9 @@ def of_region(value: Node, name: str, span: Span) -> ModelValue:
         case "start" | "end" if (points := _line(value)) is not None:
             (x, y), (u, v) = points[:2] if name == "start" else points[-2:]
             place = points[0] if name == "start" else points[-1]
-            return operators.oriented(build.constant(place, span), build.constant(heading_of(u - x, v - y), span))
+            return operators.make_oriented_point(
+                build.constant(place, span), build.constant(heading_of(u - x, v - y), span)
+            )
         case "points" if (points := _line(value)) is not None:
             return tuple(build.constant(point, span) for point in points)
         case "footprint" if isinstance(value, Constant) and isinstance(value.value, PolygonSet):

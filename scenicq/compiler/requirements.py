@@ -19,7 +19,7 @@ from scenicq.syntax import ast
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["RequireStatement", "deferred", "requirement"]
+__all__ = ["RequireStatement", "defer", "requirement"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,17 +43,17 @@ def requirement(run: Interpreter, node: ast.Require, scope: Environment) -> Requ
         raise fail("wrong-value", "a requirement with operators of time has no probability", node.probability.span,
                    "only 1 can stand here", ("leave the probability out",))  # fmt: skip
     if run.timed is not None and is_temporal(wanted):
-        run.timed.require(lambda expression: deferred(run, expression, scope, node.span), wanted, node.span)
+        run.timed.require(lambda expression: defer(run, expression, scope, node.span), wanted, node.span)
         return None
     if isinstance(wanted, ast.Temporal | ast.UntilOperator):
         run.dynamic(f"require {wanted.operator if isinstance(wanted, ast.Temporal) else 'until'}", wanted.span)
         if not (isinstance(wanted, ast.Temporal) and wanted.operator == "always"):
             return None
         wanted = wanted.operand
-    return RequireStatement(deferred(run, wanted, scope, node.span), node.span, probability)
+    return RequireStatement(defer(run, wanted, scope, node.span), node.span, probability)
 
 
-def deferred(run: Interpreter, wanted: ast.Expression, scope: Environment, span: Span) -> Callable[[], Node]:
+def defer(run: Interpreter, wanted: ast.Expression, scope: Environment, span: Span) -> Callable[[], Node]:
     """What computes a condition, once the ego is known, over the names that the program has now."""
     names: dict[str, ModelValue] = {}
     current = scope

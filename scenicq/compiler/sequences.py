@@ -18,7 +18,7 @@ from scenicq.compiler.coerce import kind_of_model, to_scalar
 from scenicq.compiler.comparisons import compare
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector, items_of
-from scenicq.compiler.known_properties import decided, settled
+from scenicq.compiler.known_properties import as_constant, known_truth
 from scenicq.compiler.rounding import in_order
 from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail, lift
 from scenicq.errors import Span
@@ -48,7 +48,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
     def filtered(span: Span, function: ModelValue, items: ModelValue) -> ModelValue:
         if isinstance(items, Choice):
             return each_option(run, items, lambda option: filtered(span, function, option), span)
-        return [item for item in items_of(run, items, span) if decided(run, apply(function, item, span), span)]
+        return [item for item in items_of(run, items, span) if known_truth(run, apply(function, item, span), span)]
 
     def mapped(span: Span, function: ModelValue, *lists: ModelValue) -> ModelValue:
         columns = [items_of(run, items, span) for items in lists]
@@ -57,11 +57,11 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
     def less(one: ModelValue, other: ModelValue, span: Span) -> bool:
         run.budget.step(span)
         if is_random(one) or is_random(other):
-            return decided(run, lift(lambda a, b: compare("<", a, b, span), one, other), span)
+            return known_truth(run, lift(lambda a, b: compare("<", a, b, span), one, other), span)
         return plain_binary("<", one, other, span)
 
     def ordered(span: Span, items: ModelValue, key: ModelValue = None, reverse: ModelValue = False) -> ModelValue:
-        keyed = [(_plain(settled(run, apply(key, item, span))), item) for item in items_of(run, items, span)]
+        keyed = [(_plain(as_constant(run, apply(key, item, span))), item) for item in items_of(run, items, span)]
         random, backwards = any(is_random(value) for value, _ in keyed), truth(reverse, span)
         if random and key is None and all(kind_of_model(item) == "scalar" for _, item in keyed):
             run.budget.step(span, len(keyed) ** 2)
@@ -100,7 +100,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
                 return plain(span, *values)
             if not values:
                 raise fail("runtime-error", f"`{name}` of an empty list", span)
-            keys = [_plain(settled(run, apply(key, value, span))) for value in values]
+            keys = [_plain(as_constant(run, apply(key, value, span))) for value in values]
             if run.course is None and any(map(is_random, keys)):
                 raise fail("random-branch", "random values have no known order", span, "random here",
                            ("compare by something known", "state conditions with `require`"))  # fmt: skip

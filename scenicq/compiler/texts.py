@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from scenicq.compiler.arithmetic import LARGEST
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.known_properties import settled
+from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
@@ -20,7 +20,7 @@ from scenicq.syntax import ast
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["checked_text", "formatted"]
+__all__ = ["checked_text", "format_string"]
 
 _FORMAT = re.compile(r"(.?[<>=^])?[-+ ]?#?0?\d{0,3}[,_]?(\.\d{1,2})?[bcdeEfFgGnosxX%]?", re.DOTALL)
 """Format specifications whose result is at most about a thousand characters long."""
@@ -37,7 +37,7 @@ def checked_text(text: str, span: Span) -> str:
     return text
 
 
-def formatted(run: Interpreter, node: ast.FormattedString, scope: Environment) -> str:
+def format_string(run: Interpreter, node: ast.FormattedString, scope: Environment) -> str:
     """The text of an f-string.
 
     Raises:
@@ -48,14 +48,14 @@ def formatted(run: Interpreter, node: ast.FormattedString, scope: Environment) -
         if isinstance(part, ast.LiteralValue):
             text.append(checked_text(str(part.value), part.span))
             continue
-        value = settled(run, run.evaluate(part.value, scope))
+        value = as_constant(run, run.evaluate(part.value, scope))
         value = value.value if isinstance(value, Constant) else value
         if not isinstance(value, str | int | float | bool | None):
             raise fail("unsupported-construct", "only known numbers and strings can be put in a string", part.span,
                        f"this is {describe(value)}",
                        ("choose between known strings with `Uniform(...)`",))  # fmt: skip
         value = {"r": repr, "a": ascii, "s": str}[part.conversion](value) if part.conversion else value
-        text.append(_laid_out(value, formatted(run, part.format, scope) if part.format else "", part.span))
+        text.append(_laid_out(value, format_string(run, part.format, scope) if part.format else "", part.span))
         run.budget.pay(len(text[-1]), node.span)
     if sum(map(len, text)) > LARGEST:
         raise fail("budget-exceeded", f"a string grows beyond {LARGEST:,} characters", node.span, "grows here")

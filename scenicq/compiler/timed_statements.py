@@ -10,7 +10,7 @@ from scenicq.compiler.courses import without_courses
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.items import items_of
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition, graph_of
-from scenicq.compiler.requirements import deferred
+from scenicq.compiler.requirements import defer
 from scenicq.compiler.temporal import TimedStatements
 from scenicq.compiler.values import describe, fail
 from scenicq.errors import Diagnostic, Span
@@ -65,7 +65,7 @@ def timed_statement(
             _watch(run, timed, value, node.span)
         case ast.DynamicStatement(kind="terminate when" | "terminate simulation") if node.operand is not None:
             simulation = node.kind == "terminate simulation"
-            timed.end(node.span, condition=deferred(run, node.operand, scope, node.span), simulation=simulation)
+            timed.end(node.span, condition=defer(run, node.operand, scope, node.span), simulation=simulation)
         case ast.DynamicStatement(kind="terminate after"):
             timed.end(node.span, after_s=_seconds(run, node, scope))
         case _:
@@ -114,7 +114,7 @@ def _watch(run: Interpreter, timed: TimedStatements, call: MonitorCall, span: Sp
         return inner
 
     def conditions(wanted: ast.Expression, names: Environment) -> Callable[[], Node]:
-        return deferred(run, wanted, names, span)
+        return defer(run, wanted, names, span)
 
     def seconds(node: ast.DynamicStatement, names: Environment) -> float:
         return _seconds(run, node, names)

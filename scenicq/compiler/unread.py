@@ -20,7 +20,7 @@ from scenicq.syntax.walk import walk
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["NoValue", "computed", "read"]
+__all__ = ["NoValue", "evaluate_when_read", "read"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +30,7 @@ class NoValue:
     error: ScenarioError
 
 
-def computed(
+def evaluate_when_read(
     run: Interpreter, node: ast.Expression, scope: Environment, compute: Callable[[], ModelValue]
 ) -> ModelValue:
     """The value that a statement gives a name.

@@ -72,7 +72,7 @@ def _ways(
     """A crossing and the ways through it: straight on in either lane, to the right in the outer, left in the inner one.
 
     Args:
-        name: Of the crossing.
+        name: The crossing's name.
         center: Where it is.
         arms: By the number of the arm: its road, the group of the lanes that lead here, that of those that lead away.
         lanes: How many lanes each way go through it.

@@ -148,7 +148,7 @@ class Occupancy:
 
         Args:
             bounds: The box.
-            number: Of the option whose areas are wanted; all if None.
+            number: The option whose areas are wanted; all if None.
         """
         box = _box(bounds)
         return [

@@ -49,7 +49,7 @@ class World:
     """What all jobs of an ingest share.
 
     Attributes:
-        folder: Of the dataset that grows.
+        folder: The folder of the dataset that grows.
         maps: Elements of each map.
         strict: Whether the first problem is an error.
     """
@@ -64,8 +64,8 @@ class SegmentPlace:
     """Where a segment lies that there is already.
 
     Attributes:
-        folder: Of its dataset.
-        number: Of the segment there.
+        folder: The folder of its dataset.
+        number: The segment's number there.
         segment: What it holds.
     """
 
@@ -79,9 +79,9 @@ class RecordingTask:
     """One recording of a segment to be written.
 
     Attributes:
-        name: Of the recording.
-        fingerprint: Of all that it depends on.
-        reader: Of the recording alone.
+        name: The recording's name.
+        fingerprint: What changes with all that it depends on.
+        reader: Reads the recording alone.
         old: A segment that has it already.
     """
 
@@ -96,9 +96,9 @@ class Job:
     """One segment to be written.
 
     Attributes:
-        number: Of the segment.
+        number: The segment's number.
         shares: Its recordings, in order.
-        fingerprint: Of all that it depends on.
+        fingerprint: What changes with all that it depends on.
         taken: Recording and frame of labels that are left out, because earlier recordings use the same name.
     """
 

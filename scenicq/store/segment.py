@@ -58,7 +58,7 @@ class SourceProblem:
 
     Attributes:
         what, code, name, kept: As in `LeftOut`.
-        message, hints: Of the diagnostic.
+        message, hints: The diagnostic's.
     """
 
     what: str
@@ -176,8 +176,8 @@ class SegmentWriter:
     """Writes one segment of a dataset.
 
     Attributes:
-        folder: Of the dataset.
-        number: Of the segment.
+        folder: The dataset's folder.
+        number: The segment's number.
     """
 
     folder: Path
@@ -220,7 +220,7 @@ class SegmentWriter:
         """Append a recording that another segment has.
 
         Args:
-            name: Of the recording; they come in order of their names.
+            name: The recording's name; recordings come in order of their names.
             rows: Its rows in each of `SEGMENT_TABLES`.
 
         Raises:
@@ -269,7 +269,7 @@ class SegmentWriter:
         """Complete the files, then say so.
 
         Args:
-            fingerprint: Of the segment.
+            fingerprint: The segment's fingerprint.
             pieces: As in `Segment`.
 
         Raises:
@@ -320,8 +320,8 @@ def is_whole(segment: Segment, folder: Path, number: int) -> bool:
 
     Args:
         segment: The segment.
-        folder: Of the dataset.
-        number: Of the segment there.
+        folder: The dataset's folder.
+        number: The segment's number there.
     """
     for table in SEGMENT_TABLES:
         part = segment.part(table, number)

@@ -97,8 +97,8 @@ class Example:
     """Values of random variables with which a label matches.
 
     Attributes:
-        values: Of the variables of conditions over time.
-        witness: Of all, by their place in the program.
+        values: The values of the variables of conditions over time.
+        witness: The values of all, by their place in the program.
         truth: What they make of each condition that hangs on them, at each sample.
     """
 

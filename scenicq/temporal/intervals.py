@@ -142,7 +142,7 @@ class IntervalMatcher:
     Attributes:
         scenario: The scenario, made ready to be matched.
         match: Options of the matcher, for initial scenes.
-        options: Of intervals.
+        options: The options of intervals.
         solver: Decides what is not decided otherwise.
         outcomes: The outcomes of the choices that conditions over time hang on.
     """

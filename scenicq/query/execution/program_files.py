@@ -35,7 +35,7 @@ class SiblingFiles:
     So whoever has it, copies in other processes included, compiles one program, whatever is written meanwhile.
 
     Attributes:
-        path: Of the program.
+        path: The program's file.
     """
 
     path: Path
