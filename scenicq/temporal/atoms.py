@@ -7,7 +7,7 @@ allows several directions, any of them will do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
 
@@ -21,6 +21,7 @@ from scenicq.forest.condition import expand
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
 from scenicq.forest.nodes import DirectionAt, Feature, Identity, Leaf, Node, Value
 from scenicq.forest.scenario import Scenario
+from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.temporal.samples import FIXED, MOVING, Observed
@@ -145,6 +146,22 @@ class AtomColumns:
             self.undecided.append(open_)
             found[open_] = UNKNOWN
         return found
+
+    def reader(self, conditions: Sequence[Node], given: Mapping[int, Truth] | None = None) -> Callable[[Atom], Truth]:
+        """What gives the value of an atom at each sample, each worked out when it is first asked for.
+
+        Args:
+            conditions: The expanded conditions that atoms stand for.
+            given: Values of some that are known already, by their numbers.
+        """
+        known = dict(given or {})
+
+        def read(atom: Atom) -> Truth:
+            if atom.number not in known:
+                known[atom.number] = self.truth_of(conditions[atom.number])
+            return known[atom.number]
+
+        return read
 
     def _with_bounds(self, condition: Node, found: Truth) -> Truth:
         """The truth where a condition is the same for every speed that is not observed."""

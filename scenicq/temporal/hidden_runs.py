@@ -15,7 +15,6 @@ from scenicq.budget import TimeIsUp, limited, look
 from scenicq.forest.nodes import Compare, CompareOp, Constant, Identity, Logic, LogicOp, Node, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import roots_of
-from scenicq.forest.temporal import Atom
 from scenicq.forest.walk import leaves
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown, WitnessValue
@@ -149,14 +148,7 @@ class HiddenRuns:
     ) -> HiddenFound:  # fmt: skip
         """The runs by the values of hidden numbers."""
         hidden = HiddenConditions(columns, expanded)
-        known: dict[int, Truth] = {}
-
-        def atom(each: Atom) -> Truth:
-            if each.number not in known:
-                known[each.number] = columns.truth_of(expanded[each.number])
-            return known[each.number]
-
-        pieces = follow_pieces(self.machine, stretches, atom, hidden)
+        pieces = follow_pieces(self.machine, stretches, columns.reader(expanded), hidden)
         self._confirm(pieces, stretches, columns, expanded, hidden)
         runs, numbers = pieces.runs, cast("list[int]", stretches.numbers.tolist())
         order = np.lexsort((*pieces.low.T[::-1], -runs.ends, -runs.truth.astype(np.int64), pieces.of))
@@ -240,14 +232,7 @@ class HiddenRuns:
 
     def _run(self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], known: Mapping[int, Truth]) -> Run:
         """The run of one start, given some conditions at each sample."""
-        values = dict(known)
-
-        def atom(each: Atom) -> Truth:
-            if each.number not in values:
-                values[each.number] = columns.truth_of(expanded[each.number])
-            return values[each.number]
-
-        return follow_runs(self.machine, one, atom).run(0, int(one.starts[0]))
+        return follow_runs(self.machine, one, columns.reader(expanded, known)).run(0, int(one.starts[0]))
 
     def _again(
         self, found: HiddenFound, pieces: Pieces, groups: Sequence[NDArray[np.int64]], hidden: HiddenConditions,

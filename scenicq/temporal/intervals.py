@@ -20,7 +20,6 @@ from scenicq.errors import Span
 from scenicq.forest.condition import expand
 from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import Atom
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import WitnessValue
 from scenicq.smt.answer import Solver
@@ -213,14 +212,8 @@ class IntervalMatcher:
             every = self.options.intervals == "all"
             hidden = HiddenRuns(program.machine, program.scenario, self.match, self.solver, every)
             return _found(stretches, table, columns, hidden.follow(stretches, columns, expanded, remember))
-        known: dict[int, Truth] = {}
-
-        def atom(each: Atom) -> Truth:
-            if each.number not in known:
-                known[each.number] = columns.truth_of(expanded[each.number])
-            return known[each.number]
-
-        return _found(stretches, table, columns, HiddenFound(follow_runs(program.machine, stretches, atom)))
+        runs = follow_runs(program.machine, stretches, columns.reader(expanded))
+        return _found(stretches, table, columns, HiddenFound(runs))
 
     def _reported(self, found: _Found, table: StartTable, bindings: NDArray[np.int64], *, every: bool) -> Reported:
         """What is reported of the runs of all bindings; see `intervals`."""

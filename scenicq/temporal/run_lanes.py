@@ -7,7 +7,7 @@ cut lies within a piece, it falls in two. Pieces of one start that touch and sta
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,16 +64,11 @@ def follow_runs(
     if which is None:
         which = np.arange(len(stretches.starts))
     runs = Runs.unknown(stretches.starts[which].copy())
-    # a situation that waits for a time is of one run alone
-    size = _TIMED_AT_ONCE if machine.timed else max(len(which), 1)
-    for first in range(0, len(which), size):
-        if machine.timed:
-            machine.begin()
-        steps = RunSteps(machine, stretches, atom, which[first : first + size])
+    for places in _at_once(machine, len(which)):
+        steps = RunSteps(machine, stretches, atom, which[places])
         # each run has a time of its own, or what becomes of all that stand alike is the same
         notes = _alone(steps) if machine.timed or steps.limited else _together(steps)
-        some = np.arange(len(steps.which))
-        runs.replace(np.arange(first, first + len(some)), _runs_of(steps, notes, some))
+        runs.replace(places, _runs_of(steps, notes, np.arange(len(places))))
     return runs
 
 
@@ -88,18 +83,22 @@ def follow_pieces(
         atom: The value of an atom that hangs on no hidden number at each place.
         hidden: The conditions that do.
     """
-    every = np.arange(len(stretches.starts))
-    parts: list[Pieces] = []
-    size = _TIMED_AT_ONCE if machine.timed else max(len(every), 1)
-    for first in range(0, len(every), size):
-        if machine.timed:
-            machine.begin()
-        steps = RunSteps(machine, stretches, atom, every[first : first + size], hidden)
-        parts.append(_pieces(steps))
+    starts = _at_once(machine, len(stretches.starts))
+    parts = [_pieces(RunSteps(machine, stretches, atom, which, hidden)) for which in starts]
     return Pieces(
         np.concatenate([each.of for each in parts]), Runs.joined([each.runs for each in parts]),
         np.concatenate([each.low for each in parts]), np.concatenate([each.high for each in parts]),
     )  # fmt: skip
+
+
+def _at_once(machine: RunMachine, count: int) -> Iterator[NDArray[np.int64]]:
+    """The numbers of runs that are followed at once, for each of which the machine is made ready."""
+    # a situation that waits for a time is of one run alone
+    size = _TIMED_AT_ONCE if machine.timed else max(count, 1)
+    for first in range(0, count, size):
+        if machine.timed:
+            machine.begin()
+        yield np.arange(first, min(first + size, count))
 
 
 def _together(steps: RunSteps) -> Notes:
