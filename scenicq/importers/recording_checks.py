@@ -11,6 +11,7 @@ import numpy as np
 
 from scenicq.importers.report import Report
 from scenicq.store.columns import RecordingColumns
+from scenicq.store.motion import track_numbers
 
 __all__ = ["radians", "tell_order", "tell_recording"]
 
@@ -94,21 +95,17 @@ def tell_recording(columns: RecordingColumns, report: Report) -> None:
 def _tell_jumps(columns: RecordingColumns, report: Report) -> None:
     """Tell tracks that are twice somewhere nothing gets from one place to the other in time."""
     objects = columns.objects
-    names = list(dict.fromkeys(track for track in objects.track if track is not None))
-    numbers: dict[str | None, int] = {name: number for number, name in enumerate(names)} | {None: -1}
-    track = np.array([numbers[each] for each in objects.track], dtype=np.int64)
+    track = track_numbers(objects.track)
     time_us = np.repeat(np.array(columns.times_us, dtype=np.int64), columns.object_counts)
-    order = np.lexsort((time_us, track))
-    order = order[track[order] >= 0]
+    order = np.argsort(track, kind="stable")
     track, time_us, x, y = track[order], time_us[order], objects.x[order], objects.y[order]
     away_m, passed_s = np.hypot(np.diff(x), np.diff(y)), np.diff(time_us) / 1e6
     with np.errstate(divide="ignore", invalid="ignore"):
         jumps = (np.diff(track) == 0) & (away_m > _SHORTEST_JUMP_M) & (away_m / passed_s > _FASTEST_M_S)
     (places,) = np.nonzero(jumps)
-    for number, first in zip(*np.unique(track[places], return_index=True), strict=True):
-        place = places[first]
+    for place in places[np.unique(track[places], return_index=True)[1]].tolist():
         message = (
-            f"track `{names[number]}` of recording `{columns.name}` is {away_m[place]:.0f} m away "
+            f"track `{objects.track[int(order[place])]}` of recording `{columns.name}` is {away_m[place]:.0f} m away "
             f"{passed_s[place]:g} s later; what is derived from its motion is as absurd"
         )
         report.assumed("track", "tracks that jump", message)

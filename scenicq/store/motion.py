@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scenicq.geometry.angles import normalize_array
 from scenicq.store.columns import MemberColumns
 
-__all__ = ["LONGEST_GAP_US", "MotionColumns", "motion_of"]
+__all__ = ["LONGEST_GAP_US", "MotionColumns", "motion_of", "track_numbers"]
 
 LONGEST_GAP_US = 1_500_000
 """Microseconds between two samples of a track beyond which neither says anything of the other."""
@@ -59,6 +59,15 @@ def motion_of(times_us: NDArray[np.int64], members: MemberColumns, tracks: Seque
     return MotionColumns(vx, vy, acceleration, steps.rate(members.heading, turns=True), derived)
 
 
+def track_numbers(tracks: Sequence[str | None]) -> NDArray[np.int64]:
+    """Numbers of tracks, in the order in which they come first; what has no track is one of its own, below 0."""
+    numbers: dict[str, int] = {}
+    return np.array(
+        [~place if name is None else numbers.setdefault(name, len(numbers)) for place, name in enumerate(tracks)],
+        dtype=np.int64,
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Steps:
     """The neighbours of each sample on its track; its own number where there is none near enough."""
@@ -70,12 +79,7 @@ class _Steps:
     @classmethod
     def of(cls, times_us: NDArray[np.int64], tracks: Sequence[str | None]) -> _Steps:
         """Find the neighbours."""
-        numbers: dict[str, int] = {}
-        # what has no track is a track of its own
-        track = np.array(
-            [~place if name is None else numbers.setdefault(name, len(numbers)) for place, name in enumerate(tracks)],
-            dtype=np.int64,
-        )
+        track = track_numbers(tracks)
         order = np.argsort(track, kind="stable")
         times = times_us[order]
         gap = np.diff(times)

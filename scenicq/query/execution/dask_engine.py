@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import platform
 import shutil
 import tempfile
@@ -28,6 +29,7 @@ from typing import Any
 from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
 from scenicq.processes import processors
+from scenicq.query.execution.deadline import time_left_s
 from scenicq.query.execution.partitions import Partition
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Done, Engine, Progress, Question, alone, run_shard
@@ -158,7 +160,14 @@ def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tup
             room = 3 * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) - len(pending)
             for piece in islice(waiting, max(0, room)):
                 work = client.submit(
-                    _work, question, piece, __version__, platform.node(), _left_s(query), pure=False, retries=_RETRIES
+                    _work,
+                    question,
+                    piece,
+                    __version__,
+                    platform.node(),
+                    time_left_s(query.options.until),
+                    pure=False,
+                    retries=_RETRIES,
                 )
                 pending.append((piece, work))
             if not pending:
@@ -197,22 +206,17 @@ def _taken(client: Any, future: Any) -> Done:
                 raise DataError(Diagnostic("engine-failed", message, hints=hints)) from None
 
 
-def _left_s(query: Query) -> float | None:
-    """Seconds until the deadline of a query, for machines with another clock."""
-    return None if query.options.until is None else query.options.until - time.monotonic()
-
-
 _known = threading.local()
 
 
-def _work(question: Question, piece: Partition, client_version: str, machine: str, left_s: float | None) -> Done:
+def _work(question: Question, piece: Partition, client_version: str, machine: str, left_s: float) -> Done:
     """Run a piece in a worker, which keeps what it has compiled."""
     if __version__ != client_version:
         message = f"a worker has version {__version__} of scenicq, the client {client_version}"
         raise DataError(Diagnostic("engine-failed", message, hints=("install the same version on both",)))
     if getattr(_known, "fingerprint", None) != question.fingerprint:
         query = question.query()
-        if left_s is not None and machine != platform.node():
+        if math.isfinite(left_s) and machine != platform.node():
             query.options = replace(query.options, until=time.monotonic() + left_s)
         _known.query, _known.fingerprint = query, question.fingerprint
     return run_shard(_known.query, piece)
