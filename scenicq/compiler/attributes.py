@@ -284,8 +284,7 @@ def _of_field(run: Interpreter, value: Node, name: str) -> ModelValue:
 
 def _angle_with(value: Node, other: Node, span: Span) -> Node:
     """How far a vector is turned from another, counter-clockwise."""
-    turned = build.minus(build.bearing(other, span), build.bearing(value, span), span)
-    return build.arithmetic(ArithmeticOp.WRAP, turned, span=span)
+    return operators.relative_heading(build.bearing(other, span), build.bearing(value, span), span)
 
 
 def _dot(value: Node, other: Node, span: Span) -> Node:

@@ -88,21 +88,17 @@ _OPERATIONS: dict[type, _Operation] = {
     ast.Implies: _Operation("left right", _pure(_implies), is_spread=False),
 }
 _SEEN, _UNSEEN = _sight(operators.region_intersection), _sight(operators.region_difference)
+_BY_NAME: dict[str, type] = {
+    "FieldAt": ast.FieldAt, "RelativeTo": ast.RelativeTo, "OffsetAlong": ast.OffsetAlong, "Follow": ast.Follow,
+    "RelativePosition": ast.RelativePosition, "RelativeHeading": ast.RelativeHeading,
+    "ApparentHeading": ast.ApparentHeading, "DistanceFrom": ast.DistanceOperator, "DistancePast": ast.DistancePast,
+    "CanSee": ast.CanSee, "Intersects": ast.IntersectsOperator, "Implies": ast.Implies,
+}  # fmt: skip
+"""Functions that take the operands of an operator as they stand there."""
 _FUNCTIONS: dict[str, tuple[_Operation, str]] = {
-    "FieldAt": (_OPERATIONS[ast.FieldAt], "field position"),
-    "RelativeTo": (_OPERATIONS[ast.RelativeTo], "left right"),
-    "OffsetAlong": (_OPERATIONS[ast.OffsetAlong], "origin direction offset"),
-    "Follow": (_OPERATIONS[ast.Follow], "field origin distance"),
-    "RelativePosition": (_OPERATIONS[ast.RelativePosition], "target origin"),
-    "RelativeHeading": (_OPERATIONS[ast.RelativeHeading], "target origin"),
-    "ApparentHeading": (_OPERATIONS[ast.ApparentHeading], "target origin"),
-    "DistanceFrom": (_OPERATIONS[ast.DistanceOperator], "target origin"),
-    "DistancePast": (_OPERATIONS[ast.DistancePast], "target origin"),
+    **{name: (_OPERATIONS[node], _OPERATIONS[node].operands) for name, node in _BY_NAME.items()},
     "AngleTo": (_OPERATIONS[ast.Angle], "target"),
     "AngleFrom": (_OPERATIONS[ast.Angle], "origin target"),
-    "CanSee": (_OPERATIONS[ast.CanSee], "viewer target"),
-    "Intersects": (_OPERATIONS[ast.IntersectsOperator], "left right"),
-    "Implies": (_OPERATIONS[ast.Implies], "left right"),
     "Visible": (_SEEN, "region"),
     "NotVisible": (_UNSEEN, "region"),
     "VisibleFromOp": (_SEEN, "region viewer"),

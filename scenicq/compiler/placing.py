@@ -78,13 +78,17 @@ def _known(value: ModelValue, instance: Instance) -> ModelValue:
     return value
 
 
+def _flat(value: ModelValue, span: Span, *, is_object: bool) -> Node:
+    """A vector of the plane; that of an object may be written with a height, which is left out."""
+    return to_place(value, span) if is_object else to_vector(value, span)
+
+
 def _position(span: Span, value: ModelValue, heading: ModelValue = None) -> BoundSpecifier:
     """A specifier of a position and, if there is one, optionally of a heading."""
 
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         place = _known(value, instance)
-        flat = to_vector(place, span) if instance.index is None else to_place(place, span)
-        given: dict[str, ModelValue] = {"position": flat}
+        given: dict[str, ModelValue] = {"position": _flat(place, span, is_object=instance.index is not None)}
         if heading is not None:
             given["heading"] = heading
         return given
@@ -146,7 +150,7 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
     def gap(away: ModelValue, instance: Instance) -> tuple[Node, Node]:
         zero = build.constant(0.0)
         if kind_of_model(away) == "vector" or isinstance(away, tuple | list):
-            pair = to_vector(away, span) if instance.index is None else to_place(away, span)
+            pair = _flat(away, span, is_object=instance.index is not None)
             x, y = build.coordinate(pair, 0, span), build.coordinate(pair, 1, span)
         else:
             distance = to_scalar(0.0 if away is None else away, span)
@@ -212,8 +216,12 @@ def _beyond(
     goal = to_vector(target, span)
     sight = build.bearing(build.vector_difference(goal, to_vector(origin, span), span), span)
     is_vector = kind_of_model(by) == "vector" or isinstance(by, tuple | list)
-    flat = to_place if around.is_object else to_vector
-    offset = flat(by, span) if is_vector else build.vector(build.constant(0.0), to_scalar(by, span), span)
+    is_object = around.is_object
+    offset = (
+        _flat(by, span, is_object=is_object)
+        if is_vector
+        else build.vector(build.constant(0.0), to_scalar(by, span), span)
+    )
     position = build.offset_local(goal, sight, offset, span)
     if around.version < 3:
         return _position(span, position)

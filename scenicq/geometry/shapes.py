@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import reduce
 from itertools import chain
 from typing import Any, TypeAlias, cast
 
@@ -182,11 +181,6 @@ def _repaired(shape: Any) -> Any:
 
 _GRIDS = (None, 1e-9, 1e-7, 1e-5)
 """Metres that coordinates are rounded to, the exact ones first."""
-
-
-def intersection_all(geometries: Sequence[Shape]) -> Shape:
-    """What all of the geometries share."""
-    return reduce(intersection, geometries)
 
 
 def intersection(a: Shape, b: Shape) -> Shape:

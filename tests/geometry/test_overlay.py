@@ -37,7 +37,6 @@ OPERATIONS = {
     "union": lambda a, b: shapes.union_all([a, b]),
     "snapped union": lambda a, b: shapes.snapped_union([a, b]),
     "intersection": shapes.intersection,
-    "intersection of all": lambda a, b: shapes.intersection_all([a, b]),
     "difference": shapes.difference,
     "shared area": lambda a, b: shapes.shared_areas(np.array([a]), np.array([b])),
     "division": lambda a, b: shapes.divided(a, [b]),
