@@ -7,9 +7,10 @@ Writes OUT/map.geojson (Scenic's own network of the map, as interchange features
 object a line on standard input and standard output: {"text": program, "count": scenes, "seed": number, "seconds":
 limit}, or "file" with a path in place of the text, with {"scenes": [...]}, each with its objects (the ego first,
 headings in Scenic's convention) and parameters, or with {"error": text} where Scenic refuses the program. No scenes at
-all means that none was found in time. {"text": program, "witness": values, "labels": objects, "seconds": limit} asks
-whether the program allows them, see `replay_witness`. {"points": how many, "seed": number} and {"elements": points of
-each, "seed": number} ask the network, see `map_answers`.
+all means that none was found in time, nor the first one in "first" seconds, where that is given. {"text": program,
+"witness": values, "labels": objects, "seconds": limit} asks whether the program allows them, see `replay_witness`.
+{"points": how many, "seed": number} and {"elements": points of each, "seed": number} ask the network, see
+`map_answers`.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ import importlib.metadata
 import json
 import random
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scenic
+import scenic.syntax.translator
 from map_answers import at_points, of_elements
 from network_features import features_of
 from patience import OutOfPatienceError, patience
@@ -72,6 +75,23 @@ def _sample_all(quantities: Any) -> Any:
     return SAMPLE_ALL(quantities)
 
 
+PARSE, COMPILE = scenic.syntax.translator.parse_string, scenic.syntax.translator.compileScenicAST
+parse_file = functools.cache(PARSE)
+compile_tree = functools.cache(COMPILE)
+
+
+def _parse(source: str, mode: str, filename: str = "<string>") -> Any:
+    """As Scenic's own, but files, such as the world model that all programs import, are parsed once."""
+    parse = PARSE if filename == "<string>" else parse_file
+    return parse(source, mode, filename=filename)
+
+
+def _compile(tree: Any, filename: str = "<string>") -> Any:
+    """As Scenic's own, which changes the tree: each is compiled once."""
+    compile_it = COMPILE if filename == "<string>" else compile_tree
+    return compile_it(tree, filename=filename)
+
+
 def plain(scene: Any) -> dict[str, Any]:
     """A scene as plain data."""
     known = {(round(each.x, 3), round(each.y, 3)) for each in KNOWN_OFF_ROAD}
@@ -97,11 +117,15 @@ def draw(request: dict[str, Any], chart: Path) -> dict[str, Any]:
     random.seed(request["seed"])
     np.random.seed(request["seed"])
     scenes: list[dict[str, Any]] = []
+    started = time.process_time()
     try:
-        with patience(request["seconds"]):
+        with patience(request.get("first", request["seconds"])):
             OFF_ROAD.clear()
             scenario = compiled(request, chart)
             KNOWN_OFF_ROAD[:] = OFF_ROAD
+            if request["count"]:
+                scenes.append(plain(scenario.generate(maxIterations=MOST_ATTEMPTS)[0]))
+        with patience(max(0.001, request["seconds"] - (time.process_time() - started))):
             while len(scenes) < request["count"]:
                 scenes.append(plain(scenario.generate(maxIterations=MOST_ATTEMPTS)[0]))
     except (OutOfPatienceError, RejectionException, InvalidScenarioError) as end:
@@ -132,6 +156,8 @@ def main(arguments: list[str]) -> None:
     chart, out = Path(arguments[0]), Path(arguments[1])
     importlib.metadata.version = lambda name: CARLA if name == "carla" else INSTALLED(name)
     if MODE:
+        scenic.syntax.translator.parse_string = _parse
+        scenic.syntax.translator.compileScenicAST = _compile
         Network._defaultRoadDirection = _road_direction
         Samplable.sampleAll = staticmethod(_sample_all)
     Network.fromFile = functools.cache(Network.fromFile)  # one map for all programs

@@ -59,13 +59,23 @@ class Original:
         self._process = self._started()
         self.map = work / "map.geojson"
 
-    def draw(self, text: str, count: int, seed: int, seconds: float = 60.0) -> dict[str, Any]:
+    def draw(
+        self, text: str, count: int, seed: int, seconds: float = 60.0, first: float | None = None
+    ) -> dict[str, Any]:
         """Scenes of a program, or the error that Scenic reports for it.
+
+        Args:
+            text: The program.
+            count: How many scenes.
+            seed: Of the random numbers.
+            seconds: Processor time for all of them.
+            first: Processor time after which there is one or it gives up.
 
         Raises:
             SystemExit: The process has ended.
         """
-        return self._ask({"text": text, "count": count, "seed": seed, "seconds": seconds})
+        limits = {"seconds": seconds, "first": seconds if first is None else first}
+        return self._ask({"text": text, "count": count, "seed": seed, **limits})
 
     def draw_file(self, file: Path, count: int, seed: int, seconds: float) -> dict[str, Any]:
         """Scenes of a program in a file, which may import others beside it.

@@ -22,6 +22,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -50,8 +51,8 @@ TOLERANCE = parse_tolerance("position=0.05,heading=0.5deg")
 CLOCK_S = 20.0
 """Seconds of processor time for compiling a program, and again for each label."""
 SCENES = 3
-DRAWING_S = 5.0
-"""Seconds of processor time that Scenic may take for the scenes of one program."""
+DRAWING_S, FIRST_S = 5.0, 2.0
+"""Seconds of processor time that Scenic may take for the scenes of one program, and for the first of them."""
 GOOD = frozenset({"right", "Scenic refuses", "no scene", "told apart", "allowed"})
 
 
@@ -98,7 +99,7 @@ class Town:
         kept = self.drawn / f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
         if kept.exists():
             return json.loads(kept.read_text(encoding="utf-8"))
-        answer = self.original.draw(text, SCENES, 1, DRAWING_S)
+        answer = self.original.draw(text, SCENES, 1, DRAWING_S, FIRST_S)
         kept.write_text(json.dumps(answer), encoding="utf-8")
         return answer
 
@@ -241,7 +242,7 @@ class Tally:
 
     def show(self) -> None:
         """Print the counts."""
-        print(", ".join(f"{count} {kind}" for kind, count in self.kinds.most_common()))
+        print(", ".join(f"{count} {kind}" for kind, count in self.kinds.most_common()), flush=True)
         if self.excuses:
             print("excused:", ", ".join(f"{count} {name}" for name, count in self.excuses.most_common()))
         for reason, count in self.reasons.most_common():
@@ -250,27 +251,31 @@ class Tally:
             print(f"worst {max(self.times):.1f} s, mean {sum(self.times) / len(self.times):.2f} s of processor time")
 
 
-def towns(arguments: argparse.Namespace, python: Path) -> Iterator[Town]:
-    """Each town of the run, Scenic's process and all; one at a time."""
-    charts = maps_of(arguments.maps)
+def towns(arguments: argparse.Namespace, python: Path, stack: ExitStack) -> list[Town]:
+    """The towns of the run, a process of Scenic's for each until the stack closes."""
+    charts, found = maps_of(arguments.maps), list[Town]()
     (arguments.work / "scenes").mkdir(parents=True, exist_ok=True)
     for name in arguments.towns:
         original = Original(python, charts[name], arguments.work / name)
-        try:
-            network = read_map(convert_xodr(charts[name], arguments.work / "maps", python=str(python)))
-            yield Town(name, network, Places.of(network), original, arguments.work / "scenes")
-        finally:
-            original.close()
+        stack.callback(original.close)
+        network = read_map(convert_xodr(charts[name], arguments.work / "maps", python=str(python)))
+        found.append(Town(name, network, Places.of(network), original, arguments.work / "scenes"))
+    return found
 
 
-def run(arguments: argparse.Namespace, town: Town, judge: Judge, tally: Tally) -> bool:
-    """The programs of a town; whether all is as it should be."""
+def programs(arguments: argparse.Namespace, towns: list[Town]) -> Iterator[tuple[str, Town, int]]:
+    """The programs of a run by their names, each with its town and number; the towns take them in turn."""
+    for number in range(arguments.first, arguments.first + arguments.programs):
+        for town in towns if arguments.only else [towns[number % len(towns)]]:
+            name = f"{town.name}-{arguments.seed}-{number}"
+            if not arguments.only or name in arguments.only:
+                yield name, town, number
+
+
+def run(arguments: argparse.Namespace, towns: list[Town], judge: Judge, tally: Tally) -> bool:
+    """Decide the programs; whether all is as it should be."""
     good = True
-    numbers = range(arguments.first, arguments.first + arguments.programs)
-    for number in numbers[arguments.towns.index(town.name) :: len(arguments.towns)] if not arguments.only else numbers:
-        name = f"{town.name}-{arguments.seed}-{number}"
-        if arguments.only and name not in arguments.only:
-            continue
+    for name, town, number in programs(arguments, towns):
         text = compose(f"{arguments.seed}/{town.name}/{number}", town.places)
         tally.kinds["programs"] += 1
         for found in judge.findings(town, text):
@@ -281,6 +286,8 @@ def run(arguments: argparse.Namespace, town: Town, judge: Judge, tally: Tally) -
                 print(f"{name}: {found.kind} {found.excuse} {found.seconds:.1f} s {found.why}", flush=True)
             if not fine or found.kind == "open":
                 _write(arguments, judge, town, name, text, found)
+        if tally.kinds["programs"] % 100 == 0:
+            tally.show()
     return good
 
 
@@ -322,12 +329,10 @@ def parse_arguments() -> argparse.Namespace:
 def main() -> int:
     """Compare; 0 if everything is as it should be."""
     arguments = parse_arguments()
-    python, tally, good = environment(arguments.environment, SCENIC), Tally(), True
+    python, tally = environment(arguments.environment, SCENIC), Tally()
     print(f"seed {arguments.seed}, programs {arguments.first} to {arguments.first + arguments.programs - 1}")
-    with open_solver("portable") as solver:
-        judge = Judge(solver, arguments.displaced)
-        for town in towns(arguments, python):
-            good = run(arguments, town, judge, tally) and good
+    with open_solver("portable") as solver, ExitStack() as stack:
+        good = run(arguments, towns(arguments, python, stack), Judge(solver, arguments.displaced), tally)
     tally.show()
     return 0 if good else 1
 
