@@ -251,7 +251,7 @@ MOST_HOPS = 3
 QUESTIONS = {
     "Where is position tolerance applied?", "What happens to a random lane?", "Why was this frame no match?",
     "Where would a new distribution go?", "Where is a requirement turned into SQL?",
-    "What runs when nothing is hidden?",
+    "What runs when nothing is hidden?", "Which limit ended this search?",
 }  # fmt: skip
 
 
@@ -308,7 +308,7 @@ def test_the_portable_solver_knows_formulas_and_no_nodes():
         name = todo.pop()
         seen.add(name)
         for module in imports(LIBRARY / f"smt/{name}.py"):
-            assert module.startswith(("scenicq.smt.", "scenicq.budget")), (name, module)
+            assert module.startswith(("scenicq.smt.", "scenicq.budget", "scenicq.limits")), (name, module)
             todo += {module.removeprefix("scenicq.smt.")} - seen if module.startswith("scenicq.smt.") else ()
     assert {"interval", "affine", "hc4"} <= seen
 

@@ -17,6 +17,7 @@ from scenicq.forest.nodes import (
     Value,
 )
 from scenicq.forest.walk import deciding_first, leaves
+from scenicq.limits import LIMITS
 from scenicq.match.linear.affine_forms import affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
 from scenicq.match.linear.linear_program import NotLinear
@@ -27,13 +28,6 @@ from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["decide"]
-
-
-_MOST_BRANCHES = 4096
-_MOST_CHOSEN = 100
-"""Discrete variables that are chosen one below the other."""
-_MOST_PROGRAMS = 20_000
-"""Linear programs for one decision: some seconds, after which a solver does no worse."""
 
 
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
@@ -73,7 +67,7 @@ class _Cascade:
                 return Refuted(item[0], ground_cause(item))
         if not open_items:
             return Satisfied(given)
-        if depth > _MOST_CHOSEN:
+        if depth > LIMITS.cascade_nesting:
             raise _Exhausted
         for leaf in deciding_first([node for _, node, _ in open_items]):
             options = options_of(leaf)
@@ -95,7 +89,7 @@ class _Cascade:
                 return outcome
             if isinstance(outcome, Undecided) or (number == 0 and isinstance(blamed, Refuted)):
                 blamed = outcome
-            if self.branches > _MOST_BRANCHES:
+            if self.branches > LIMITS.cascade_outcomes:
                 return Undecided(constraint, "nonlinear")
         return blamed
 
@@ -133,7 +127,7 @@ class _Cascade:
     def _linear(self, items: list[Item], given: dict[Identity, Value]) -> Outcome:
         constraint = items[0][0]
         self.programs += 1
-        if self.programs > _MOST_PROGRAMS:
+        if self.programs > LIMITS.cascade_programs:
             raise _Exhausted
         try:
             found = solve_affine(items, [], self.tolerance)

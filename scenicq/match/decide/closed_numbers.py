@@ -13,6 +13,7 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import postorder
 from scenicq.geometry.road_direction import RoadDirection
+from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, UnclearError, clipped, spread
@@ -23,7 +24,6 @@ from scenicq.match.tolerance import SLACK
 
 __all__ = ["heading", "number", "text"]
 
-_MOST_CHOICES = 8
 _STRAIGHT = (0.0,)
 """The direction that is added where no field is asked."""
 
@@ -43,7 +43,7 @@ class _Case(NamedTuple):
 def _cases(root: Node) -> list[_Case]:
     """The ways in which the choices of an expression come out; none where there are many, or one has no form."""
     indices = [node for node in postorder((root,)) if isinstance(node, Index)]
-    if math.prod(len(node.weights) for node in indices) > _MOST_CHOICES:
+    if math.prod(len(node.weights) for node in indices) > LIMITS.closed_form_choices:
         return []
     cases: list[_Case] = []
     for picked in itertools.product(*(range(len(node.weights)) for node in indices)):

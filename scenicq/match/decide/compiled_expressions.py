@@ -35,8 +35,8 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.limits import LIMITS
 from scenicq.match.decide.range_forms import (
-    MOST_STEPS,
     Columns,
     CompiledVector,
     Exact,
@@ -65,7 +65,7 @@ def truth(root: Node) -> Callable[[Get], bool] | None:
     for node in postorder((root,)):
         below = children(node)
         steps[id(node)] = 1 + sum([steps[id(child)] for child in below])
-        if is_leaf(node) or isinstance(node, DirectionAt) or steps[id(node)] > MOST_STEPS:
+        if is_leaf(node) or isinstance(node, DirectionAt) or steps[id(node)] > LIMITS.closed_form_terms:
             return None
         if isinstance(node, Feature) and node.object == PARAMS:
             return None
@@ -121,7 +121,7 @@ class CompiledExpressions:
                 below = children(node)
                 steps = self._steps[id(node)] = 1 + sum([self._steps[id(child)] for child in below])
                 args = [self._exact[id(child)] for child in below]
-                self._exact[id(node)] = _exact(node, args) if steps <= MOST_STEPS else None
+                self._exact[id(node)] = _exact(node, args) if steps <= LIMITS.closed_form_terms else None
         return self._exact[id(root)]
 
     def form(self, root: Node) -> Form | None:

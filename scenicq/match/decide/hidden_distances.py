@@ -21,14 +21,13 @@ from scenicq.geometry import shapes
 from scenicq.geometry.membership import distance
 from scenicq.geometry.regions import Nowhere, PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.geometry.shapes import Bounds, Shape
+from scenicq.limits import LIMITS
 from scenicq.match.linear.linear_relaxation import position_boxes
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["with_areas"]
 
-_WIDEST = 500.0
-"""Metres along a box beyond which no area is outlined."""
 _AROUND = 1 / math.cos(math.pi / (4 * shapes.QUARTER_SEGMENTS))
 """A polygon around a circle is that much larger than the one inside of it with as many corners."""
 
@@ -108,7 +107,7 @@ def _area_of(asked: _Asked, box: Box, *, outer: bool) -> Region | None:
     if away + half < limit or away - half > limit:
         # the point may occur nowhere else, and still needs a value
         return _set((window,)) if (away < limit) is most else Nowhere()
-    if limit < 0 or max(x1 - x0, y1 - y0) > _WIDEST:
+    if limit < 0 or max(x1 - x0, y1 - y0) > LIMITS.outlined_box_m:
         return None
     # polygons around circles for the largest area within a distance, and for the smallest beyond it
     reach = limit * _AROUND + SLACK if most is outer else max(0.0, limit - SLACK)

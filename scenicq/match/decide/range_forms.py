@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.nodes import DirectionAt, Identity, Value
+from scenicq.limits import LIMITS
 
 __all__ = [
-    "MOST_STEPS",
     "Columns",
     "CompiledVector",
     "Exact",
@@ -35,9 +35,6 @@ FloatColumn: TypeAlias = NDArray[np.float64]
 Exact: TypeAlias = Callable[[Get], "float | tuple[float, float]"]
 Scalar: TypeAlias = Callable[[Get], float]
 CompiledVector: TypeAlias = Callable[[Get], "tuple[float, float]"]
-
-MOST_STEPS = 400
-"""Operations that a formula may take: what is shared in an expression is worked out anew for each use of it."""
 
 
 class UnclearError(Exception):
@@ -120,7 +117,7 @@ class Form:
         """The sum; None if a variable occurs in both, or both are unbounded."""
         if self.terms.keys() & other.terms.keys() or (self.unbounded and other.unbounded):
             return None
-        if len(self.parts) + len(other.parts) > MOST_STEPS:
+        if len(self.parts) + len(other.parts) > LIMITS.closed_form_terms:
             return None
         return Form(
             self.parts + other.parts,

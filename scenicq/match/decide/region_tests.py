@@ -27,6 +27,7 @@ from scenicq.forest.walk import children, postorder
 from scenicq.geometry.membership import distance
 from scenicq.geometry.regions import Disc, Rectangle, Region, Sector
 from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
+from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
 from scenicq.match.decide.range_forms import Columns, Exact, Get
@@ -34,8 +35,6 @@ from scenicq.match.problem.map_lookups import XY, MapLookups
 
 __all__ = ["RegionTest", "region_test"]
 
-_MOST_PARTS = 40
-"""Regions that one may be made of."""
 
 _Truths: TypeAlias = "bool | NDArray[np.bool_]"
 _Test: TypeAlias = Callable[[Get, Value, MapLookups, float], "tuple[_Truths, _Truths]"]
@@ -77,7 +76,7 @@ def region_test(root: Node) -> RegionTest | None:
             case _:
                 continue
     test = made.get(id(root))
-    return None if test is None or parts > _MOST_PARTS else RegionTest(test, tuple(regions.values()))
+    return None if test is None or parts > LIMITS.closed_form_regions else RegionTest(test, tuple(regions.values()))
 
 
 def _constant(region: Region) -> _Test:

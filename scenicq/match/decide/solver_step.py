@@ -10,6 +10,7 @@ from scenicq.budget import waiting
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import Constant, Identity, Leaf, Node, Value
 from scenicq.forest.walk import deciding_first
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import Item, conditioned, options_of
 from scenicq.match.problem.evaluation import holds, replay
@@ -21,9 +22,6 @@ if TYPE_CHECKING:  # takes long to load, and most queries ask no solver
 
 __all__ = ["ask", "discrete_options", "encoded"]
 
-_MOST_OUTCOMES = 64
-"""Joint outcomes of discrete variables that are asked about one by one; where there are more, the solver has them."""
-_ATTEMPTS = 3
 _REFINED = 100.0
 
 
@@ -53,7 +51,7 @@ def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver |
         solver: The solver, if there is one.
     """
     known = discrete_options([node for group in items for _, node, _ in group])
-    if solver is None or not known or math.prod(len(numbers) for _, numbers in known) > _MOST_OUTCOMES:
+    if solver is None or not known or math.prod(len(numbers) for _, numbers in known) > LIMITS.asked_outcomes:
         return _ask_once(items, options, solver)
     blamed: Outcome = Refuted(next(constraint for group in items for constraint, _, _ in group))
     todo: list[tuple[Sequence[Sequence[Item]], dict[Identity, Value]]] = [(items, {})]
@@ -107,7 +105,7 @@ def _ask_once(items: Sequence[Sequence[Item]], options: MatchOptions, solver: So
     except UnsupportedError as error:
         return Undecided(blame, f"unsupported: {error}")
     precision = options.precision
-    for attempt in range(_ATTEMPTS):
+    for attempt in range(LIMITS.solver_attempts):
         if attempt == 1:
             # what was left out to keep the question small may be what the witness breaks
             encoding = encoded(items, options)

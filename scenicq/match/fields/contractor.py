@@ -39,6 +39,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import conjuncts, is_leaf
+from scenicq.limits import LIMITS
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.interval_domain import (
     Enclosure,
@@ -61,7 +62,6 @@ from scenicq.match.tolerance import SLACK
 
 __all__ = ["BoxSet"]
 
-_PASSES = 6
 _WORTH = 0.8
 """A pass that leaves more than this share of every range in every case is the last."""
 
@@ -140,7 +140,7 @@ class BoxSet:
     def narrowed(self) -> BoxSet:
         """The cases of which something is left, over narrower ranges."""
         branches = self
-        for _ in range(_PASSES):
+        for _ in range(LIMITS.narrowing_passes):
             # most cases that are none miss what the label observes from the start
             branches._upward()
             branches = branches.those(~branches._lost())

@@ -16,6 +16,7 @@ from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import DiscreteRange, Identity, Index, Value
 from scenicq.forest.walk import leaves
+from scenicq.limits import LIMITS
 from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_of, solved
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
@@ -28,12 +29,8 @@ from scenicq.match.tolerance import Tolerance
 
 __all__ = ["decide_directions", "repaired"]
 
-_MOST_WAYS = 256
-"""Ways of one part that are put to the linear program."""
 _MANY_CASES = 128
 """Cases of one part after which a witness is looked for by more draws than at first."""
-_MOST_HALVES = 64
-"""Ways of one part that are divided."""
 _CLOSE = 0.05
 """How far from the answer of a solver a solution is looked for."""
 
@@ -100,7 +97,7 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
             searched = searched or way is None
             if isinstance(found, Satisfied):
                 return found
-            if number == _MOST_WAYS:
+            if number == LIMITS.field_ways:
                 break
             if isinstance(found, Undecided) and way is not None:
                 todo.append(way)
@@ -116,7 +113,7 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
 def _halved(todo: deque[HeadingAssignment], first: Constraint, tolerance: Tolerance) -> Outcome:
     """What comes of vague ways, divided."""
     doubt = Undecided(first, "nonlinear")
-    for _ in range(_MOST_HALVES):
+    for _ in range(LIMITS.field_halvings):
         if not todo:
             return Refuted(first)
         less = _divided(todo.popleft(), None) if todo[0].vague else None

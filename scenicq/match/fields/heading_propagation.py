@@ -20,6 +20,7 @@ from scenicq.geometry import shapes
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.geometry.regions import SLACK, PointSet, PolygonSet, PolylineSet
+from scenicq.limits import LIMITS
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
 
@@ -27,29 +28,23 @@ __all__ = ["LimitError", "bisected", "directed", "propagated"]
 
 _AT_ONCE = 256
 """Cases that are narrowed together: what one of them finds may make the others needless."""
-_MOST_CASES = 100_000
-"""Cases of one part that are looked at."""
 _FAR = 60.0
 """Metres: where a point may be farther about than this, a number that it hangs on is divided before directions are."""
-_PASSES = 12
-"""Times that places and headings narrow each other at most."""
 _WORTH = 0.8
 """A share of the range of headings, or of the place of a point, above which nothing is gained by looking again."""
 _POINT = 1.5e-9
 """Radians that the headings of one direction may be apart, being rounded."""
 _PIECES = 4
 """Ranges into which the headings of a bend are parted."""
-_FINEST = 1e-5
-"""Width of a range that is not divided any more."""
 _LONG = 1.0
 """Width of a range of numbers that is divided before directions are, where these are many."""
 
 
 class LimitError(Exception):
-    """There are more cases than `_MOST_CASES`, or nothing is left that bisecting would narrow."""
+    """There are too many cases, or nothing is left that bisecting would narrow."""
 
 
-def directed(start: BoxSet, soon: int = _MOST_CASES) -> Iterator[BoxSet]:
+def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
     """The cases in which every field has one direction and something is left, those found first at once.
 
     Args:
@@ -65,7 +60,7 @@ def directed(start: BoxSet, soon: int = _MOST_CASES) -> Iterator[BoxSet]:
         if seen <= soon < seen + cases.size:
             yield cases.take(np.arange(0))
         seen += cases.size
-        if seen > _MOST_CASES:
+        if seen > LIMITS.heading_cases:
             raise LimitError
         cases = propagated(cases)
         if not cases.size:
@@ -79,7 +74,7 @@ def directed(start: BoxSet, soon: int = _MOST_CASES) -> Iterator[BoxSet]:
 
 def propagated(cases: BoxSet) -> BoxSet:
     """The cases of which something is left, narrowed until places and headings do not narrow each other any more."""
-    for _ in range(_PASSES):
+    for _ in range(LIMITS.heading_passes):
         cases = _placed(cases.narrowed())
         gained = False
         for node in cases.network.choices:
@@ -102,7 +97,7 @@ def bisected(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
         LimitError: There is none.
     """
     found = _widest(cases, below)
-    if found is None or found[0] <= _FINEST:
+    if found is None or found[0] <= LIMITS.heading_width:
         raise LimitError
     return _halves(cases, *found[1:])
 

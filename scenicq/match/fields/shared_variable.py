@@ -12,17 +12,13 @@ from dataclasses import dataclass, replace
 
 from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.nodes import Identity, Value
+from scenicq.limits import LIMITS
 from scenicq.match.fields.cell_assignment import HeadingAssignment, extent, solved
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import ROUNDING, SLACK, Tolerance
 
 __all__ = ["find_shared_value", "joined"]
-
-_MOST_VALUES = 256
-"""Values that are tried."""
-_FINEST = 1e-7
-"""Width of an interval that is not divided any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +53,7 @@ def find_shared_value(
     sure = True
     tried: dict[int, tuple[float, Satisfied, HeadingAssignment]] = {}
     order = list(range(len(parts)))
-    for _ in range(_MOST_VALUES):
+    for _ in range(LIMITS.shared_values):
         common = _common(stretches)
         if not common:
             return Refuted(first) if sure else Undecided(first, "nonlinear")
@@ -135,12 +131,12 @@ def _sharper(
         if ends is None:
             return [], way.exact
         less = replace(stretch, low=ends[0], high=ends[1], tight=True)
-        if not less.holds(value) or ends[1] - ends[0] < stretch.high - stretch.low - _FINEST:
+        if not less.holds(value) or ends[1] - ends[0] < stretch.high - stretch.low - LIMITS.shared_width:
             return [less], way.exact
     ways = divided(way) if way.vague else None
     if ways is not None:
         return [_Stretch(each, *each.limits) for each in ways], True
-    if stretch.high - stretch.low <= _FINEST:
+    if stretch.high - stretch.low <= LIMITS.shared_width:
         return [], False
     # there may be solutions on either side of a gap between cells
     sides = [_Stretch(way, stretch.low, value), _Stretch(way, value, stretch.high)]

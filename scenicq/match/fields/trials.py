@@ -17,14 +17,13 @@ from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.interpret import OnMap, interpret, steps_of
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, Select
 from scenicq.forest.walk import children
+from scenicq.limits import LIMITS
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.hidden_values import HiddenValue
 from scenicq.match.fields.residuals import Residuals, residuals_of
 
 __all__ = ["Trial", "TrialDraws", "TrialSpace"]
 
-_MOST_PLACES = 16_384
-"""Places at which the map is asked at once."""
 
 _Numbers = NDArray[np.float64]
 
@@ -178,7 +177,7 @@ class TrialSpace:
             return (draws.shares[self._use[id(node)]] * counts).astype(np.intp)
 
         with np.errstate(all="ignore"):
-            domain = _Lazy(observed, drawn, pick, _MOST_PLACES, wanted=self._wanted(draws.places))
+            domain = _Lazy(observed, drawn, pick, LIMITS.witness_places, wanted=self._wanted(draws.places))
             known = interpret(self._steps, domain)
             residuals = residuals_of(self.network.items, known, self.network.tolerance, count)
         headings = [np.broadcast_to(cast(_Numbers, known[id(node)].data), (count,)) for node in self.fields]

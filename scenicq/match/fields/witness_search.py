@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scenicq.budget import Trials, trials_left
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.nodes import Identity, Index, Leaf, PointIn, Value
+from scenicq.limits import LIMITS
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.damped_steps import damped_steps
@@ -70,8 +71,6 @@ _ALIKE = 0.02
 """Radians within which a field points alike in two draws."""
 _SHARE = 4
 """A search takes one of so many parts of the trials that are left at most."""
-_REPLAYED = 6
-"""Draws that are put to the test."""
 _STEP = 1e-5
 """By how much a coordinate is moved to see what changes."""
 _JUMP = 1e3
@@ -152,7 +151,7 @@ class _Search:
             least = float(elite.residuals.missing.min())
             idle = idle + 1 if least > _PROGRESS * before else 0
             before = min(before, least)
-            if self.replayed >= _REPLAYED or idle == self.effort.idle:
+            if self.replayed >= LIMITS.witness_replays or idle == self.effort.idle:
                 break
             draws = self._near(elite.draws, _CLOSER**number)
         return None
@@ -253,7 +252,7 @@ class _Search:
     def _witness(self, tried: Trial) -> Satisfied | None:
         """A witness among draws of which nothing is missing."""
         missing = tried.residuals.missing
-        for number in np.flatnonzero(missing <= 0)[: _REPLAYED - self.replayed].tolist():
+        for number in np.flatnonzero(missing <= 0)[: LIMITS.witness_replays - self.replayed].tolist():
             self.replayed += 1
             values: dict[Identity, Value] = {
                 identity: _value(each.leaf, tried.draws.places[each.rows, number])

@@ -21,13 +21,12 @@ import shapely
 from scenicq.forest.nodes import Constant, Identity, Leaf, Normal, PointIn, Range, TruncatedNormal, Value
 from scenicq.geometry.proximity import meets, witness_point
 from scenicq.geometry.regions import Region
+from scenicq.limits import LIMITS
 from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis
 from scenicq.match.tolerance import ROUNDING, Margin
 
 __all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position"]
 
-_MOST_CORNERS = 6
-"""Random offsets of one position whose box is taken corner by corner."""
 _SIMILAR = 1e-12
 """How far a matrix may be from a similarity, relative to its scale."""
 
@@ -144,7 +143,7 @@ def reach_position(
     scalars = [variable for variable in variables if variable[0] not in points]
     limits = [ends(leaves[identity]) for identity, _ in scalars]
     bounded = [pair for pair in limits if pair is not None and all(map(math.isfinite, pair)) and pair[0] <= pair[1]]
-    if len(points) > 1 or len(bounded) != len(limits) or len(bounded) > _MOST_CORNERS:
+    if len(points) > 1 or len(bounded) != len(limits) or len(bounded) > LIMITS.inverted_offsets:
         return _OPEN
     corners = list(itertools.product(*bounded))
     if points:

@@ -36,6 +36,7 @@ from scenicq.geometry.regions import (
     Region,
     Sector,
 )
+from scenicq.limits import LIMITS
 from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.linear.linear_program import LinearSystem, NotLinear, NotSolved, Row
@@ -44,9 +45,6 @@ from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import ROUNDING, SLACK, Tolerance
 
 __all__ = ["extent_affine", "position_boxes", "solve_affine"]
-
-_MOST_EXTENTS = 16
-"""Combinations of alternatives of which the ends of a number are looked for."""
 
 
 def position_boxes(items: Sequence[Item], tolerance: Tolerance, rows: Sequence[Row] = ()) -> dict[Identity, Box]:
@@ -273,7 +271,7 @@ class _Problem:
     def extent(self, variable: VariableAxis) -> tuple[float, float] | None:
         """The ends of a variable over all solutions, discs taken too large."""
         around = [*disc_rows(self.discs, outer=True)]
-        if math.prod(map(len, self.alternatives)) > _MOST_EXTENTS:
+        if math.prod(map(len, self.alternatives)) > LIMITS.extent_combinations:
             raise NotLinear
         found: tuple[float, float] | None = None
         try:

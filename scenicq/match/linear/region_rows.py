@@ -12,6 +12,7 @@ import shapely
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import parts_near
 from scenicq.geometry.regions import PointSet, PolygonSet, PolylineSet, Rectangle, Region, Sector, UnionOf
+from scenicq.limits import LIMITS
 from scenicq.match.linear.affine_forms import Affine, AffineVector
 from scenicq.match.linear.linear_program import NotLinear, Row
 
@@ -19,7 +20,6 @@ __all__ = ["Alternative", "disc_rows", "polygon_rows", "region_rows", "sector_ro
 
 _SIDES = 32
 """Corners of the polygons around and inside a disc."""
-_MOST_CELLS = 2000
 
 Alternative = list[list[Row]]
 """Sets of linear facts, one of which holds."""
@@ -86,7 +86,7 @@ def region_rows(region: Region, limits: tuple[float, float, float, float], place
                     found.append([Row(x, px, px), Row(y, py, py)])
             case _:
                 raise NotLinear
-        if len(found) > _MOST_CELLS:
+        if len(found) > LIMITS.linear_cells:
             raise NotLinear
     return found
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
+from scenicq.limits import LIMITS
 from scenicq.match.options import Exhausted, MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
@@ -20,8 +21,6 @@ __all__ = ["Candidates", "LabelProblem", "candidates_of", "egos", "find_candidat
 
 Candidates = Mapping[int, tuple[int, ...]]
 """For objects of the scenario, the numbers of the label objects that may play them: all others are excluded."""
-
-_MOST_SIGNATURES = 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +65,7 @@ class LabelProblem:
             choices.append(split[key])
         params = frozenset(self.params)
         for count, chosen in enumerate(itertools.product(*choices)):
-            if count >= _MOST_SIGNATURES:
+            if count >= LIMITS.signatures:
                 raise Exhausted
             yield (*(names for names, _ in chosen), params), {i: numbers for i, (_, numbers) in enumerate(chosen)}
 

@@ -13,6 +13,7 @@ from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, Undefined, Value
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.geometry.angles import distance
+from scenicq.limits import LIMITS
 from scenicq.match.problem.conditioned import Item, conditioned
 from scenicq.match.tolerance import ROUNDING, Tolerance
 
@@ -84,9 +85,6 @@ def replay(
 
 _Items = list[tuple[Constraint, Node, Value]]
 
-MOST_CHOICES = 1024
-"""Combinations of directions that are tried where a field allows several."""
-
 
 def _sharing(items: _Items) -> list[_Items]:
     """The items in parts that have no use of a field in common: one use is one direction, whoever refers to it."""
@@ -100,7 +98,7 @@ class _Picks:
     def __init__(self) -> None:
         self.picked: list[int] = []
         self.sizes: list[int] = []
-        self.left = MOST_CHOICES
+        self.left = LIMITS.replayed_directions
 
     def __call__(self, _: DirectionAt, allowed: tuple[float, ...]) -> float:
         if len(self.sizes) == len(self.picked):

@@ -10,11 +10,9 @@ import itertools
 
 from scenicq.forest.groups import PARAMS, Comparison, Constraint, Group, group_constraints
 from scenicq.forest.walk import features
+from scenicq.limits import LIMITS
 
 __all__ = ["subgroups_of"]
-
-_MOST_ROLES = 2
-_MOST_PARTS = 300
 
 
 def subgroups_of(group: Group, ego: int) -> tuple[Group, ...]:
@@ -24,13 +22,13 @@ def subgroups_of(group: Group, ego: int) -> tuple[Group, ...]:
         group: A group of jointly dependent constraints.
         ego: Index of the ego, which plays no role of its own.
     """
-    if len(set(group.objects) - {ego}) <= _MOST_ROLES:
+    if len(set(group.objects) - {ego}) <= LIMITS.part_roles:
         return ()
     about = [(item, _roles(item, ego)) for item in group.constraints]
-    single = dict.fromkeys(roles for _, roles in about if 0 < len(roles) <= _MOST_ROLES)
+    single = dict.fromkeys(roles for _, roles in about if 0 < len(roles) <= LIMITS.part_roles)
     joined = dict.fromkeys(one | other for one, other in itertools.combinations(single, 2))
-    wanted = {roles: None for roles in (*single, *joined) if len(roles) <= _MOST_ROLES}
-    if len(wanted) > _MOST_PARTS:
+    wanted = {roles: None for roles in (*single, *joined) if len(roles) <= LIMITS.part_roles}
+    if len(wanted) > LIMITS.group_parts:
         wanted = single
     found = [
         part

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Value
+from scenicq.limits import LIMITS
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.match.search.interval_relaxation import possible
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["arc_consistent"]
-
-_MOST_ROLES = 2
 
 
 def arc_consistent(
@@ -41,7 +40,7 @@ def arc_consistent(
     pairs: list[tuple[GroupPlan, NDArray[np.bool_]]] = []
     known: dict[tuple[int, tuple[tuple[int, ...], ...]], Any] = {}
     for group in [*(each for found in plan.unary.values() for each in found), *plan.joint]:
-        if len(group.roles) > _MOST_ROLES:
+        if len(group.roles) > LIMITS.arc_roles:
             continue
         options = tuple(candidates[index] for index in group.roles)
         if (group.kind, options) not in known:

@@ -25,6 +25,7 @@ from scenicq.forest.nodes import (
     Node,
     Value,
 )
+from scenicq.limits import LIMITS
 from scenicq.match.options import Exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_field
@@ -38,10 +39,6 @@ from scenicq.match.tolerance import Tolerance
 
 __all__ = ["Ask", "decide_with_choices"]
 
-_MOST_TRIES = 20_000
-"""Outcomes of choices that are tried for one group of one label."""
-_DEEPEST = 16
-"""Searches inside one another: of alternatives that are met only in what an alternative leads to."""
 
 _SEVERAL = 8
 """Combinations of outcomes from which on a witness is looked for over all of them."""
@@ -80,7 +77,7 @@ def decide_with_choices(
         return Undecided(items[0][0], "budget")
     if not any(part.trees for part in found):
         return None
-    if depth > _DEEPEST:
+    if depth > LIMITS.choice_nesting:
         return Undecided(items[0][0], "budget")
     for part in found:
         if any(not tree.results for tree in part.trees.values()):
@@ -207,7 +204,7 @@ class _ChoiceSearch:
         for group in together:
             for slot in group:
                 links.setdefault(slot, set()).update(group - {slot})
-        return find_assignments(slots, self._check, links=links, budget=_MOST_TRIES)
+        return find_assignments(slots, self._check, links=links, budget=LIMITS.choice_tries)
 
     def _check(self, slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
         domain = self.domains[slot]

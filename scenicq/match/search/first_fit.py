@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
+from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.options import MatchOptions
@@ -33,9 +34,6 @@ from scenicq.store.labels import Label, LabelObject
 
 __all__ = ["FilledBatch", "FirstFit", "LabelRow", "first_fit_of", "signature_of"]
 
-_MOST_DECISIONS = 64
-_MORE_DECISIONS = 16
-"""For each role: what is given up costs as much as half a search at most."""
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 T = TypeVar("T")
@@ -333,7 +331,7 @@ def first_fit_of(plan: MatchPlan, scenario: Scenario) -> FirstFit | None:
     due: list[list[tuple[GroupPlan, ClosedForm]]] = [[] for _ in order]
     for group, form in sorted(forms, key=lambda each: len(each[0].roles)):
         due[max((ranks[index] for index in group.roles), default=0)].append((group, form))
-    most = _MOST_DECISIONS + _MORE_DECISIONS * (len(order) - 1)
+    most = LIMITS.fit_decisions + LIMITS.fit_decisions_a_role * (len(order) - 1)
     return FirstFit(plan, order, ranks, tuple(map(tuple, due)), most)
 
 

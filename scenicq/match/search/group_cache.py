@@ -14,6 +14,7 @@ from scenicq.budget import TimeIsUp, Trials, look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Value
+from scenicq.limits import LIMITS
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import LabelProblem
@@ -26,10 +27,6 @@ from scenicq.match.search.choice_search import Ask, decide_with_choices
 from scenicq.match.search.group_plan import GroupPlan
 
 __all__ = ["Asker", "GroupCache", "known_of", "surely", "translated"]
-
-
-_MOST_TRIALS = 400
-"""How often searches for witnesses may try in vain for one label: some seconds, a hundred draws or more at a time."""
 
 
 class Asker(Protocol):
@@ -56,7 +53,7 @@ class GroupCache:
     problem: LabelProblem
     ask: Asker
     lookups: MapLookups
-    trials: Trials = field(default_factory=lambda: Trials(_MOST_TRIALS))
+    trials: Trials = field(default_factory=lambda: Trials(LIMITS.witness_trials))
     _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
         default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
     )

@@ -13,6 +13,7 @@ from typing import TypeAlias, cast
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.scenario import Scenario
+from scenicq.limits import LIMITS
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.options import Exhausted, MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot
@@ -25,10 +26,6 @@ from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
 from scenicq.match.search.group_cache import Asker, GroupCache, known_of, surely, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
-
-_FEW_STEPS = 64
-"""Steps of a search that cost hardly anything."""
-_FEW_SLOTS = 8
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
 
@@ -266,9 +263,9 @@ class LabelSearch:
         many objects, the most constrained ones come first.
         """
         given: list[dict[int, int]] = []
-        if len(slots) <= _FEW_SLOTS:
+        if len(slots) <= LIMITS.ordered_slots:
             try:
-                for assignment in self._search(plan, slots, ego, accept_unknown=False, budget=_FEW_STEPS):
+                for assignment in self._search(plan, slots, ego, accept_unknown=False, budget=LIMITS.ordered_steps):
                     given.append(assignment)
                     yield assignment
                 return

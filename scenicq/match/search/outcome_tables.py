@@ -26,6 +26,7 @@ from scenicq.forest.walk import children, leaves, postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
+from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
 
 __all__ = ["ChoiceTree", "ChoiceVariable", "Outcomes", "TooManyOutcomesError", "above_choices", "tree_of"]
@@ -33,7 +34,6 @@ __all__ = ["ChoiceTree", "ChoiceVariable", "Outcomes", "TooManyOutcomesError", "
 ChoiceVariable: TypeAlias = Identity | Node
 """A random index by its identity; else the expression that says which option is taken."""
 
-MOST_OUTCOMES = 50_000
 _DOMAIN = IntervalDomain(ARRAYS)
 
 
@@ -151,7 +151,7 @@ def tree_of(root: Select) -> ChoiceTree:
         if not isinstance(node, Select):
             rows.append(path)
             results.append(node)
-            if len(rows) > MOST_OUTCOMES:
+            if len(rows) > LIMITS.nested_outcomes:
                 raise TooManyOutcomesError
             for variable in path:
                 columns.setdefault(variable, len(columns))

@@ -10,7 +10,8 @@ import pytest
 from comparisons import DEFAULT, c, compared
 
 from scenicq.forest.nodes import Constant, DirectionAt, Rotate, VectorSum
-from scenicq.match.problem.evaluation import MOST_CHOICES, replay
+from scenicq.limits import LIMITS
+from scenicq.match.problem.evaluation import replay
 
 
 class Fan:
@@ -69,7 +70,7 @@ def test_combinations_are_tried_up_to_a_limit_of_one_part(uses, found):
     # steps of different lengths from the left: only the last of all combinations leads to the end
     start = (-9.0, 0.0)
     turns = FAN.values(*start)
-    assert len(turns) ** 10 == MOST_CHOICES
+    assert len(turns) ** 10 == LIMITS.replayed_directions
     steps = [Rotate(c((0.0, 2.0**-number)), use(c(start)), span=None) for number in range(uses)]
     total, end = c((0.0, 0.0)), (0.0, 0.0)
     for number, each in enumerate(steps):
