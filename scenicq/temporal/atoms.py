@@ -24,13 +24,12 @@ from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
+from scenicq.limits import LIMITS
 from scenicq.temporal.samples import FIXED, MOVING, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["AtomColumns", "HiddenVariable", "reads_start"]
 
-_MOST_CHOICES = 64
-"""Combinations of directions that are tried beside the first where a field allows several."""
 
 Numbers: TypeAlias = NDArray[np.float64]
 
@@ -127,7 +126,7 @@ class AtomColumns:
         several = np.zeros(len(self.samples), np.bool_)
         todo: list[dict[int, int]] = [{}]
         seen = {frozenset[tuple[int, int]]()}
-        for _ in range(1 + _MOST_CHOICES):
+        for _ in range(1 + LIMITS.direction_choices):
             if not todo:
                 return self._with_bounds(condition, found)
             picks = todo.pop(0)

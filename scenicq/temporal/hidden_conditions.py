@@ -16,14 +16,13 @@ from scenicq.forest.columns import DEFINED, UNDEFINED, Column
 from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.nodes import Compare, CompareOp, Leaf, Logic, Node
 from scenicq.forest.walk import children, leaves
+from scenicq.limits import LIMITS
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.hidden import UnclearVariable, affine_sides, comparisons_of, random_variables, support
 from scenicq.temporal.truth import FALSE, Truth
 
 __all__ = ["Cut", "HiddenConditions"]
 
-_MOST_CUTS = 24
-"""Cuts of one condition."""
 _ROUNDING = 1e-12
 """Relative difference of two values below which they are one."""
 
@@ -129,7 +128,7 @@ class HiddenConditions:
             if found:
                 self._inside[number] = [made[key] for key in dict.fromkeys(id(each) for each, _ in found)]
                 self.of[number] = tuple(cut for each in self._inside[number] for cut in each.cuts)
-                if len(self.of[number]) > _MOST_CUTS:
+                if len(self.of[number]) > LIMITS.condition_cuts:
                     raise UnclearVariable("too many values of random variables to tell apart")
 
     def truth(self, number: int, places: NDArray[np.int64] | slice, sides: Mapping[int, NDArray[np.bool_]]) -> Truth:

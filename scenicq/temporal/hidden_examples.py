@@ -41,6 +41,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.walk import leaves, postorder, transform
+from scenicq.limits import LIMITS
 from scenicq.match.explanation import Finding
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -58,8 +59,6 @@ __all__ = ["Example", "ExampleOutcome", "Examples", "Remembered", "examine_start
 Remembered = tuple[Label, Mapping[str, str]]
 """The label of a start, and its correspondence."""
 
-_MOST_ASKED = 128
-"""Questions to the matcher for one start."""
 
 _REACHES = (1.0, 4.0, 16.0)
 """How far beyond examples a number or a coordinate may be, tried in this order: in metres, radians, ..."""
@@ -301,7 +300,7 @@ class Examples:
 
     def _ask(self, wanted: Node | None) -> bool | None:
         """Whether there are values for which a condition holds, which are kept; None if not known."""
-        if self._asked >= _MOST_ASKED:
+        if self._asked >= LIMITS.start_questions:
             return None
         self._asked += 1
         finding = examine_start(self.scenario, self.match, self.solver, self.start, wanted)

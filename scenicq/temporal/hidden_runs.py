@@ -16,6 +16,7 @@ from scenicq.forest.nodes import Compare, CompareOp, Constant, Identity, Logic, 
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import roots_of
 from scenicq.forest.walk import leaves
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.smt.answer import Solver
@@ -36,8 +37,6 @@ _Rest = TypeVarTuple("_Rest")
 Detail = tuple[str, Mapping[str, WitnessValue]]
 """Why a run is unknown, and the values of random variables of conditions over time."""
 
-_MOST_JOINT = 32
-"""Starts of one binding that are matched again with values of random variables that the initial scene has, too."""
 _THIN = 4e-12
 """Relative width of a piece of values below which rounding may decide: there, a run is followed again with a value."""
 
@@ -250,7 +249,7 @@ class HiddenRuns:
                 found.put(start, numbers[start], [(best, ("", witness))])
                 continue
             asked[int(stretch_of[start])] += 1
-            if asked[int(stretch_of[start])] > _MOST_JOINT:
+            if asked[int(stretch_of[start])] > LIMITS.joint_starts:
                 unknown = replace(best, truth=int(UNKNOWN))
                 found.put(start, numbers[start], [(unknown, ("budget", witness))])
                 continue

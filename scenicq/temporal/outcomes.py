@@ -18,15 +18,13 @@ from scenicq.forest.simplify import rebuilt, roots_of
 from scenicq.forest.temporal import Atom, TemporalRequirement
 from scenicq.forest.walk import children, deciding_first, features, leaves, postorder, transform
 from scenicq.geometry.occupancy import ElementAtPoint
+from scenicq.limits import LIMITS
 from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import WitnessValue
 from scenicq.temporal.hidden import has_cuts
 from scenicq.temporal.samples import MOVING
 
 __all__ = ["Outcome", "outcomes_of", "place_of", "steady_value"]
-
-_MOST_OUTCOMES = 3000
-"""Beyond these, choices stay random variables, of which examples are looked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +58,7 @@ def outcomes_of(scenario: Scenario) -> tuple[Outcome, ...]:
             found.append(replace(outcome, scenario=_from_the_start(outcome.scenario)))
             continue
         stack += reversed(list(_made(outcome, *choice)))
-        if len(found) + len(stack) > _MOST_OUTCOMES:
+        if len(found) + len(stack) > LIMITS.outcomes_over_time:
             return (replace(whole, scenario=_from_the_start(scenario)),)
     return tuple(found) or (whole,)
 

@@ -12,12 +12,11 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next, Not, Or, Until
+from scenicq.limits import LIMITS
 from scenicq.temporal.folding import folded
 
 __all__ = ["HOLDS", "LOST", "Progression", "Rest", "TooManyClausesError", "accepts"]
 
-_MOST_CLAUSES = 512
-"""Clauses of what is left of one formula."""
 
 Obligation = tuple[int, bool]
 """The number of a part of a formula, and whether there must be a next sample for it."""
@@ -165,7 +164,7 @@ def _all_of(rests: Iterable[Rest]) -> Rest:
 
 def _without_implied(clauses: set[frozenset[Obligation]]) -> Rest:
     """The clauses that imply no other one."""
-    if len(clauses) > _MOST_CLAUSES:
+    if len(clauses) > LIMITS.formula_clauses:
         raise TooManyClausesError
     if len(clauses) < 2:
         return frozenset(clauses)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.forest.temporal import Atom
+from scenicq.limits import LIMITS
 from scenicq.temporal.grouping import distinct, groups, values_of
 from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.run_machine import RunMachine
@@ -30,8 +31,6 @@ Places = NDArray[np.int64]
 Numbers = NDArray[np.float64]
 _TIMED_AT_ONCE = 32
 """Runs at once, where each has situations of its own."""
-_MOST_PIECES = 256
-"""Pieces of one run at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +205,7 @@ def _pieces(steps: RunSteps) -> Pieces:
         ended = ahead.situation < 0
         over.append((owner[ended], notes.some(ended), ahead.some(ended)))
         owner, notes, ahead = _merged(owner[~ended], notes.some(~ended), ahead.some(~ended))
-        many = np.bincount(owner, minlength=len(steps.which))[owner] > _MOST_PIECES
+        many = np.bincount(owner, minlength=len(steps.which))[owner] > LIMITS.run_pieces
         if many.any():
             left = notes.some(many)
             left.undecided[:] = True

@@ -13,17 +13,12 @@ from typing import assert_never
 
 from scenicq.errors import Span
 from scenicq.forest.temporal import Atom, Dynamics, End, Formula, Goto, Monitor, Reject, Terminate, Test, Wait, operands
+from scenicq.limits import LIMITS
 from scenicq.temporal.progression import LOST, Progression, Rest, TooManyClausesError, accepts
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 __all__ = ["Advance", "RunMachine", "Situation"]
 
-_MOST_WAYS = 1024
-"""In which what is not observed at one sample may come out."""
-_MOST_MODES = 256
-"""In which one run may be at once."""
-_MOST_SITUATIONS = 20_000
-"""Situations of one program."""
 
 _OVER, _REJECTED = (-1, 0), (-2, 0)
 """A monitor that says nothing any more, and one that has rejected the run."""
@@ -186,7 +181,7 @@ class RunMachine:
                     (ended if over else going).add(after)
         except TooManyClausesError:
             return Advance(self._undecided())
-        if len(going) > _MOST_MODES:
+        if len(going) > LIMITS.run_modes:
             return Advance(self._undecided())
         failed = frozenset(each for each in ended if not each.matches)
         return Advance(
@@ -209,7 +204,7 @@ class RunMachine:
             while stack:
                 assumed = stack.pop()
                 tried += 1
-                if tried > _MOST_WAYS:
+                if tried > LIMITS.observation_ways:
                     raise TooManyClausesError
                 try:
                     found.add(self._step(mode, _holding(values, assumed), due=due, here=here, later=later))
@@ -236,7 +231,7 @@ class RunMachine:
 
     def _situation(self, modes: _Modes) -> int:
         if modes not in self._numbers:
-            if self.situations and len(self.situations) >= _MOST_SITUATIONS:
+            if self.situations and len(self.situations) >= LIMITS.run_situations:
                 return self._undecided()
             self._numbers[modes] = len(self.situations)
             matching = [mode.matches for mode in modes]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import Span
 from scenicq.forest.temporal import Atom
+from scenicq.limits import LIMITS
 from scenicq.temporal.first_exits import FirstExits, next_at
 from scenicq.temporal.grouping import alike, groups
 from scenicq.temporal.hidden_conditions import HiddenConditions
@@ -32,8 +33,6 @@ Places = NDArray[np.int64]
 Numbers = NDArray[np.float64]
 _MOST_COLUMNS = 64
 """Situations of which it is remembered at which places they lead elsewhere."""
-_MOST_CUTS = 6
-"""Cuts that a situation reads, of which it is worked out between which of them it stays."""
 
 
 @dataclass(slots=True)
@@ -170,7 +169,7 @@ class RunSteps:
         assert self.hidden is not None
         cuts = sorted({cut for each in reads for cut in self._of[each]})
         variables = {self.hidden.cuts[cut].variable for cut in cuts}
-        if len(variables) > 1 or len(cuts) > _MOST_CUTS:
+        if len(variables) > 1 or len(cuts) > LIMITS.jump_cuts:
             return np.arange(len(self.code))
         ends = [self.hidden.cuts[cut].at for cut in cuts]
         borders = np.sort(np.stack(ends), axis=0)

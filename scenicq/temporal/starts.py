@@ -18,6 +18,7 @@ from scenicq.forest.groups import PARAMS, Condition
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import features, leaves
+from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
 from scenicq.match.matcher import Matcher
@@ -37,8 +38,6 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 __all__ = ["RoleCandidates", "StartSearch", "Starts", "narrowed", "start_matchers"]
 
 Members = NDArray[np.int64]
-_MOST_TUPLES = 64
-"""Correspondences of one label that are decided side by side; labels with more are left to the matcher."""
 _AT_ONCE = 200_000
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
@@ -268,7 +267,7 @@ class StartSearch:
                 chosen = chosen[near]
             roles[index] = chosen
             count *= np.bincount(of_label[chosen], minlength=len(candidates.labels))
-        where = labels[(count[labels] <= _MOST_TUPLES) & (count[labels] > 0)]
+        where = labels[(count[labels] <= LIMITS.start_tuples) & (count[labels] > 0)]
         members: dict[int, Members] = {}
         for index, chosen in roles.items():
             # each choice so far with each label object of its label

@@ -5,9 +5,9 @@ from interval_definition import Sample
 from interval_definition import recording_of as of_samples
 
 from scenicq.errors import Source
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown
-from scenicq.query.execution import recording_starts
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.writer import write_dataset
@@ -52,7 +52,7 @@ def test_those_beside_a_match_are_told_too(tmp_path, method):
 
 @pytest.mark.parametrize("most", [0, 1, 2])
 def test_more_open_starts_than_can_be_held_leave_the_label_open(dataset, monkeypatch, most):
-    monkeypatch.setattr(recording_starts, "_MOST_STARTS", most)
+    monkeypatch.setattr(LIMITS, "recording_starts", most)
     found = told(dataset, "require a.speed > 5\nterminate after 0 seconds\n")
     alone = [(track, kind) for frame, track, kind in found if frame == "alone-0"]
     assert sorted(alone) == sorted([("", Unknown), *((track, Unknown) for track in ("t", "u", "v")[:most])])

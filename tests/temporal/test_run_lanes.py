@@ -21,10 +21,11 @@ from scenicq.forest.temporal import (
     TemporalRequirement,
     Termination,
 )
+from scenicq.limits import LIMITS
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset
-from scenicq.temporal import run_lanes, run_steps
+from scenicq.temporal import run_steps
 from scenicq.temporal.hidden_conditions import Cut
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.run_lanes import follow_pieces, follow_runs
@@ -123,8 +124,8 @@ def test_lanes_may_stand_behind_the_last_place_of_all():
 
 @pytest.mark.parametrize("least", [0, 1, 2])
 def test_a_limit_of_pieces_makes_unknown_at_most(monkeypatch, least):
-    monkeypatch.setattr(run_lanes, "_MOST_PIECES", least)
-    monkeypatch.setattr(run_steps, "_MOST_CUTS", least)
+    monkeypatch.setattr(LIMITS, "run_pieces", least)
+    monkeypatch.setattr(LIMITS, "jump_cuts", least)
     compare_pieces(random.Random(2), 8, limited=True)
 
 

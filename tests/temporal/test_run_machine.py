@@ -13,7 +13,7 @@ from test_ltlf import ATOMS, recursive
 from test_run_lanes import random_stretches
 
 from scenicq.forest.temporal import Dynamics, Goto, Reject, Terminate, Test, Wait
-from scenicq.temporal import progression, run_machine
+from scenicq.limits import LIMITS
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
@@ -159,16 +159,10 @@ def test_runs_are_unknown_only_where_completions_differ():
     assert compare(random.Random(1), 250) > 900
 
 
-@pytest.mark.parametrize(
-    ("where", "name"),
-    [
-        (progression, "_MOST_CLAUSES"), (run_machine, "_MOST_WAYS"), (run_machine, "_MOST_MODES"),
-        (run_machine, "_MOST_SITUATIONS"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("name", ["formula_clauses", "observation_ways", "run_modes", "run_situations"])
 @pytest.mark.parametrize("least", [0, 1, 2])
-def test_a_limit_makes_unknown_at_most(monkeypatch: pytest.MonkeyPatch, where: object, name: str, least: int):
-    monkeypatch.setattr(where, name, least)
+def test_a_limit_makes_unknown_at_most(monkeypatch: pytest.MonkeyPatch, name: str, least: int):
+    monkeypatch.setattr(LIMITS, name, least)
     compare(random.Random(2), 40, limited=True)
 
 
