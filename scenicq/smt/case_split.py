@@ -6,19 +6,18 @@ A solver that gets lost among the cells of a map, or the directions at a point, 
 from __future__ import annotations
 
 from scenicq.budget import clock
+from scenicq.limits import LIMITS
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Solver, Unsat
 from scenicq.smt.formula import Conjunction, Disjunction, Problem, conjunction
 
 __all__ = ["cases", "check_by_cases"]
-
-_MOST_CASES = 64
 
 
 def cases(problem: Problem) -> list[Problem]:
     """The problem split by its widest disjunction, so that it has a solution if one of these has; empty without one."""
     root = problem.constraint
     parts = root.args if isinstance(root, Conjunction) else (root,)
-    choices = [part for part in parts if isinstance(part, Disjunction) and 1 < len(part.args) <= _MOST_CASES]
+    choices = [part for part in parts if isinstance(part, Disjunction) and 1 < len(part.args) <= LIMITS.split_cases]
     if not choices:
         return []
     chosen = max(choices, key=lambda part: len(part.args))

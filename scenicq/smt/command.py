@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import IO, Self
 
 from scenicq.errors import Diagnostic, SolverError
+from scenicq.limits import LIMITS
 from scenicq.refusals import limit_memory, refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.evaluation import holds
@@ -27,8 +28,6 @@ from scenicq.smt.smtlib import read_reply, to_smtlib
 
 __all__ = ["SmtlibSolver"]
 
-REPLY_BYTES = 4 * 2**20
-"""Length of a reply at most."""
 
 _LEASHED = """(read -r word < "/dev/fd/$1"; kill -s KILL -- "-$$") < /dev/null > /dev/null 2>&1 &
 shift; exec "$@\""""
@@ -70,7 +69,7 @@ class SmtlibSolver:
         """Decide a problem in a new process; see `Solver.check`."""
         with _leashed(self._words) as (words, leash), self._spawn(words, leash) as process:
             text, expired = _converse(process, to_smtlib(problem, precision).encode(), timeout_s)
-        if len(text) > REPLY_BYTES:
+        if len(text) > LIMITS.command_reply_bytes:
             return NoAnswer("garbage")
         answer = read_reply(text.decode(errors="replace"), problem)
         if expired and answer == NoAnswer("garbage"):
@@ -154,8 +153,8 @@ def _converse(process: subprocess.Popen[bytes], script: bytes, timeout_s: float)
     try:
         timer.start()
         writer.start()
-        text = process.stdout.read(REPLY_BYTES + 1)
-        if len(text) > REPLY_BYTES:
+        text = process.stdout.read(LIMITS.command_reply_bytes + 1)
+        if len(text) > LIMITS.command_reply_bytes:
             end_group(process)
         process.wait()
     finally:

@@ -20,6 +20,7 @@ from scenicq.geometry.boxes import corners as box_corners
 from scenicq.geometry.cells import convex_cells
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
+from scenicq.limits import LIMITS
 from scenicq.smt.formula import Formula, Num, Operator, Term, apply, compare, conjunction, disjunction
 from scenicq.smt.region_membership import TermVector, UnsupportedError, convex_cell, disc
 
@@ -34,8 +35,6 @@ __all__ = [
     "minus",
     "squared_distance",
 ]
-
-_MOST_SEGMENTS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +130,7 @@ def distance_term(region: Region, point: TermVector, around: Box) -> tuple[Term,
         away = length(minus(point, (Num(region.center[0]), Num(region.center[1]))))
         return apply(Operator.MAX, apply(Operator.SUB, away, region.radius), 0.0), []
     segments = _nearest_only(_points(region), around)
-    if not len(segments) or len(segments) > _MOST_SEGMENTS:
+    if not len(segments) or len(segments) > LIMITS.distance_edges:
         raise UnsupportedError("the distance from a random point to a region of so many edges")
     outside = apply(Operator.MIN, *(_to_segment(point, segment) for segment in segments.tolist()))
     if not isinstance(region, PolygonSet | Rectangle):
@@ -206,7 +205,7 @@ def box_meets(box: BoxTerms, region: Region) -> Formula:
             return disc_meets(box, (Num(region.center[0]), Num(region.center[1])), Num(region.radius))
         case PolygonSet():
             cells = convex_cells(region, region_bounds(region))
-            if len(cells) > _MOST_SEGMENTS:
+            if len(cells) > LIMITS.distance_edges:
                 raise UnsupportedError("whether a random box meets a region of so many pieces")
             return disjunction(_box_meets_cell(box, cell) for cell in cells)
         case UnionOf():

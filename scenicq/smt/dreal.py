@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from scenicq.limits import LIMITS
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import (
@@ -75,8 +76,6 @@ Symbolic = Any
 
 NEAR = 1000.0
 """Distance at which unbounded ranges are cut off in the search for a witness that holds."""
-CASES = 1_000_000
-"""Conjunctions that a problem is split into at most; most of them are never looked at."""
 COARSE = 1e-2
 """Precision at which some alternatives together are tried before the rest is chosen."""
 
@@ -132,7 +131,7 @@ def _cases(constraint: Formula) -> tuple[list[Formula], list[tuple[Formula, ...]
     count = 1
     for part in sorted((part for part in parts if isinstance(part, Disjunction)), key=lambda part: len(part.args)):
         count *= max(1, len(part.args))
-        if count <= CASES:
+        if count <= LIMITS.dreal_conjunctions:
             choices.append(part.args)
         else:
             fixed.append(part)

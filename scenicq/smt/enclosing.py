@@ -15,13 +15,12 @@ from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, Everywhere, IntersectionOf, Nowhere, PolygonSet, Rectangle, Region, UnionOf
 from scenicq.geometry.shapes import Shape
 from scenicq.geometry.terms import overlap, rectangle_shape
+from scenicq.limits import LIMITS
 from scenicq.smt.distance_terms import BoxTerms, dot, minus
 from scenicq.smt.formula import FALSE, TRUE, Formula, Num, Operator, apply, compare, conjunction, disjunction
 from scenicq.smt.region_membership import UnsupportedError, convex_cell, disc
 
 __all__ = ["box_holds"]
-
-_MOST_EDGES = 400
 
 
 def box_holds(box: BoxTerms, region: Region, around: Box) -> Formula:
@@ -79,7 +78,7 @@ def _area_holds(box: BoxTerms, area: Shape, around: Box) -> Formula:
         for ax, ay, bx, by in border
         if min(ax, bx) <= x1 and max(ax, bx) >= x0 and min(ay, by) <= y1 and max(ay, by) >= y0
     ]
-    if len(close) > _MOST_EDGES:
+    if len(close) > LIMITS.enclosing_edges:
         raise UnsupportedError("whether a random box lies in a region of so many edges")
     inside = disjunction(convex_cell(box.center, cell) for cell in cells)
     return conjunction([inside, *(_missed(box, *edge) for edge in close)])

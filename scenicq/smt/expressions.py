@@ -51,6 +51,7 @@ from scenicq.forest.walk import children, postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Rectangle
+from scenicq.limits import LIMITS
 from scenicq.smt.distance_terms import BoxTerms, box_meets, boxes_meet, disc_meets, distance_term, length, minus
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.field import field_cells
@@ -105,8 +106,6 @@ _SCALAR: dict[ArithmeticOp, Operator] = {
 }
 
 
-_MOST_WHOLE = 1000
-"""Cases of a number that is rounded down."""
 EVERYWHERE: Box = ((-math.inf, math.inf), (-math.inf, math.inf))
 
 
@@ -325,7 +324,7 @@ class Expressions:
                 low, high = min(ends), max(ends)
             case _:
                 return None
-        if not high - low <= _MOST_WHOLE:
+        if not high - low <= LIMITS.rounded_values:
             return None
         numbers = range(math.floor(low), math.floor(high) + 1)
         whole = self.unknowns.fresh("whole", float(numbers[0]), float(numbers[-1]))

@@ -25,6 +25,7 @@ from typing import IO, Self
 
 from scenicq.budget import leave_out, uncounted
 from scenicq.errors import Diagnostic, SolverError
+from scenicq.limits import LIMITS
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem
@@ -39,12 +40,6 @@ GRACE_S = 0.5
 """Seconds that a worker has to answer after its timeout before it is killed."""
 BUSY = 8.0
 """How many times the seconds of its work a worker may take by the wall: other work may hold the processor."""
-START_S = 60.0
-"""Seconds that a worker has to start."""
-_STARTS = 3
-"""How often a process that ends before it is ready is started anew."""
-ANSWER_BYTES = 16 * 2**20
-"""Length of an answer at most."""
 
 _BOOTSTRAP = (
     "import os, pickle, sys\n"
@@ -162,7 +157,7 @@ class _Worker:
                 return self._version
             self.stop()
         greeting: dict[str, str] = {}
-        for _ in range(_STARTS):
+        for _ in range(LIMITS.worker_starts):
             with uncounted():
                 greeting = self._spawn()
             if "ready" in greeting:
@@ -188,7 +183,7 @@ class _Worker:
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
-        line, _ = self._exchange(pickle.dumps(path) + pickle.dumps(self._setup), START_S)
+        line, _ = self._exchange(pickle.dumps(path) + pickle.dumps(self._setup), LIMITS.worker_start_s)
         try:
             return json.loads(line)
         except ValueError:
@@ -214,7 +209,7 @@ class _Worker:
             expired = expired or self._ended_by_alarm()
             self.stop()
             leave_out(max(0.0, waited - timeout_s) if expired else 0.0)
-            return NoAnswer("timeout" if expired else "garbage" if len(line) > ANSWER_BYTES else "crash")
+            return NoAnswer("timeout" if expired else "garbage" if len(line) > LIMITS.worker_answer_bytes else "crash")
         took = seconds_of(line)
         leave_out(max(0.0, waited - took) if took is not None else 0.0)
         answer = read_answer(line)
@@ -243,7 +238,7 @@ class _Worker:
         try:
             requests.write(message)
             requests.flush()
-            line = answers.readline(ANSWER_BYTES + 1)
+            line = answers.readline(LIMITS.worker_answer_bytes + 1)
         except OSError:
             # the process has ended
             pass

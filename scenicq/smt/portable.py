@@ -16,6 +16,7 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
+from scenicq.limits import LIMITS
 from scenicq.smt.affine import EMPTY, ENTAILED
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.evaluation import holds
@@ -25,16 +26,8 @@ from scenicq.smt.variable_isolation import Recipe, recipes
 
 __all__ = ["check"]
 
-BOXES = 100_000
-"""Boxes after which the search gives up."""
-PATIENCE = 400
-"""Boxes that are searched after a point within the precision was met."""
-SWEEPS = 8
-"""Rounds of contraction of one box at most."""
 GAIN = 0.9
 """A round of contraction counts if it cuts the width of a variable to this part."""
-FARTHEST = 1e12
-"""Unbounded ranges are not searched beyond this."""
 EXACT = 1e-9
 """An equality that fails by no more holds but for rounding."""
 SAMPLES = 2
@@ -94,7 +87,7 @@ class _Search:
         queue: list[tuple[float, int, _Box]] = []
         ages: deque[_Box] = deque()
         undecided = False
-        patience, count = PATIENCE, 0
+        patience, count = LIMITS.solver_patience, 0
         while True:
             for box in fresh:
                 count += 1
@@ -110,7 +103,7 @@ class _Search:
                 ages.append(box)
             if self._best and patience < 0:
                 return self._best
-            if count > BOXES:
+            if count > LIMITS.solver_boxes:
                 return NoAnswer("budget")
             box = _next(queue, ages, count)
             if box is None:
@@ -124,7 +117,7 @@ class _Search:
     def _narrow(self, box: _Box) -> bool:
         """Contract a box until that gains little; False if it is empty."""
         low, high = box.low, box.high
-        for _ in range(SWEEPS):
+        for _ in range(LIMITS.solver_sweeps):
             old_low, old_high = low[:], high[:]
             systems: list[System] = []
             for system in box.systems:
@@ -212,7 +205,7 @@ class _Search:
 
     def _splittable(self, low: float, high: float) -> bool:
         if math.isinf(high - low):
-            return low < FARTHEST and high > -FARTHEST
+            return low < LIMITS.solver_reach and high > -LIMITS.solver_reach
         return high - low > max(self._precision * 1e-3, 1e-12 * max(abs(low), abs(high)), 1e-15)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 from scenicq.errors import Diagnostic, SolverError
+from scenicq.limits import LIMITS
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Solver, SolverSession, SolverStatus, Unsat
 from scenicq.smt.command import SmtlibSolver
 from scenicq.smt.formula import TRUE, Problem
@@ -22,11 +23,8 @@ __all__ = [
     "open_solver",
 ]
 
-MEMORY_MB = 4096
-"""Address space of a solver process by default: what needs more is unknown, instead of taking the machine down."""
 
-
-def open_solver(name: str = "auto", *, jobs: int = 1, memory_mb: int | None = MEMORY_MB) -> SolverSession:
+def open_solver(name: str = "auto", *, jobs: int = 1, memory_mb: int | None = LIMITS.solver_memory_mb) -> SolverSession:
     """Open a solver, to be used in a `with` statement.
 
     Args:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 
+from scenicq.limits import LIMITS
 from scenicq.smt.affine import EMPTY, ENTAILED, MAYBE, AffineAtom, Forms, affine_atoms, contract_affine
 from scenicq.smt.evaluation import Evaluator
 from scenicq.smt.formula import Conjunction, Disjunction, Formula, Relation, TermComparison, free_variables, postorder
@@ -135,7 +136,7 @@ def compile_system(constraint: Formula, index: Mapping[str, int]) -> System:
         index: The number of each variable.
 
     Raises:
-        TooDeepError: Choices are nested deeper than `NESTING`.
+        TooDeepError: Choices are nested deeper than `LIMITS.formula_nesting`.
     """
     forms: Forms = {}
     systems: dict[int, System] = {}
@@ -157,10 +158,6 @@ def compile_system(constraint: Formula, index: Mapping[str, int]) -> System:
                 nesting[id(node)] = 1 + max((nesting[id(arg)] for arg in args), default=0)
             case _:
                 continue
-        if nesting[id(node)] > NESTING:
+        if nesting[id(node)] > LIMITS.formula_nesting:
             raise TooDeepError
     return systems[id(constraint)]
-
-
-NESTING = 100
-"""Choices within choices at most."""

@@ -6,14 +6,13 @@ import math
 
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import DiscreteRange, Identity, Index, Normal, Range, TruncatedNormal
+from scenicq.limits import LIMITS
 from scenicq.smt.formula import Formula, Num, Operator, Term, Var, Variable, apply, compare, disjunction
 from scenicq.smt.region_membership import UnsupportedError
 
 __all__ = ["ScalarLeaf", "Unknowns"]
 
 ScalarLeaf = Range | Normal | TruncatedNormal | DiscreteRange | Index
-
-_MOST_INTEGERS = 1000
 
 
 class Unknowns:
@@ -61,7 +60,7 @@ class Unknowns:
             case TruncatedNormal() if not all(isinstance(arg, Num) for arg in args):
                 self.side += [compare("<=", args[2], variable), compare("<=", variable, args[3])]
             case DiscreteRange() | Index():
-                if not math.isfinite(high - low) or high - low > _MOST_INTEGERS:
+                if not math.isfinite(high - low) or high - low > LIMITS.integer_values:
                     raise UnsupportedError("an integer from a random or very long range")
                 numbers = range(math.ceil(low), math.floor(high) + 1)
                 self.whole.add(node.identity)

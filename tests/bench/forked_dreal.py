@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from forked import alone
 
+from scenicq.limits import LIMITS
 from scenicq.smt import dreal
 from scenicq.smt.answer import Answer
 from scenicq.smt.formula import Problem
@@ -18,5 +19,5 @@ def by_dreal(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
 
 def by_dreal_as_it_is(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
     """DReal on a formula as it is."""
-    dreal.CASES = 0
+    LIMITS.dreal_conjunctions = 0
     return alone(dreal.check, problem, precision, timeout_s)
