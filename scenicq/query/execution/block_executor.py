@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from scenicq.limits import LIMITS
 from scenicq.match.verdict import Cause, Unknown
 from scenicq.processes import Lost, Work, Workers, as_many_as_pay
 from scenicq.query.execution.block_matcher import Decided, Decider, every_label
@@ -20,8 +21,6 @@ __all__ = ["BlockExecutor"]
 
 _PAYS_S = 3.0
 """Seconds of work that must be left for processes to be worth starting: it takes each about one."""
-_TRIES = 3
-"""Processes that a block, and then a frame alone, may cost."""
 
 
 class BlockExecutor:
@@ -83,17 +82,17 @@ class BlockExecutor:
             yield from self._elsewhere(waiting, told)
 
     def _elsewhere(
-        self, blocks: Iterable[Block], told: Callable[[Any], None] | None = None, tries: int = _TRIES
+        self, blocks: Iterable[Block], told: Callable[[Any], None] | None = None, tries: int | None = None
     ) -> Iterator[Decided]:
         """Decide blocks side by side, a bounded number ahead."""
-        for block, found in self._workers.run(blocks, told, tries=tries):
+        for block, found in self._workers.run(blocks, told, tries=LIMITS.block_tries if tries is None else tries):
             yield from self._halves(block) if isinstance(found, Lost) else (found,)
 
     def _halves(self, block: Block) -> Iterator[Decided]:
         if block.divisible:
             for half in block.halves():
                 # a half is lost at once: only what is left to blame, a frame or recording, gets more chances
-                yield from self._elsewhere([half], tries=1 if half.divisible else _TRIES)
+                yield from self._elsewhere([half], tries=1 if half.divisible else LIMITS.block_tries)
             return
         if block.runs:
             from scenicq.query.execution.recording_matcher import lost_recording  # noqa: PLC0415 - takes long to load

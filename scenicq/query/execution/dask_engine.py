@@ -28,6 +28,7 @@ from typing import Any
 
 from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
+from scenicq.limits import LIMITS
 from scenicq.processes import processors
 from scenicq.query.execution.deadline import time_left_s
 from scenicq.query.execution.partitions import Partition
@@ -44,8 +45,6 @@ _BEGINS_S = 60
 _CONNECT_S = 20
 _LOOK_S, _NOBODY_S = 2, 60
 """Seconds between looks at who is there, and how long nobody may be."""
-_RETRIES = 2
-"""How often a piece is done again after an error of the operating system, such as a disk that does not answer."""
 
 _LATER = ("`--resume` with `-o FILE` goes on where a query stopped",)
 
@@ -167,7 +166,7 @@ def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tup
                     platform.node(),
                     time_left_s(query.options.until),
                     pure=False,
-                    retries=_RETRIES,
+                    retries=LIMITS.piece_retries,
                 )
                 pending.append((piece, work))
             if not pending:

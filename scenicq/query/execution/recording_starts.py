@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.scenario import Scenario
+from scenicq.limits import LIMITS
 from scenicq.match.explanation import Finding
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.candidates import Candidates
@@ -21,9 +22,6 @@ from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.stretches import StartTable
 
 __all__ = ["DecidedStart", "few_findings", "label_of", "start_table", "starts_of"]
-
-_MOST_STARTS = 10_000
-"""Starts that the matcher may find in one recording, sure ones and open ones: they are held until it is decided."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +56,8 @@ def few_findings(
     for finding in matcher.findings(label, among=among, every_open=True):
         if finding.plan is not None:
             kind = "match" if isinstance(finding.verdict, Match) else "open"
-            if starts[kind] >= _MOST_STARTS:
-                cause = Cause("correspondence search", f"more than {_MOST_STARTS:,} starts in the recording")
+            if starts[kind] >= LIMITS.recording_starts:
+                cause = Cause("correspondence search", f"more than {LIMITS.recording_starts:,} starts in the recording")
                 return [*findings, Finding(Unknown("budget", cause))]
             starts[kind] += 1
         findings.append(finding)

@@ -23,6 +23,7 @@ from scenicq.budget import limited, time_is_up
 from scenicq.errors import Span
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.scenario import Scenario
+from scenicq.limits import LIMITS
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
@@ -42,18 +43,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Advice", "Outlook", "ProgramChange", "advice"]
 
-_MOST_FRAMES = 5_000
-"""Frames of a dataset beyond which a sample is looked at."""
-_MOST_CHANGES, _FEW_CHANGES = 24, 5
-"""Changes that are tried; the second where advice must be brief."""
-_MOST_PAIRED, _FEW_PAIRED = 6, 4
-"""Changes of which pairs are tried."""
-_MOST_DECIDED, _FEW_DECIDED = 300, 16
-"""Frames that the matcher decides for one change."""
-_MOST_RUNS, _FEW_RUNS = 8, 3
-"""Runs of frames of each map that a large dataset is sampled by."""
-_MOST_MAPS, _FEW_MAPS = 16, 4
-"""Maps whose frames are looked at."""
 _ANYWHERE = {"position": 1e5, "heading": math.pi}
 """Sizes of a tolerance by which a feature is as good as not compared."""
 _WRITTEN = {"position": "in everywhere", "heading": "facing Range(0, 360) deg"}
@@ -183,22 +172,24 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
     changes = sorted(
         _changes(scenario, query.options.match), key=lambda each: (rank.get(each.about, len(excluded)), each.widened)
     )
-    few, decided = (_FEW_CHANGES, _FEW_DECIDED) if brief else (_MOST_CHANGES, _MOST_DECIDED)
+    few, decided = (
+        (LIMITS.brief_changes, LIMITS.brief_decisions) if brief else (LIMITS.advice_changes, LIMITS.advice_decisions)
+    )
     found: list[Outlook] = []
     complete = True
     with ExitStack() as stack, limited(min(budget_s, time_left_s(query.options.until))):
-        runs, maps = (_FEW_RUNS, _FEW_MAPS) if brief else (_MOST_RUNS, _MOST_MAPS)
+        runs, maps = (LIMITS.brief_runs, LIMITS.brief_maps) if brief else (LIMITS.advice_runs, LIMITS.advice_maps)
         sample = _sample(query, worlds, stack, runs, maps)
         solver = stack.enter_context(LazySolver(query.options.solver))
         for number, change in enumerate(changes):
-            if number and (time_is_up() or number >= (few if found else _MOST_CHANGES)):
+            if number and (time_is_up() or number >= (few if found else LIMITS.advice_changes)):
                 complete = False
                 break
             outlook = _outlook(query.options.match, sample, change, solver, decided)
             if outlook.most > query.funnel.matches:
                 found.append(outlook)
         if not found and query.funnel.matches == 0:
-            paired = _pairs(changes, _FEW_PAIRED if brief else _MOST_PAIRED)
+            paired = _pairs(changes, LIMITS.brief_pairs if brief else LIMITS.advice_pairs)
             for change in itertools.takewhile(lambda _: not time_is_up(), paired):
                 outlook = _outlook(query.options.match, sample, change, solver, decided)
                 if outlook.most > 0:
@@ -246,7 +237,7 @@ def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, r
     for name in chosen:
         connection = stack.enter_context(closing(query.dataset.connect(threads=1, views=False)))
         blocks = query.blocks(name)
-        frames += hold(query.dataset, connection, list(spots(blocks, runs)) if total > _MOST_FRAMES else blocks)
+        frames += hold(query.dataset, connection, list(spots(blocks, runs)) if total > LIMITS.advice_frames else blocks)
         held[name] = connection
     return _Sample(chosen, held, frames, total)
 

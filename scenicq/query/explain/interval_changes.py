@@ -17,14 +17,13 @@ from scenicq.forest.build import constant
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Compare, CompareOp, Node
 from scenicq.forest.temporal import Atom, Eventually, Formula, operands
 from scenicq.forest.walk import features, leaves, postorder, transform
+from scenicq.limits import LIMITS
 from scenicq.temporal.atoms import AtomColumns, HiddenVariable
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["Change", "least_changes", "may_still_hold"]
 
-_MOST_TRIED = 400
-"""Amounts that are tried for one comparison."""
 _GREATER = (CompareOp.GT, CompareOp.GE)
 _ORDERS = (*_GREATER, CompareOp.LT, CompareOp.LE)
 _SPARE = 1e-3
@@ -155,7 +154,7 @@ def _least(
         ends = [_first(tried[side], holds) for side in (tried > 0, tried < 0)]
         enough = min((each for each in ends if each is not None), key=abs, default=None)
     else:
-        enough = next((float(amount) for amount in tried[:_MOST_TRIED] if holds(float(amount))), None)
+        enough = next((float(amount) for amount in tried[: LIMITS.tried_amounts] if holds(float(amount))), None)
     if enough is None:
         return None
     assert compare.span is not None

@@ -10,6 +10,7 @@ import numpy as np
 
 from scenicq.errors import DataError, Diagnostic, render
 from scenicq.forest.scenario import Scenario
+from scenicq.limits import LIMITS
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.interval_frames import locate
@@ -29,8 +30,6 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 __all__ = ["IntervalExplanation", "changes_of", "explain_recording", "placed"]
 
-_MOST_ROUNDS = 8
-"""How often starts whose runs are cut off are left out."""
 
 _ROUNDED_S = 0.05
 """Seconds are shown to a tenth."""
@@ -197,7 +196,7 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
         results = _intervals(intervals, scenario, block, starts)
         # what is cut off is looked at where no run comes to its end
         whole = starts
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(LIMITS.cut_off_rounds):
             cut = {each.binding: each.start for each in results if each.cut_off}
             whole = [each for each in whole if not _is_after(block, each, cut)]
             if not cut or not whole:

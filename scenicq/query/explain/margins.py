@@ -16,6 +16,7 @@ from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Comparison, Condition
 from scenicq.forest.nodes import Constant, Identity, Node, Value
 from scenicq.geometry.angles import normalize
+from scenicq.limits import LIMITS
 from scenicq.match.explanation import Item, LabelSearch, MatchPlan, Satisfied, describe_constraint, show_value
 from scenicq.match.matcher import Matcher
 from scenicq.query.explain.sides import amount, sides
@@ -24,8 +25,6 @@ from scenicq.query.explain.violations import allowed_values, choices, distance_o
 __all__ = ["SatisfiedConstraint", "margins"]
 
 _ROUNDING = 1e-3
-_MOST = 200
-"""Features and requirements that are told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,7 @@ def margins(
     found: list[SatisfiedConstraint] = []
     for each in plan.groups:
         outcome = attempt.decide(each, assignment)
-        if not isinstance(outcome, Satisfied) or len(found) >= _MOST:
+        if not isinstance(outcome, Satisfied) or len(found) >= LIMITS.told_margins:
             continue
         try:
             items = attempt.items(each.group, assignment)

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from scenicq.errors import Span
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch
@@ -24,13 +25,6 @@ from scenicq.query.explain.interval_explanation import changes_of, placed
 from scenicq.query.explain.nearest_miss import FINEST_M, LADDER_M, show_tolerance, widened, with_parts
 
 __all__ = ["nearest_intervals"]
-
-MOST_RECORDINGS = 200
-"""Recordings that a ranking looks at for each of the two ways to let one through."""
-MOST_BINDINGS = 1000
-"""Bindings of all these for which numbers are looked for, those that come furthest first."""
-_MOST_TRIED = 10
-"""Numbers that are tried on a recording, the least first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +59,9 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
         if each.recording not in matching and isinstance(each.verdict, NoMatch):
             missed.setdefault(each.recording, []).append(each)
     furthest = sorted(missed.values(), key=lambda mine: -max(map(_length, mine)))
-    for mine in furthest[:MOST_RECORDINGS]:
+    for mine in furthest[: LIMITS.ranked_recordings]:
         longest = sorted(mine, key=_length, reverse=True)
-        _keep(near, _by_number(every, longest[: max(1, MOST_BINDINGS // len(missed))]))
+        _keep(near, _by_number(every, longest[: max(1, LIMITS.ranked_bindings // len(missed))]))
         _keep(near, _by_duration(every, longest[0]))
     seen = set(matching)
     for widening_m in LADDER_M:
@@ -75,7 +69,7 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
         if widening_m > nearer and widening_m / 10 > nearer:
             break
         for each in _under(every, widened(query.options.match.tolerance, widening_m)):
-            if each.recording not in seen and len(seen) - len(matching) < MOST_RECORDINGS:
+            if each.recording not in seen and len(seen) - len(matching) < LIMITS.ranked_recordings:
                 seen.add(each.recording)
                 _keep(near, _by_tolerance(every, each.recording, widening_m, _bound(near, count)))
         if widening_m >= _bound(near, count):
@@ -149,7 +143,7 @@ def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
         scenario, tracks, interval = placed(query, result)
         found = changes_of(scenario, tracks, interval, quick=True)
         changes += [(abs(each.amount), each, interval.broken) for each in found]
-    for amount, change, broken in sorted(changes, key=lambda each: each[0])[:_MOST_TRIED]:
+    for amount, change, broken in sorted(changes, key=lambda each: each[0])[: LIMITS.ranked_numbers]:
         conditions = change.made(dynamics.conditions)
         changed = replace(world.scenario, dynamics=replace(dynamics, conditions=conditions))
         other = CompiledMap.of(changed, world.network, match, prefilter=query.options.prefilter)

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from scenicq.forest.groups import Comparison
+from scenicq.limits import LIMITS
 from scenicq.match.explanation import Finding
 from scenicq.match.matcher import Matcher
 from scenicq.match.tolerance import Tolerance
@@ -46,8 +47,6 @@ MOST_M = 100.0
 """Metres beyond which a tolerance is not widened."""
 FINEST_M = 1e-3
 """Metres to which the least tolerance is found."""
-MOST_FRAMES = 5000
-"""Frames that a ranking looks at."""
 LADDER_M = (0.01, 0.1, 1.0, 4.0, 16.0, MOST_M)
 """Metres by which tolerances are widened on the way to the least."""
 
@@ -262,7 +261,7 @@ def nearest_misses(
     query: Query,
     count: int,
     *,
-    most_frames: int = MOST_FRAMES,
+    most_frames: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> list[Result]:
     """The frames that do not match but come closest, the closest first; ties in the order of the store.
@@ -279,7 +278,7 @@ def nearest_misses(
         progress: Called with 1 for each frame looked at.
     """
     ranking = _Ranking(count, [])
-    left = most_frames
+    left = LIMITS.ranked_frames if most_frames is None else most_frames
     seen: set[str] = set()
     with LazySolver(query.options.solver) as solver:
         worlds = [(world, Matcher(world.scenario, query.options.match, solver)) for world in query.fitting()]

@@ -16,6 +16,7 @@ from scenicq.forest.groups import Comparison, Condition, Group
 from scenicq.forest.nodes import Constant, Encloses, Index, Node, PointIn, Undefined, Value
 from scenicq.forest.walk import leaves
 from scenicq.geometry.angles import normalize
+from scenicq.limits import LIMITS
 from scenicq.match.explanation import (
     Item,
     LabelSearch,
@@ -36,8 +37,6 @@ _LONGEST_NAME = 60
 _FAR_M = 1000.0
 _STEPS = 40
 _FINEST = 1e-4
-_MOST_CHOICES = 16
-_MOST_INTERVALS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +152,7 @@ def _region_name(leaf: PointIn) -> str:
 def choices(root: Node) -> Iterator[Node]:
     """The expression for each way to choose among options; nothing if there are too many."""
     indices = [leaf for leaf in leaves(root) if isinstance(leaf, Index)]
-    if math.prod(len(leaf.weights) for leaf in indices) > _MOST_CHOICES:
+    if math.prod(len(leaf.weights) for leaf in indices) > LIMITS.told_choices:
         return
     for picked in itertools.product(*(range(len(leaf.weights)) for leaf in indices)):
         chosen = {leaf.identity: float(number) for leaf, number in zip(indices, picked, strict=True)}
@@ -163,7 +162,7 @@ def choices(root: Node) -> Iterator[Node]:
 def _interval(property_: str, node: Node) -> str:
     """The interval of each way to choose among options, or what holds them all."""
     bounds = sorted({scalar_bounds(option) for option in choices(node)}) or [scalar_bounds(node)]
-    if len(bounds) > _MOST_INTERVALS:
+    if len(bounds) > LIMITS.told_intervals:
         bounds = [scalar_bounds(node)]
     shown: list[str] = []
     for low, high in bounds:

@@ -33,6 +33,7 @@ from scenicq.forest.walk import conjuncts, features
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import IntersectionOf, Region
 from scenicq.geometry.road_direction import RoadDirection
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.ego_frame import DISTANCE, PLACE, in_ego_frame
@@ -339,15 +340,12 @@ def turned_within(own: str, alternatives: Sequence[Interval[Expr]], width: float
     return f"CASE WHEN len({directions}) = 1 THEN {one} ELSE len(list_filter({directions}, lambda d: {each})) > 0 END"
 
 
-_MOST_SUMMANDS = 64
-
-
 def _summands(node: Node) -> list[Node]:
     """The terms of a sum; the sum itself if it has very many: terms that are shared count again and again."""
     found: list[Node] = []
     stack = [node]
     while stack:
-        if len(stack) + len(found) > _MOST_SUMMANDS:
+        if len(stack) + len(found) > LIMITS.heading_terms:
             return [node]
         part = stack.pop()
         if isinstance(part, Arithmetic) and part.op is ArithmeticOp.ADD:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 __all__ = ["columns_of", "decided_frames", "decision", "new_table"]
 
 _DECIDED = "decided"
-
-_MOST_COUNTED, _MOST_JOINED = 6, 3
-"""Roles that may be counted, and that may be joined."""
 
 
 def decision(
@@ -52,7 +50,7 @@ def decision(
     """
     labels, objects = tables
     ties = [each for each in found if len(each.objects) == 2]
-    if len(roles) > (_MOST_JOINED if ties else _MOST_COUNTED):
+    if len(roles) > (LIMITS.tied_roles if ties else LIMITS.counted_roles):
         return ()
     if any(near not in flags or len(each.objects) == 2 for each in found for _, near in each.places):
         return ()

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from scenicq.forest.scenario import Scenario, ScenarioObject
 from scenicq.geometry.network import Network
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import SLACK
@@ -33,9 +34,6 @@ SENSORS = "block_sensors"
 """The view of the sensor files of a block."""
 PASSED = "passed"
 """The table of the numbers `f` of the frames that their own columns leave."""
-
-_MOST_PAIRS = 12
-"""Pairs of roles whose objects are joined."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +143,7 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
     placed_table = _regions(draft, [each for each in found if not each.objects and each.region], roles, flags)
     if roles and own_ego:
         _distinct(draft, roles, placed_table, pairs)
-        for objects, tied in list(pairs.items())[:_MOST_PAIRS]:
+        for objects, tied in list(pairs.items())[: LIMITS.joined_pairs]:
             _pair(draft, roles, objects, tied)
     played = tuple(role.owner.index for role in roles)
     left = f"(SELECT f FROM {draft.last} WHERE missed IS NULL)"

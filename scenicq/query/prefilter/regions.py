@@ -6,14 +6,12 @@ from functools import cached_property
 
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, Region, UnionOf
+from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.sql import sql_text
 
 __all__ = ["RegionNames", "near_region"]
-
-_MOST_IDS = 2000
-"""Regions named one by one in a condition at most."""
 
 
 class RegionNames:
@@ -82,7 +80,7 @@ def _chosen(area: PolygonSet, names: RegionNames) -> str | None:
     if id(area) in names.kinds:
         return f"kind IN ({', '.join(map(sql_text, names.kinds[id(area)]))})"
     known = area.ids and all(name in names.elements for name in area.ids)
-    if not known or len(area.ids) > _MOST_IDS or len(area.ids) != len(area.polygons):
+    if not known or len(area.ids) > LIMITS.named_regions or len(area.ids) != len(area.polygons):
         return None
     ids = ", ".join(sql_text(names.elements[name]) for name in area.ids)
     # a subquery is hashed, a list is gone through for every row

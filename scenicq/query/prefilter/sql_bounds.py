@@ -18,6 +18,7 @@ from scenicq.forest.interpret import OnMap, RegionNode, interpret, steps_of
 from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import ArithmeticOp, CompareOp, DiscreteRange, Feature, Leaf, LogicOp, Node, Value
+from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import SQL, Expr, any_of
 
@@ -29,9 +30,6 @@ Alternatives: TypeAlias = tuple[IntervalValue[Expr], ...]
 Columns = Mapping[tuple[int, str], str | tuple[str, str]]
 """The column of each (object, property) that has one; a pair for vectors."""
 
-_MOST_ALTERNATIVES = 16
-_MOST_TEXT = 6000
-"""Characters of an end of an interval: what is longer is left unbounded."""
 
 ARITHMETIC = IntervalDomain(SQL, slack=SLACK)
 """Operations on intervals whose ends are SQL."""
@@ -112,7 +110,7 @@ class _Alternatives:
         ends = [arg[0] for arg in args if len(arg) == 1]
         if isinstance(node, DiscreteRange) and len(ends) == len(args):
             low, high = self.domain.hull([each for each in ends if isinstance(each, Interval)])[:2]
-            if isinstance(low, float) and isinstance(high, float) and high - low < _MOST_ALTERNATIVES:
+            if isinstance(low, float) and isinstance(high, float) and high - low < LIMITS.sql_alternatives:
                 numbers = range(math.ceil(low), math.floor(high) + 1)
                 return tuple(self.domain.constant(float(number)) for number in numbers)
         return self._each(lambda *chosen: self.domain.variable(node, chosen), args)
@@ -158,14 +156,14 @@ class _Alternatives:
         return self._each(lambda *chosen: self.domain.region(node, chosen), args)
 
     def _each(self, operation: Callable[..., IntervalValue[Expr]], args: Sequence[Alternatives]) -> Alternatives:
-        if math.prod(map(len, args)) > _MOST_ALTERNATIVES**2:
+        if math.prod(map(len, args)) > LIMITS.sql_alternatives**2:
             args = [(self._joined(arg),) for arg in args]
         return self._few([operation(*chosen) for chosen in itertools.product(*args)])
 
     def _few(self, found: Sequence[IntervalValue[Expr]]) -> Alternatives:
         """At most so many alternatives, none of them endless to read."""
         kept = list(dict.fromkeys(found))
-        if len(kept) > _MOST_ALTERNATIVES:
+        if len(kept) > LIMITS.sql_alternatives:
             kept = [self._joined(kept)]
         return tuple(
             IntervalVector(*map(self._readable, each)) if isinstance(each, IntervalVector)
@@ -179,5 +177,5 @@ class _Alternatives:
         return parts[0] if len(parts) == 1 else self.domain.select(None, parts)
 
     def _readable(self, value: Interval[Expr]) -> Interval[Expr]:
-        long = any(isinstance(end, str) and len(end) > _MOST_TEXT for end in value[:2])
+        long = any(isinstance(end, str) and len(end) > LIMITS.sql_characters for end in value[:2])
         return self.domain.everything() if long else value

@@ -40,6 +40,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import features, postorder
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import IntersectionOf, Region
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, relevant_properties
 from scenicq.match.tolerance import SLACK
@@ -53,7 +54,6 @@ from scenicq.store.sql import sql_text
 __all__ = ["SufficientCondition", "sufficient_conditions"]
 
 _T = TypeVar("_T")
-_MOST_ALTERNATIVES = 16
 _COLUMNED = frozenset(object_columns(EGO))
 """Properties that a label has in columns; all others are among its attributes."""
 
@@ -186,7 +186,7 @@ class _Prover:
         if not isinstance(rest, VectorOf):
             raise _OpenError
         (across, one), (along, other) = _filled(rest.x, bounds), _filled(rest.y, bounds)
-        if one & other or len(across) * len(along) > _MOST_ALTERNATIVES:
+        if one & other or len(across) * len(along) > LIMITS.proof_alternatives:
             raise _OpenError
         close = [
             _close([_beyond(p, limits) for p, limits in zip(rest_place, (x, y), strict=True)], sure)
@@ -275,7 +275,7 @@ def _filled_by(node: Node, bounds: SqlBounds, found: Mapping[int, Filled]) -> Fi
         case Range(low=Constant(value=float(low)), high=Constant(value=float(high))):
             return [Interval(min(low, high), max(low, high))], frozenset((node.identity,))
         case DiscreteRange(low=Constant(value=float(low)), high=Constant(value=float(high))):
-            if high - low >= _MOST_ALTERNATIVES:
+            if high - low >= LIMITS.proof_alternatives:
                 raise _OpenError
             numbers = range(math.ceil(low), math.floor(high) + 1)
             return [SQL.known(float(each)) for each in numbers], frozenset((node.identity,))
@@ -321,7 +321,7 @@ def _combined(op: ArithmeticOp, args: Sequence[Filled]) -> Filled:
 
 
 def _few(found: list[_T]) -> list[_T]:
-    if len(found) > _MOST_ALTERNATIVES:
+    if len(found) > LIMITS.proof_alternatives:
         raise _OpenError
     return found
 

@@ -8,9 +8,9 @@ from collections import Counter
 import pytest
 
 from scenicq.errors import Source
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown
-from scenicq.query.execution import recording_starts
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
@@ -66,7 +66,7 @@ def test_what_is_beyond_the_limit_is_unknown_for_each_label(dataset, over_time):
 
 
 def test_beyond_the_starts_of_a_recording_labels_are_unknown(dataset, monkeypatch):
-    monkeypatch.setattr(recording_starts, "_MOST_STARTS", 50)
+    monkeypatch.setattr(LIMITS, "recording_starts", 50)
     options = QueryOptions(every=True, match=MatchOptions(correspondences=20))
     matches, unknown = told(dataset, APART + OVER_TIME, options)
     assert unknown == Counter({(f"r-{n}", "budget"): 1 for n in range(LABELS)})

@@ -15,11 +15,11 @@ import pytest
 from scenicq import budget
 from scenicq.errors import Source
 from scenicq.importers.ingest import ingest
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.explain import advice as advice_module
 from scenicq.query.explain import prefilter_counts
 from scenicq.query.explain.advice import advice
 from scenicq.smt.solver import NoAnswer
@@ -84,7 +84,7 @@ def test_a_parameter_is_a_change_too(dataset):
 
 
 def test_large_datasets_are_sampled(dataset, monkeypatch):
-    monkeypatch.setattr(advice_module, "_MOST_FRAMES", 10)
+    monkeypatch.setattr(LIMITS, "advice_frames", 10)
     query = taken(dataset, TEXT)
     assert not any(each.sampled for each in advice(query).outlooks)  # where the sample is all there is
     monkeypatch.setattr(prefilter_counts, "_SPOT_FRAMES", 10)
@@ -103,7 +103,7 @@ def test_brief_advice_is_bounded_by_work_and_says_no_more_than_all_of_it(dataset
 
 
 def test_brief_advice_goes_on_until_something_helps(dataset, monkeypatch):
-    monkeypatch.setattr(advice_module, "_FEW_CHANGES", 1)
+    monkeypatch.setattr(LIMITS, "brief_changes", 1)
     text = "model scenic.domains.driving.model\nego = new Car\nother = new Truck\nrequire (distance to other) < 1\n"
     query = taken(dataset, text)
     assert query.funnel.excluded.most_common(1)[0][0] == "other.class"
