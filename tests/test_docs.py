@@ -6,11 +6,10 @@ from pathlib import Path
 import click
 import pytest
 
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
-from scenicq.query.execution import recording_starts
 from scenicq.store.classes import ROOT as ROOT_CLASS
 from scenicq.store.classes import ancestors, subclasses
-from scenicq.syntax.parser import MAX_CHARACTERS
 from scenicq_cli.main import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
@@ -111,8 +110,8 @@ def test_help_fits_a_page_and_has_every_section():
     ("sentence", "limit"),
     [
         ("At most {:,} correspondences are reported per frame", MatchOptions().correspondences),
-        ("an interval may begin in {:,} ways a recording", recording_starts._MOST_STARTS),
-        ("it has {:,} characters", MAX_CHARACTERS),
+        ("an interval may begin in {:,} ways a recording", LIMITS.recording_starts),
+        ("it has {:,} characters", LIMITS.program_characters),
     ],
 )
 def test_limits_are_those_that_the_readme_names(sentence, limit):

@@ -17,13 +17,10 @@ from typing import Any, cast
 from scenicq.compiler.values import Choice, ModelValue, describe, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant
+from scenicq.limits import LIMITS
 
-__all__ = ["LARGEST", "check_weight", "hashed", "is_flat", "is_random", "no_number", "plain_binary", "plain_unary"]
+__all__ = ["check_weight", "hashed", "is_flat", "is_random", "no_number", "plain_binary", "plain_unary"]
 
-LARGEST = 100_000
-"""Items of the longest list, characters of the longest string, that a program may make."""
-_MOST_BITS = 2048
-_DEEPEST = 40
 
 _PYTHON: dict[str, Callable[[Any, Any], Any]] = {
     "+": operator.add,
@@ -64,18 +61,18 @@ def is_flat(value: ModelValue) -> bool:
 
 
 def _weigh(values: Iterable[ModelValue], span: Span, *, compared: bool) -> int:
-    """How many values there are with all they hold, counted as often as they are reached; at most `LARGEST` + 1."""
+    """How many values there are with all they hold, counted as often as they are reached; one too many at most."""
     total = 0
     stack: list[tuple[ModelValue, int]] = [(value, 0) for value in values]
-    while stack and total <= LARGEST:
+    while stack and total <= LIMITS.value_items:
         value, depth = stack.pop()
         if compared and depth and is_random(value):
             raise fail("random-branch", "a list that holds random values cannot be compared", span, "random inside",
                        ("compare the items themselves",))  # fmt: skip
         total += 1 + (len(value) // 64 if isinstance(value, str) else 0)
         if isinstance(value, _CONTAINERS):
-            if depth >= _DEEPEST or len(cast("list[ModelValue]", value)) > LARGEST:
-                return LARGEST + 1
+            if depth >= LIMITS.value_nesting or len(cast("list[ModelValue]", value)) > LIMITS.value_items:
+                return LIMITS.value_items + 1
             held = cast("Iterable[ModelValue]", value)
             stack += [(item, depth + 1) for item in held]
             if isinstance(value, dict):
@@ -95,9 +92,9 @@ def check_weight(span: Span, *values: ModelValue, compared: bool = False) -> Non
         ScenarioError: budget-exceeded, random-branch.
     """
     held = [value for value in values if isinstance(value, _CONTAINERS) and not is_flat(value)]
-    if held and _weigh(held, span, compared=compared) > LARGEST:
+    if held and _weigh(held, span, compared=compared) > LIMITS.value_items:
         raise fail("budget-exceeded", "this value is too large to go through", span, "nested or long beyond bounds",
-                   (f"keep lists below {LARGEST:,} items and {_DEEPEST} levels",))  # fmt: skip
+                   (f"keep lists below {LIMITS.value_items:,} items and {LIMITS.value_nesting} levels",))  # fmt: skip
 
 
 def no_number(error: ArithmeticError, span: Span | None, label: str) -> ScenarioError:
@@ -107,7 +104,7 @@ def no_number(error: ArithmeticError, span: Span | None, label: str) -> Scenario
 
 def _check_size(op: str, left: Any, right: Any, span: Span) -> None:
     """Refuse what would make a number or a sequence too large to hold."""
-    size, most = 0, LARGEST
+    size, most = 0, LIMITS.value_items
     sequences = (str, list, tuple)
     if op == "*" and (isinstance(left, sequences) or isinstance(right, sequences)):
         sequence, times = (left, right) if isinstance(left, sequences) else (right, left)
@@ -116,9 +113,10 @@ def _check_size(op: str, left: Any, right: Any, span: Span) -> None:
         size = len(cast("list[Any]", left)) + len(cast("list[Any]", right))
     elif op in ("**", "<<") and isinstance(left, int) and isinstance(right, int):
         bits = left.bit_length()
-        size, most = (bits * right if op == "**" and bits > 1 else bits + right if op == "<<" else 0), _MOST_BITS
+        most = LIMITS.integer_bits
+        size = bits * right if op == "**" and bits > 1 else bits + right if op == "<<" else 0
     elif op == "*" and isinstance(left, int) and isinstance(right, int):
-        size, most = left.bit_length() + right.bit_length(), _MOST_BITS
+        size, most = left.bit_length() + right.bit_length(), LIMITS.integer_bits
     elif op == "%" and isinstance(left, str):
         raise fail("unsupported-construct", "`%` on a string is not supported", span, "formats a string",
                    ("write an f-string",))  # fmt: skip

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import LARGEST, check_weight, hashed, is_flat, is_random
+from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random
 from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import property_node, to_heading, to_region, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
@@ -27,6 +27,7 @@ from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import ArithmeticOp, Node
 from scenicq.geometry.elements import Lane, Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
+from scenicq.limits import LIMITS
 from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS
 
 if TYPE_CHECKING:
@@ -221,8 +222,8 @@ def _guarded(name: str, owner: ModelValue) -> Callable[..., ModelValue]:
 
 
 def _check_length(length: int, span: Span) -> None:
-    if length > LARGEST:
-        raise fail("budget-exceeded", f"a value grows beyond {LARGEST:,} items", span, "grows here")
+    if length > LIMITS.value_items:
+        raise fail("budget-exceeded", f"a value grows beyond {LIMITS.value_items:,} items", span, "grows here")
 
 
 _PLACES = {

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import LARGEST, hashed, is_random, plain_binary
+from scenicq.compiler.arithmetic import hashed, is_random, plain_binary
 from scenicq.compiler.choices import distribute, is_choice
 from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
 from scenicq.compiler.courses import as_test
@@ -26,6 +26,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant
 from scenicq.geometry.regions import Everywhere, Nowhere, PolylineSet
+from scenicq.limits import LIMITS
 
 __all__ = ["extreme", "language_names", "mathematics", "truth"]
 
@@ -257,8 +258,8 @@ def _whole_numbers(span: Span, *args: ModelValue) -> ModelValue:
         raise fail("wrong-value", "the step of a `range` must not be zero", span)
     numbers = range(*args)
     first, last, step = numbers.start, numbers.stop, numbers.step
-    if (last - first) // step > LARGEST:  # `len` cannot count so far
-        raise fail("budget-exceeded", f"more than {LARGEST:,} numbers", span, "counts too far")
+    if (last - first) // step > LIMITS.value_items:  # `len` cannot count so far
+        raise fail("budget-exceeded", f"more than {LIMITS.value_items:,} numbers", span, "counts too far")
     return numbers
 
 

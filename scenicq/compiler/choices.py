@@ -14,6 +14,7 @@ from scenicq.compiler.coerce import kind_of_model, to_node
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
+from scenicq.limits import LIMITS
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -33,8 +34,6 @@ __all__ = [
     "regions_apart",
 ]
 
-_MOST_OPTIONS = 20_000
-"""Options of a choice, those of nested choices included."""
 LACKING = frozenset({"map-lacks", "runtime-error"})
 """Errors that only say that something is not there: a part of the map, an item of a list."""
 
@@ -59,8 +58,10 @@ def make_choice(index: Node, options: list[ModelValue], span: Span | None) -> Mo
     if all(option is options[0] for option in options) and not isinstance(options[0], Choice):
         return options[0]
     size = sum(option.size if isinstance(option, Choice) else 1 for option in options)
-    if size > _MOST_OPTIONS:
-        raise fail("budget-exceeded", f"a random choice has more than {_MOST_OPTIONS:,} outcomes", span, "chosen here")
+    if size > LIMITS.choice_options:
+        raise fail(
+            "budget-exceeded", f"a random choice has more than {LIMITS.choice_options:,} outcomes", span, "chosen here"
+        )
     kinds = {kind_of_model(option) for option in options}
     plain = all(not isinstance(option, Instance) and kind_of_model(option) is not None for option in options)
     elements = any(kind_of_model(option) == "region" and not is_node(option) for option in options)
@@ -153,8 +154,9 @@ def holds_instances(value: ModelValue) -> bool:
 
 def _check_outcomes(choices: list[Choice], span: Span) -> None:
     outcomes = math.prod({choice.key: len(choice.options) for choice in choices}.values())
-    if outcomes > _MOST_OPTIONS:
-        raise fail("budget-exceeded", f"this has more than {_MOST_OPTIONS:,} outcomes", span, "of random choices",
+    if outcomes > LIMITS.choice_options:
+        what = f"this has more than {LIMITS.choice_options:,} outcomes"
+        raise fail("budget-exceeded", what, span, "of random choices",
                    ("choose between fewer", "compare numbers that are made from the choices"))  # fmt: skip
 
 

@@ -24,13 +24,12 @@ from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build
 from scenicq.forest.nodes import CompareOp, Constant, Feature, Index, LogicOp, Node, Select
 from scenicq.forest.walk import leaves
+from scenicq.limits import LIMITS
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
 __all__ = ["as_test", "option_of", "split", "without_courses"]
-
-_MOST_COURSES = 2_000
 
 
 @dataclass(eq=False, slots=True)
@@ -105,8 +104,9 @@ def split(run: Interpreter, evaluate: Callable[[], Node], span: Span) -> Node:
     missing: ScenarioError | None = None
     todo: list[tuple[tuple[Node, bool], ...]] = [()]
     while todo:
-        if len(values) >= _MOST_COURSES:
-            raise fail("budget-exceeded", f"this condition has more than {_MOST_COURSES:,} courses", span, "",
+        if len(values) >= LIMITS.condition_courses:
+            what = f"this condition has more than {LIMITS.condition_courses:,} courses"
+            raise fail("budget-exceeded", what, span, "",
                        ("compare fewer objects with each other",))  # fmt: skip
         given = todo.pop()
         with ExitStack() as around:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
 
-from scenicq.compiler.arithmetic import LARGEST
 from scenicq.compiler.choices import make_choice, nothing_to_choose
 from scenicq.compiler.coerce import to_scalar
 from scenicq.compiler.values import Choice, ModelValue, describe, fail, is_node
@@ -24,6 +23,7 @@ from scenicq.forest.nodes import (
     Select,
     TruncatedNormal,
 )
+from scenicq.limits import LIMITS
 
 __all__ = ["DISTRIBUTIONS", "interval", "uniform"]
 
@@ -132,7 +132,7 @@ def _discrete_range(
         raise fail("wrong-value", "this range of whole numbers is empty", span, "the lower end is above the upper")
     if weights is None:
         return ends[0] if values[0] is not None and values[0] == values[1] else DiscreteRange(*ends, span=span)
-    if len(known) < 2 or not isinstance(weights, list | tuple) or known[1] - known[0] > LARGEST:
+    if len(known) < 2 or not isinstance(weights, list | tuple) or known[1] - known[0] > LIMITS.value_items:
         raise fail("wrong-type", "`DiscreteRange` with weights needs known whole numbers and a list", span)
     numbers: list[ModelValue] = [float(n) for n in range(known[0], known[1] + 1)]
     return uniform(numbers, _weights(list(cast("list[ModelValue]", weights)), span), span)

@@ -9,6 +9,7 @@ from scenicq.compiler.unavailable import unavailable_name
 from scenicq.compiler.values import ModelValue, fail
 from scenicq.errors import Span, similar
 from scenicq.forest.nodes import Node
+from scenicq.limits import LIMITS
 from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS, TURNS
 
 __all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Course", "Environment"]
@@ -28,15 +29,13 @@ class Budget:
         depth: Calls in progress.
     """
 
-    MOST_STEPS = 400_000
-    MOST_CALLS = 40
     ITEMS_PER_STEP = 8
     LOOK_UP_STEPS = 20
     """What asking the map about one known place takes."""
 
     def __init__(self) -> None:
         """Start with everything left."""
-        self.steps = self.MOST_STEPS
+        self.steps = LIMITS.program_steps
         self.depth = 0
 
     def pay(self, items: int, span: Span) -> None:
@@ -53,14 +52,14 @@ class Budget:
         look()
         self.steps -= count
         if self.steps < 0:
-            raise fail("budget-exceeded", f"the program takes more than {self.MOST_STEPS:,} steps", span,
+            raise fail("budget-exceeded", f"the program takes more than {LIMITS.program_steps:,} steps", span,
                        "the budget ends here", ("make loops shorter",))  # fmt: skip
 
     def enter(self, span: Span) -> None:
         """Enter a call."""
         self.depth += 1
-        if self.depth > self.MOST_CALLS:
-            raise fail("budget-exceeded", f"calls are nested deeper than {self.MOST_CALLS}", span, "this call",
+        if self.depth > LIMITS.call_nesting:
+            raise fail("budget-exceeded", f"calls are nested deeper than {LIMITS.call_nesting}", span, "this call",
                        ("replace the recursion by a loop",))  # fmt: skip
 
     def leave(self) -> None:

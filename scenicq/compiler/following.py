@@ -18,17 +18,13 @@ from scenicq.forest import build
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import ArithmeticOp, Constant, Node, Select
 from scenicq.forest.step_counts import FEWEST, LONGEST, StepCount
+from scenicq.limits import LIMITS
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
     from scenicq.compiler.placing import SpecifierContext
 
 __all__ = ["follow"]
-
-MOST = 100
-"""Steps of the longest way whose length is random."""
-MOST_KNOWN = 2_000
-"""Steps of the longest way whose length is known."""
 
 
 def follow(
@@ -64,7 +60,7 @@ def _steps(length: Node, version: int, span: Span) -> tuple[int, int]:
     if version == 1:
         return FEWEST, FEWEST
     shortest, longest = scalar_bounds(length)
-    limit = LONGEST * (MOST_KNOWN if shortest == longest else MOST)
+    limit = LONGEST * (LIMITS.known_way_steps if shortest == longest else LIMITS.random_way_steps)
     if math.isfinite(longest) and longest > limit:
         raise fail("budget-exceeded", f"a field is followed for at most {limit:,.0f} m here", span,
                    f"up to {longest:,.0f} m")  # fmt: skip

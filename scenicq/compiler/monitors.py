@@ -15,6 +15,7 @@ from scenicq.compiler.values import Function, ModelValue, fail
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Node
 from scenicq.forest.temporal import End, Goto, Monitor, MonitorStep, Reject, Terminate, Test, Wait
+from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 
 __all__ = ["Deferred", "MonitorCall", "MonitorDefinition", "Rounds", "Seconds", "graph_of"]
@@ -25,9 +26,6 @@ Rounds = Callable[[ast.For, Environment], list[Environment]]
 """The names in each round of a loop."""
 Seconds = Callable[[ast.DynamicStatement, Environment], float]
 """The time that a statement names, in seconds."""
-
-_MOST_STEPS = 1_000
-"""Steps of a monitor: each takes time at each sample."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,8 +81,8 @@ class _Graph:
 
     def statement(self, node: ast.Statement, then: int, loop: _Loop | None, scope: Environment) -> int:
         """Add a statement after which a step follows; the number of its first step."""
-        if len(self.steps) > _MOST_STEPS:
-            raise fail("budget-exceeded", f"the monitor takes more than {_MOST_STEPS:,} steps", node.span,
+        if len(self.steps) > LIMITS.monitor_steps:
+            raise fail("budget-exceeded", f"the monitor takes more than {LIMITS.monitor_steps:,} steps", node.span,
                        "the budget ends here", ("make loops shorter",))  # fmt: skip
         match node:
             case ast.Pass() | ast.ExpressionStatement(value=ast.LiteralValue()):

@@ -46,6 +46,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.regions import DifferenceOf, IntersectionOf, PolylineSet, UnionOf
 from scenicq.geometry.road_direction import along_lines
+from scenicq.limits import LIMITS
 
 __all__ = [
     "along",
@@ -75,8 +76,6 @@ __all__ = [
     "within",
 ]
 
-_LARGEST_REGION = 5_000
-"""Parts of a region that is combined from others."""
 
 _BINARY: dict[str, ArithmeticOp] = {op.value: op for op in ArithmeticOp if not op.value[0].isalpha()}
 _COMPARE: dict[str, CompareOp] = {op.value: op for op in CompareOp}
@@ -331,7 +330,7 @@ def intersects(left: ModelValue, right: ModelValue, span: Span) -> Node:
 def _combined(parts: tuple[Node, ...], made: Node, span: Span) -> Node:
     """A region made from others, unless it grows beyond all bounds (shared parts count as often as they are used)."""
     size, stack = 0, [*parts]
-    while stack and size <= _LARGEST_REGION:
+    while stack and size <= LIMITS.region_parts:
         part = stack.pop()
         size += 1
         match part:
@@ -347,9 +346,9 @@ def _combined(parts: tuple[Node, ...], made: Node, span: Span) -> Node:
                 stack += [Constant(region.base), Constant(region.removed)]
             case _:
                 pass
-    if size > _LARGEST_REGION:
+    if size > LIMITS.region_parts:
         raise fail(
-            "budget-exceeded", f"a region is combined from more than {_LARGEST_REGION:,} parts", span, "grows here"
+            "budget-exceeded", f"a region is combined from more than {LIMITS.region_parts:,} parts", span, "grows here"
         )
     return fold(made)
 

@@ -31,14 +31,12 @@ from scenicq.forest.scenario import BuiltIn, Property, Requirement, Scenario, Sc
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
+from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 from scenicq.syntax.parser import parse
 from scenicq.syntax.walk import walk
 
 __all__ = ["Loader", "compile_scenario"]
-
-MOST_SECONDS = 60.0
-"""Processor seconds that evaluating a program may take; what it does has its price in steps, but maps differ."""
 
 
 def compile_scenario(
@@ -67,11 +65,12 @@ def compile_scenario(
         ScenarioError: The program is wrong or uses what is not supported.
     """
     try:
-        with limited(MOST_SECONDS):
+        with limited(LIMITS.program_seconds):
             timed = None if initial or behaviors is None else TimedStatements(behaviors)
             return _compiled(source, network, version, initial=initial, timed=timed, loader=loader, model=model)
     except TimeIsUp:
-        raise fail("budget-exceeded", f"evaluating the program takes more than {MOST_SECONDS:g} s", _start(source), "",
+        what = f"evaluating the program takes more than {LIMITS.program_seconds:g} s"
+        raise fail("budget-exceeded", what, _start(source), "",
                    ("make loops shorter, and ask less of the map in them",)) from None  # fmt: skip
 
 

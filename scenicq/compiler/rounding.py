@@ -19,6 +19,7 @@ from scenicq.forest.nodes import (
     TruncatedNormal,
 )
 from scenicq.forest.walk import children
+from scenicq.limits import LIMITS
 
 __all__ = ["in_order", "rounded", "truncated"]
 
@@ -79,14 +80,11 @@ def _is_whole(value: Node) -> bool:
     )
 
 
-_SMALL = 16
-
-
 def _never_between(value: Node) -> bool:
     """Whether a number certainly lies in the middle between two whole ones with probability 0 only."""
     found: list[Node] = [value]
     for node in found:
-        if len(found) > _SMALL:
+        if len(found) > LIMITS.rounded_nodes:
             return False
         found += children(node)
     continuous = any(isinstance(node, Range | Normal | TruncatedNormal) for node in found)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from scenicq.compiler.arithmetic import LARGEST
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
+from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 
 if TYPE_CHECKING:
@@ -57,8 +57,10 @@ def format_string(run: Interpreter, node: ast.FormattedString, scope: Environmen
         value = {"r": repr, "a": ascii, "s": str}[part.conversion](value) if part.conversion else value
         text.append(_laid_out(value, format_string(run, part.format, scope) if part.format else "", part.span))
         run.budget.pay(len(text[-1]), node.span)
-    if sum(map(len, text)) > LARGEST:
-        raise fail("budget-exceeded", f"a string grows beyond {LARGEST:,} characters", node.span, "grows here")
+    if sum(map(len, text)) > LIMITS.value_items:
+        raise fail(
+            "budget-exceeded", f"a string grows beyond {LIMITS.value_items:,} characters", node.span, "grows here"
+        )
     return "".join(text)
 
 

@@ -27,6 +27,7 @@ from scenicq.forest.nodes import (
     VectorOf,
 )
 from scenicq.forest.walk import children, postorder, transform
+from scenicq.limits import LIMITS
 
 __all__ = ["MOTION", "Truths", "certain_and_possible", "with_any_value"]
 
@@ -35,9 +36,6 @@ MOTION = frozenset({"speed", "velocity", "acceleration", "angularSpeed"})
 
 Truths = tuple[Node, Node]
 """A condition that holds only where another surely holds, and one that holds wherever that may hold."""
-
-_MOST_SELECTS = 8
-"""Choices inside one comparison whose outcomes are told apart."""
 
 
 def certain_and_possible(root: Node, unobserved: Callable[[Feature], bool]) -> Truths:
@@ -50,7 +48,7 @@ def certain_and_possible(root: Node, unobserved: Callable[[Feature], bool]) -> T
     Returns:
         The condition itself twice where it reads nothing unobserved.
     """
-    return _Reader(unobserved).truths(root, _MOST_SELECTS)
+    return _Reader(unobserved).truths(root, LIMITS.unobserved_choices)
 
 
 def with_any_value(root: Node, unobserved: Callable[[Feature], bool]) -> Node:

@@ -20,6 +20,7 @@ from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_direction import ONE_HEADING, RoadDirection, distinct_pairs
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
+from scenicq.limits import LIMITS
 
 __all__ = ["OFF_ROAD", "FollowedDirection"]
 
@@ -29,8 +30,6 @@ _BESIDE = 0.05
 """Metres beside the road that count as on it, as in the original implementation."""
 _TILE = 32.0
 """Metres: sides of the squares of which each is cut once."""
-_MOST_TILES = 64
-"""Tiles of a box that is not looked at closely: it counts as partly off the road."""
 
 _Tile = tuple[int, int]
 
@@ -80,7 +79,7 @@ class FollowedDirection(RoadDirection):
     def _partly_off(self, boxes: NDArray[np.float64]) -> NDArray[np.intp]:
         """Which of some boxes may hold a point off the road."""
         west, south, east, north = np.floor(boxes / _TILE).T
-        large = (east - west + 1) * (north - south + 1) > _MOST_TILES
+        large = (east - west + 1) * (north - south + 1) > LIMITS.off_road_tiles
         off = large.copy()
         small, left = np.nonzero(~large)[0], ~large
         # most boxes lie within one road or one intersection

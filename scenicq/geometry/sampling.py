@@ -36,15 +36,9 @@ from scenicq.geometry.regions import (
 )
 from scenicq.geometry.shapes import XY
 from scenicq.geometry.terms import Term, UndecidedError, terms
+from scenicq.limits import LIMITS
 
 __all__ = ["sample", "sampler"]
-
-_FEW = 32
-"""Tries in a disc or sector before the polygons that it is intersected with are cut to it."""
-_SOME = 1_000
-"""Tries before the region is taken apart, which takes as long as hundreds of them, and finds the smallest rest."""
-_TRIES = 100_000
-"""Tries in the parts; what they miss is as good as empty."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +74,11 @@ def sampler(region: Region) -> Callable[[random.Random], XY]:
         cut = _cut_to_window(region)
         return proposal if cut is None else _filtered(cut, region)
 
-    ways = [(lambda: proposal, _FEW), (cache(closer), _SOME), (cache(lambda: _apart(region, proposal)), _TRIES)]
+    ways = [
+        (lambda: proposal, LIMITS.whole_draws),
+        (cache(closer), LIMITS.cut_draws),
+        (cache(lambda: _apart(region, proposal)), LIMITS.part_draws),
+    ]
 
     def draw(rng: random.Random) -> XY:
         while ways:

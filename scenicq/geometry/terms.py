@@ -31,11 +31,10 @@ from scenicq.geometry.regions import (
     UnionOf,
 )
 from scenicq.geometry.shapes import Bounds, Shape
+from scenicq.limits import LIMITS
 
 __all__ = ["Circle", "Term", "UndecidedError", "both", "overlap", "rectangle_shape", "terms"]
 
-_MAX_TERMS = 4096
-"""Terms of a difference at which it is given up: each separate disc that is removed can double them."""
 _MANY_CORNERS = 256
 """Polygons with more corners are cut to the neighbourhood first."""
 _PAD = 1e-6
@@ -194,7 +193,7 @@ def _without(term: Term, removed: Region, box: Bounds) -> list[Term]:
                 cut += _reduced(Term(old.clip, old.inside, (*old.outside, circle)))
             for circle in outside:
                 cut += _reduced(Term(old.clip, (*old.inside, circle), old.outside))
-        if len(cut) > _MAX_TERMS:
+        if len(cut) > LIMITS.difference_terms:
             raise UndecidedError("the region removes too many separate discs")
         left = cut
     return left

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
+from scenicq.limits import LIMITS
 from scenicq.syntax.tokens import CLOSERS, Token
 
-__all__ = ["MAX_DEPTH", "Cursor"]
-
-MAX_DEPTH = 220
-"""How deep the parser may call itself; each pair of brackets takes one or two levels."""
+__all__ = ["Cursor"]
 
 
 class Cursor:
@@ -20,7 +18,7 @@ class Cursor:
         index: Which token is next.
         token: The next token.
         text: The next token's text.
-        depth: How deep the parser is, at most `MAX_DEPTH`.
+        depth: How deep the parser is, at most `LIMITS.expression_nesting`.
     """
 
     def __init__(self, source: Source, tokens: list[Token]) -> None:
@@ -144,5 +142,5 @@ class Cursor:
     def enter(self) -> None:
         """Count one more level; whoever calls this takes it off `depth` again."""
         self.depth += 1
-        if self.depth > MAX_DEPTH:
+        if self.depth > LIMITS.expression_nesting:
             raise self.fail("the expression is nested too deeply", code="budget-exceeded")

@@ -9,13 +9,12 @@ from __future__ import annotations
 import re
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
+from scenicq.limits import LIMITS
 from scenicq.syntax.phrases import unit_hint
 from scenicq.syntax.tokens import CLOSERS, KEYWORDS, Token, TokenKind
 
-__all__ = ["MAX_NESTING", "tokenize", "tokenize_part"]
+__all__ = ["tokenize", "tokenize_part"]
 
-MAX_NESTING = 100
-"""How deep brackets and blocks may be nested."""
 
 _TOKEN = re.compile(
     r"""
@@ -49,7 +48,7 @@ def tokenize(source: Source) -> list[Token]:
 
     Raises:
         ScenarioError: `parse-error` for what is no token, unbalanced brackets and indentation that fits no block,
-            `budget-exceeded` for brackets or blocks nested deeper than `MAX_NESTING`.
+            `budget-exceeded` for brackets or blocks nested deeper than `LIMITS.bracket_nesting`.
     """
     return _Lexer(source, 0, len(source.text), whole=True).run()
 
@@ -107,7 +106,7 @@ class _Lexer:
         return ScenarioError(Diagnostic("parse-error", message, span, label, hints=(hint,) if hint else ()))
 
     def too_deep(self, start: int, end: int) -> ScenarioError:
-        message = f"the program is nested deeper than {MAX_NESTING} levels"
+        message = f"the program is nested deeper than {LIMITS.bracket_nesting} levels"
         return ScenarioError(Diagnostic("budget-exceeded", message, Span(self.source, start, end)))
 
     def newline(self, start: int) -> None:
@@ -147,7 +146,7 @@ class _Lexer:
         if wide > top[0]:
             if narrow <= top[1]:
                 raise self.tabs(begin, end)
-            if len(self.indents) > MAX_NESTING:
+            if len(self.indents) > LIMITS.bracket_nesting:
                 raise self.too_deep(begin, end)
             self.indents.append((wide, narrow))
             self.add("indent", begin, end)
@@ -181,7 +180,7 @@ class _Lexer:
 
     def operator(self, word: str, start: int) -> None:
         if word in CLOSERS:
-            if len(self.brackets) >= MAX_NESTING:
+            if len(self.brackets) >= LIMITS.bracket_nesting:
                 raise self.too_deep(start, self.position)
             self.brackets.append((word, start))
         elif word in (")", "]", "}"):

@@ -7,6 +7,7 @@ import unicodedata
 from dataclasses import dataclass
 
 from scenicq.errors import Diagnostic, ScenarioError, Source, Span
+from scenicq.limits import LIMITS
 from scenicq.syntax.tokens import CLOSERS, Token
 
 __all__ = ["Field", "LiteralText", "decode", "number_value", "split_format", "string_parts"]
@@ -17,8 +18,6 @@ _PREFIX = re.compile(r"[a-zA-Z]*")
 _QUOTED = re.compile(r"\"\"\"(?:[^\\]|\\.)*?\"\"\"|'''(?:[^\\]|\\.)*?'''|\"[^\"\n]*\"|'[^'\n]*'", re.DOTALL)
 _RAW_TEXT = re.compile(r"[^{}]*")
 _PLAIN_TEXT = re.compile(r"(?:\\N\{[^}]*\}|\\[^{}]|[^{}\\]|\\)*")
-_MAX_DIGITS = 4000
-_MAX_FIELDS = 1000
 
 
 def _fail(source: Source, message: str, start: int, end: int, hint: str = "") -> ScenarioError:
@@ -39,8 +38,8 @@ def number_value(source: Source, token: Token) -> int | float | complex:
         return int(text, 0)
     if "." in text or "e" in text:
         return float(text)
-    if len(text) > _MAX_DIGITS:
-        raise _fail(source, f"a number has more than {_MAX_DIGITS} digits", token.start, token.end)
+    if len(text) > LIMITS.number_digits:
+        raise _fail(source, f"a number has more than {LIMITS.number_digits} digits", token.start, token.end)
     return int(text)
 
 
@@ -146,8 +145,8 @@ def split_format(source: Source, start: int, end: int, *, raw: bool) -> list[Lit
         else:
             field = _field(source, stop, end)
             parts.append(field)
-            if len(parts) > _MAX_FIELDS:
-                raise _fail(source, f"a string has more than {_MAX_FIELDS:,} parts", start, position)
+            if len(parts) > LIMITS.string_parts:
+                raise _fail(source, f"a string has more than {LIMITS.string_parts:,} parts", start, position)
             position = field.end
     return parts
 

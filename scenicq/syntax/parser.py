@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from scenicq.errors import Diagnostic, ScenarioError, Source
+from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 from scenicq.syntax.jumps import check_jumps
 from scenicq.syntax.lexer import tokenize
@@ -13,10 +14,7 @@ from scenicq.syntax.tokens import INFIX_WORDS, Token
 from scenicq.syntax.versions import VERSIONS, choose_version, find_evidence
 from scenicq.syntax.walk import check_height
 
-__all__ = ["MAX_CHARACTERS", "parse"]
-
-MAX_CHARACTERS = 200_000
-"""How long a program may be."""
+__all__ = ["parse"]
 
 
 def parse(source: Source, version: int | None = None) -> ast.Program:
@@ -34,8 +32,8 @@ def parse(source: Source, version: int | None = None) -> ast.Program:
     if version is not None and version not in VERSIONS:
         message = f"version {version} is none of {sorted(VERSIONS)}"
         raise ValueError(message)
-    if len(source.text) > MAX_CHARACTERS:
-        message = f"`{source.name}` is longer than {MAX_CHARACTERS:,} characters"
+    if len(source.text) > LIMITS.program_characters:
+        message = f"`{source.name}` is longer than {LIMITS.program_characters:,} characters"
         raise ScenarioError(Diagnostic("budget-exceeded", message))
     tokens = tokenize(source)
     parser = ProgramParser(source, tokens)

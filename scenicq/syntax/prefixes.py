@@ -6,6 +6,7 @@ from abc import abstractmethod
 from bisect import bisect_right
 
 from scenicq.errors import ScenarioError, Source
+from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 from scenicq.syntax.precedence import OR, PREFIX
 from scenicq.syntax.specifiers import InstanceParser
@@ -16,7 +17,6 @@ __all__ = ["PrefixParser"]
 _PARTS = frozenset(("front", "back", "left", "right", "top", "bottom"))
 _AFTER_VISIBLE = INFIX_NAMES | {"(", "[", "{", "+", "-", "~"}
 """With these an operand starts after `visible`, which is then no name."""
-_MAX_RETRIES = 200_000
 
 
 class PrefixParser(InstanceParser):
@@ -176,7 +176,7 @@ class PrefixParser(InstanceParser):
 
     def read_on(self, start: int, left: ast.Expression, word: str) -> ast.Expression | None:
         """Read looser operators after an operand, if that leads to the word."""
-        if self.retries > _MAX_RETRIES:
+        if self.retries > LIMITS.reading_retries:
             raise self.fail(
                 "the program has too many operators that can be read in several ways", code="budget-exceeded"
             )

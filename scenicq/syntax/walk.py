@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from scenicq.errors import Diagnostic, ScenarioError
+from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 
-__all__ = ["MAX_HEIGHT", "check_height", "children", "walk"]
+__all__ = ["check_height", "children", "walk"]
 
-MAX_HEIGHT = 256
-"""How high the tree of one statement may be, so that a pass may call itself for each node."""
 
 _fields: dict[type[ast.SyntaxNode], tuple[str, ...]] = {}
 
@@ -51,7 +50,7 @@ def check_height(roots: tuple[ast.SyntaxNode, ...]) -> None:
     height = 0
     while level:
         height += 1
-        if height > MAX_HEIGHT:
+        if height > LIMITS.tree_height:
             message = "the expression has too many operators or levels"
             raise ScenarioError(Diagnostic("budget-exceeded", message, level[0].span))
         level = [child for node in level for child in children(node)]

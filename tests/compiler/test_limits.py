@@ -2,10 +2,10 @@
 
 import pytest
 
-from scenicq.compiler import program
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.geometry.default_street import street
+from scenicq.limits import LIMITS
 
 HEAD = "model scenic.domains.driving.model\nego = new Car\n"
 REFUSED = {
@@ -56,7 +56,7 @@ def test_what_grows_or_takes_too_much_is_refused_where_it_stands(text):
 
 
 def test_a_program_ends_where_its_steps_take_too_long(monkeypatch):
-    monkeypatch.setattr(program, "MOST_SECONDS", 0.0)
+    monkeypatch.setattr(LIMITS, "program_seconds", 0.0)
     with pytest.raises(ScenarioError, match="evaluating the program takes more than 0 s"):
         compile_scenario(Source("p.scenic", HEAD + "for i in range(9000):\n    pass"), street())
 

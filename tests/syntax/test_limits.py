@@ -8,7 +8,8 @@ import sys
 import pytest
 
 from scenicq.errors import ScenarioError, Source
-from scenicq.syntax.parser import MAX_CHARACTERS, parse
+from scenicq.limits import LIMITS
+from scenicq.syntax.parser import parse
 
 from .shape import error, module, shape
 
@@ -80,7 +81,7 @@ def test_little_room_on_the_stack() -> None:
 
 def test_a_program_that_is_too_long() -> None:
     with pytest.raises(ScenarioError) as caught:
-        parse(Source("long.scenic", " " * (MAX_CHARACTERS + 1)))
+        parse(Source("long.scenic", " " * (LIMITS.program_characters + 1)))
     assert str(caught.value) == "error[budget-exceeded]: `long.scenic` is longer than 200,000 characters"
 
 
