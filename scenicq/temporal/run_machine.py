@@ -14,6 +14,7 @@ from typing import assert_never
 from scenicq.errors import Span
 from scenicq.forest.temporal import Atom, Dynamics, End, Formula, Goto, Monitor, Reject, Terminate, Test, Wait, operands
 from scenicq.limits import LIMITS
+from scenicq.temporal.literals import Literal, literals_of
 from scenicq.temporal.progression import LOST, Progression, Rest, TooManyClausesError, accepts
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
@@ -113,6 +114,7 @@ class RunMachine:
     atoms: tuple[int, ...] = field(init=False)
     timed: bool = field(init=False)
     _progression: Progression = field(init=False, default_factory=Progression)
+    _literals: dict[int, Literal] = field(init=False)
     _numbers: dict[_Modes, int] = field(init=False, default_factory=dict["_Modes", int])
     _known: dict[tuple[int, tuple[int, ...], bool, int], Advance] = field(
         init=False, default_factory=dict["tuple[int, tuple[int, ...], bool, int]", Advance]
@@ -133,6 +135,7 @@ class RunMachine:
         every = {*self._before, *self._behind}.union(*self._of_formulas, *(s for m in self._of_monitors for s in m))
         self.atoms = tuple(sorted(every))
         steps = [step for monitor in dynamics.monitors for step in monitor.steps]
+        self._literals = dict(enumerate(literals_of(dynamics.conditions)))
         self.timed = any(isinstance(step, Wait) and step.for_s > 0 for step in steps)
         self._rests = tuple(map(self._progression.add, formulas))
         self.begin()
@@ -207,11 +210,25 @@ class RunMachine:
                 if tried > LIMITS.observation_ways:
                     raise TooManyClausesError
                 try:
-                    found.add(self._step(mode, _holding(values, assumed), due=due, here=here, later=later))
+                    found.add(self._step(mode, self._holding(values, assumed), due=due, here=here, later=later))
                 except _NotObserved as error:
                     stack += [{**assumed, error.atom: True}, {**assumed, error.atom: False}]
             self._ways[key] = tuple(found)
         return self._ways[key]
+
+    def _holding(self, values: Mapping[int, int], assumed: Mapping[int, bool]) -> Callable[[int], bool]:
+        """Whether an atom holds, which is known or assumed; what is assumed of one is so of all that are alike."""
+
+        def holds(atom: int) -> bool:
+            value = values[atom]
+            if value != UNKNOWN:
+                return value == TRUE
+            literal = self._literals.get(atom, Literal(atom))
+            if literal.atom not in assumed:
+                raise _NotObserved(literal.atom)
+            return assumed[literal.atom] == literal.positive
+
+        return holds
 
     def _step(
         self, mode: _Mode, holds: Callable[[int], bool], *, due: bool, here: int, later: _Later | None
@@ -276,20 +293,6 @@ class RunMachine:
     def _causes(self, mode: _Mode, *, for_good: bool) -> list[int]:
         found = [n for n, rest in enumerate(mode.rests) if rest == LOST or not (for_good or accepts(rest))]
         return found + [len(mode.rests) + n for n, place in enumerate(mode.places) if place == _REJECTED]
-
-
-def _holding(values: Mapping[int, int], assumed: Mapping[int, bool]) -> Callable[[int], bool]:
-    """Whether an atom holds, which is known or assumed."""
-
-    def holds(atom: int) -> bool:
-        value = values[atom]
-        if value != UNKNOWN:
-            return value == TRUE
-        if atom not in assumed:
-            raise _NotObserved(atom)
-        return assumed[atom]
-
-    return holds
 
 
 def _watched(

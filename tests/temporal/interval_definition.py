@@ -347,6 +347,7 @@ def said(program: Program, exchanged: dict[str, str]) -> list[object]:
     def atom(condition: Condition) -> str:
         words = [exchanged.get(word, word) for word in re.split(r"\b", condition.text)]
         text = "".join(words)
+        text = re.sub(r"distance from (\w+) to \1\b", "0", text)
         return re.sub(r"from (\w+) to (\w+)", lambda m: "between {} and {}".format(*sorted(m.groups())), text)
 
     def form(formula: Formula) -> str:

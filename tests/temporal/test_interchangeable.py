@@ -10,6 +10,7 @@ from scenicq.store.writer import write_dataset
 
 OBJECTS = "".join(f"{name} = new Object at (Range(-99, 99), Range(-99, 99)), facing 0\n" for name in ("ego", "a", "b"))
 MONITOR = "monitor Stays(one, other):\n    while (distance from one to other) < {}:\n        wait\n    terminate\n"
+LATER = "monitor Near(one, time):\n    wait for time seconds\n    require (distance from one to ego) < 50\n"
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +38,8 @@ def folder(tmp_path_factory):
         ("require always (distance to a) < 9\nrequire always (distance to b) < 8\n", 2),
         ("require (always (distance to a) < 9) and (eventually (distance to b) > 4)\n", 2),
         (f"{MONITOR.format(8)}require monitor Stays(ego, b)\n", 2),
+        (f"{LATER}require monitor Near(a, 1)\nrequire monitor Near(b, 1)\n", 1),
+        (f"{LATER}require monitor Near(a, 1)\nrequire monitor Near(b, 2)\n", 2),
     ],
 )
 def test_one_order_where_nothing_tells_them_apart(folder, text, orders):

@@ -8,32 +8,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import cast
+from dataclasses import dataclass
 
 from scenicq.forest.groups import PARAMS, Comparison, Group
 from scenicq.forest.nodes import (
     Arithmetic,
-    ArithmeticOp,
     Compare,
-    CompareOp,
     Constant,
     Coordinate,
     Feature,
     Identity,
     Index,
-    Intersects,
     Logic,
     Node,
-    Norm,
-    Scale,
-    Value,
-    VectorSum,
 )
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import And, Atom, Dynamics, Formula, Goto, MonitorStep, Or, Test, Wait, operands
+from scenicq.forest.value_numbers import ValueNumbers, parts_of
 from scenicq.forest.walk import children, features, is_leaf, leaves, postorder
-from scenicq.geometry.regions import DifferenceOf, IntersectionOf, UnionOf
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["GroupShape", "classes_of_twins", "in_one_order", "interchangeable", "shape_of"]
@@ -67,7 +59,7 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
         own: Hashable = None
         match node:
             case Constant():
-                own = (type(node.value).__name__, _parts(node.value))
+                own = (type(node.value).__name__, parts_of(node.value))
             case Feature():
                 own = (role(node.object), node.property)
             case Arithmetic() | Compare() | Logic():
@@ -222,46 +214,10 @@ class _Swaps:
         return frozenset(items.items())
 
 
-@dataclass(frozen=True, slots=True)
-class _Forms:
-    """Gives expressions numbers: equal ones mean the same, whatever the order of what has none."""
+class _Forms(ValueNumbers):
+    """Gives what is said about time numbers, too."""
 
-    _numbers: dict[Hashable, int] = field(default_factory=dict["Hashable", int])
-
-    def _number(self, form: Hashable) -> int:
-        return self._numbers.setdefault(form, len(self._numbers))
-
-    def expression(self, root: Node, swap: Mapping[int, int]) -> int:
-        """The number of an expression with some objects put for others; random variables stay themselves."""
-        numbers: dict[int, int] = {}
-        for node in postorder([root]):
-            below = [numbers[id(child)] for child in children(node)]
-            own: Hashable = None
-            match node:
-                case Constant():
-                    own = (type(node.value).__name__, _parts(node.value))
-                case Feature():
-                    own = (swap.get(node.object, node.object), node.property, node.current)
-                case Norm(vector=VectorSum(left, Scale(right, Constant(-1)))):
-                    below = sorted((numbers[id(left)], numbers[id(right)]))
-                case Arithmetic(ArithmeticOp.ABS, (Arithmetic(ArithmeticOp.WRAP, (inner,)),)) if _is_difference(inner):
-                    below = sorted(numbers[id(child)] for child in children(inner))
-                case Arithmetic(op=ArithmeticOp.ADD | ArithmeticOp.MUL | ArithmeticOp.MIN | ArithmeticOp.MAX):
-                    own, below = node.op, sorted(below)
-                case Logic() | Compare(op=CompareOp.EQ | CompareOp.NE):
-                    own, below = node.op, sorted(below)
-                case Arithmetic() | Compare():
-                    own = node.op
-                case VectorSum() | Intersects():
-                    below = sorted(below)
-                case Coordinate():
-                    own = node.axis
-                case _ if is_leaf(node):
-                    own = node.identity  # type: ignore[union-attr]
-                case _:
-                    pass
-            numbers[id(node)] = self._number((type(node).__name__, cast("Hashable", own), tuple(below)))
-        return numbers[id(root)]
+    __slots__ = ()
 
     def over_time(self, dynamics: Dynamics, swap: Mapping[int, int]) -> Hashable:
         """All that is said about time, with some objects put for others."""
@@ -289,30 +245,17 @@ class _Forms:
             if isinstance(node, And | Or):
                 below.sort()
             own = atoms[node.number] if isinstance(node, Atom) else None
-            numbers[id(node)] = self._number((type(node).__name__, own, tuple(below)))
+            numbers[id(node)] = self.number((type(node).__name__, own, tuple(below)))
         return numbers[id(root)]
-
-
-def _parts(value: Value) -> Hashable:
-    """A value as what tells it apart: regions and fields are themselves, but what is put together anew is its parts."""
-    match value:
-        case UnionOf() | IntersectionOf():
-            return value.parts
-        case DifferenceOf():
-            return value.base, value.removed
-        case _:
-            return value
-
-
-def _is_difference(node: Node) -> bool:
-    return isinstance(node, Arithmetic) and node.op is ArithmeticOp.SUB
 
 
 def _step(step: MonitorStep, atoms: Sequence[int]) -> Hashable:
     match step:
         case Test():
             return "test", atoms[step.condition.number], step.then, step.otherwise
-        case Goto() | Wait():
-            return type(step).__name__, step.then
+        case Goto():
+            return "goto", step.then
+        case Wait():
+            return "wait", step.then, step.for_s
         case _:
             return type(step).__name__

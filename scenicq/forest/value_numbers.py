@@ -1,0 +1,92 @@
+"""Value numbering: expressions get numbers, and equal numbers mean equal values."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field
+from typing import cast
+
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Compare,
+    CompareOp,
+    Constant,
+    Coordinate,
+    Feature,
+    Intersects,
+    Logic,
+    Node,
+    Norm,
+    Scale,
+    Value,
+    VectorSum,
+)
+from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.geometry.regions import DifferenceOf, IntersectionOf, UnionOf
+
+__all__ = ["ValueNumbers", "parts_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class ValueNumbers:
+    """Gives expressions numbers: equal ones mean the same, whatever the order of what has none."""
+
+    _numbers: dict[Hashable, int] = field(default_factory=dict["Hashable", int])
+
+    def number(self, form: Hashable) -> int:
+        """The number of anything that is told apart by equality."""
+        return self._numbers.setdefault(form, len(self._numbers))
+
+    def expression(self, root: Node, swap: Mapping[int, int] | None = None) -> int:
+        """The number of an expression; random variables stay themselves.
+
+        Args:
+            root: The expression.
+            swap: The objects that are put for others, by index.
+        """
+        numbers: dict[int, int] = {}
+        swap = swap or {}
+        for node in postorder([root]):
+            below = [numbers[id(child)] for child in children(node)]
+            own: Hashable = None
+            match node:
+                case Constant():
+                    own = (type(node.value).__name__, parts_of(node.value))
+                case Feature():
+                    own = (swap.get(node.object, node.object), node.property, node.current)
+                case Norm(vector=VectorSum(left, Scale(right, Constant(-1)))):
+                    below = sorted((numbers[id(left)], numbers[id(right)]))
+                case Arithmetic(ArithmeticOp.ABS, (Arithmetic(ArithmeticOp.WRAP, (inner,)),)) if _is_difference(inner):
+                    below = sorted(numbers[id(child)] for child in children(inner))
+                case Arithmetic(op=ArithmeticOp.ADD | ArithmeticOp.MUL | ArithmeticOp.MIN | ArithmeticOp.MAX):
+                    own, below = node.op, sorted(below)
+                case Logic() | Compare(op=CompareOp.EQ | CompareOp.NE):
+                    own, below = node.op, sorted(below)
+                case Arithmetic() | Compare():
+                    own = node.op
+                case VectorSum() | Intersects():
+                    below = sorted(below)
+                case Coordinate():
+                    own = node.axis
+                case _ if is_leaf(node):
+                    own = node.identity  # type: ignore[union-attr]
+                case _:
+                    pass
+            numbers[id(node)] = self.number((type(node).__name__, cast("Hashable", own), tuple(below)))
+        return numbers[id(root)]
+
+
+def parts_of(value: Value) -> Hashable:
+    """A value as what tells it apart: regions and fields are themselves, but what is put together anew is its parts."""
+    match value:
+        case UnionOf() | IntersectionOf():
+            return value.parts
+        case DifferenceOf():
+            return value.base, value.removed
+        case _:
+            return value
+
+
+def _is_difference(node: Node) -> bool:
+    return isinstance(node, Arithmetic) and node.op is ArithmeticOp.SUB
