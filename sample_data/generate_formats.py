@@ -259,7 +259,11 @@ def kitti(root: Path) -> None:
         at = EGO.at(step)
         east, north = at[0] - EGO.start[0], at[1] - EGO.start[1]
         longitude, latitude = math.degrees(east / earth), math.degrees(2 * math.atan(math.exp(north / earth))) - 90
-        poses += f"{latitude!r} {longitude!r} 100.0 0 0 0.0 " + "0 " * 23 + "0\n"
+        poses += (
+            f"{latitude!r} {longitude!r} 100.0 0 0 0.0 {EGO.velocity[1]!r} {EGO.velocity[0]!r} {EGO.velocity[0]!r} 0 0 "
+            + "0 " * 18
+            + "0\n"
+        )
         labels += f"{step} -1 DontCare -1 -1 -10 1 1 2 2 -1000 -1000 -1000 -10 -1 -1 -1\n"
         for number, (actor, kind) in enumerate(((CAR, "Car"), (WALKER, "Pedestrian"))):
             length, width, height = actor.size

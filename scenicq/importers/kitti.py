@@ -2,8 +2,8 @@
 
 Conventions of the source: boxes lie in the frame of the rectified camera (x right, y down, z ahead; `rotation_y` turns
 about y), at 10 Hz. The map frame is east and north of the first pose of the inertial unit; there is no map. The ego is
-where that unit is; it has no size. Without `oxts` the ego stays at the origin, and nothing has a velocity. What is not
-read is counted (`specifications/kitti.json`).
+where that unit is, and as fast as it says; it has no size. Without `oxts` the ego stays at the origin, and nothing has
+a velocity. What is not read is counted (`specifications/kitti.json`).
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.geometry.angles import direction
 from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.fields import InvalidError
@@ -39,10 +41,11 @@ _LABEL = (
     *["location"] * 3, "rotation_y", "score",
 )  # fmt: skip
 _OXTS = (
-    "lat", "lon", "alt", "roll", "pitch", "yaw", *["velocity"] * 5, *["acceleration"] * 6, *["turn_rate"] * 6,
-    *["accuracy"] * 2, *["status"] * 5,
+    "lat", "lon", "alt", "roll", "pitch", "yaw", "vn", "ve", "vf", "vl", "vu", *["acceleration"] * 6,
+    *["turn_rate"] * 6, *["accuracy"] * 2, *["status"] * 5,
 )  # fmt: skip
 """What the columns of the files say."""
+_FORWARD, _LEFTWARD = _OXTS.index("vf"), _OXTS.index("vl")
 
 _EARTH_M = 6378137.0
 _LARGEST_BYTES = 256 << 20
@@ -80,7 +83,8 @@ class Kitti:
             object_bytes=120,
             facts={
                 "ego": "at the inertial unit, without a size; at the origin where `oxts` is missing",
-                "velocity": f"differences over up to {2 * _REACH_US / 1e6} s, none without `oxts`",
+                "velocity": "of the ego that of the inertial unit, unless it is 0 throughout; of others differences "
+                f"over up to {2 * _REACH_US / 1e6} s, none without `oxts`",
                 "time": "steps of 0.1 s from 0",
             },
         )
@@ -118,7 +122,7 @@ def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -
             if poses is not None and frame >= len(poses):
                 raise InvalidError(f"frame {frame} has no pose")
             ego = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-            by_frame[frame].append(_object(row, (poses[frame] if poses else ego).then(camera), classes, report))
+            by_frame[frame].append(_object(row, (poses[frame].place if poses else ego).then(camera), classes, report))
         except InvalidError as error:
             report.left_out("object", "record-invalid", f"{where}: {error}")
     return _labels(place, by_frame, poses)
@@ -130,24 +134,35 @@ def _count_columns(table: str, names: Sequence[str], count: int, report: Report)
     specification("kitti").count_columns(table, there, report)
 
 
+@dataclass(frozen=True, slots=True)
+class _Pose:
+    """The inertial unit at a frame: where it is, and its velocity, which has been 0 where nobody wrote it."""
+
+    place: Rigid
+    velocity: tuple[float, float]
+
+
 def _labels(
-    place: RecordingFiles, by_frame: dict[int, list[LabelObject]], poses: list[Rigid] | None
+    place: RecordingFiles, by_frame: dict[int, list[LabelObject]], poses: list[_Pose] | None
 ) -> list[tuple[Label, str]]:
     tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
     for frame in sorted(by_frame) if poses else ():
         for member in by_frame[frame]:
             tracks[member.id].append((frame * _STEP_US, member.x, member.y))
     if poses:
-        tracks["ego"] = [(frame * _STEP_US, *pose.origin[:2]) for frame, pose in enumerate(poses)]
+        tracks["ego"] = [(frame * _STEP_US, *pose.place.origin[:2]) for frame, pose in enumerate(poses)]
     moves = {
         (name, at[0]): move
         for name, track in tracks.items()
         for at, move in zip(track, velocities(track, reach_us=_REACH_US, longest_us=_LONGEST_STEP_US), strict=True)
     }
+    if poses and any(pose.velocity != (0.0, 0.0) for pose in poses):
+        moves |= {("ego", frame * _STEP_US): pose.velocity for frame, pose in enumerate(poses)}
     made: list[tuple[Label, str]] = []
     for frame in range(len(poses)) if poses else sorted(by_frame):
         time = frame * _STEP_US
-        x, y, heading = (*poses[frame].origin[:2], poses[frame].heading) if poses else (0.0, 0.0, -math.pi / 2)
+        at = poses[frame].place if poses else None
+        x, y, heading = (*at.origin[:2], at.heading) if at else (0.0, 0.0, -math.pi / 2)
         ego = LabelObject("ego", "Car", "", x, y, heading, velocity=moves.get(("ego", time)))
         objects = tuple(_moving(member, moves.get((member.id, time))) for member in by_frame.get(frame, ()))
         sensors = {"image_02": f"{_prefix(place)}image_02/{place.name}/{frame:06d}.png"}
@@ -225,9 +240,9 @@ def _rows_of(values: list[float]) -> list[list[float]]:
     ]
 
 
-def _poses(file: Path, report: Report) -> list[Rigid]:
-    """Poses of the inertial unit by frame, metres east and north of the first."""
-    found: list[Rigid] = []
+def _poses(file: Path, report: Report) -> list[_Pose]:
+    """The inertial unit by frame, metres east and north of the first."""
+    found: list[_Pose] = []
     first: tuple[float, float] | None = None
     scale = 1.0
     for number, row in enumerate(_rows(file), start=1):
@@ -235,6 +250,7 @@ def _poses(file: Path, report: Report) -> list[Rigid]:
             latitude, longitude, altitude, roll, pitch, yaw = _numbers(row[:6])
             if abs(latitude) > 89:
                 raise InvalidError("the latitude is out of range")
+            forward, left = _numbers([row[_FORWARD], row[_LEFTWARD]]) if len(row) > _LEFTWARD else (0.0, 0.0)
         except (InvalidError, ValueError) as error:
             raise DataError(Diagnostic("file-invalid", f"{file}:{number}: no sound pose: {error}")) from error
         _count_columns("oxts", _OXTS, len(row), report)
@@ -243,7 +259,10 @@ def _poses(file: Path, report: Report) -> list[Rigid]:
         east = scale * _EARTH_M * math.radians(longitude)
         north = scale * _EARTH_M * math.log(math.tan(math.radians(90 + latitude) / 2))
         first = first or (east, north)
-        found.append(euler(roll, pitch, yaw, (east - first[0], north - first[1], altitude)))
+        place = euler(roll, pitch, yaw, (east - first[0], north - first[1], altitude))
+        ahead_x, ahead_y = direction(place.heading)
+        velocity = (forward * ahead_x - left * ahead_y, forward * ahead_y + left * ahead_x)
+        found.append(_Pose(place, velocity))
     return found
 
 

@@ -54,10 +54,10 @@ def _main(source: str, target: str) -> int:
     try:
         # Neither reads nor writes Scenic's own cache, which would lie beside the map.
         network: Any = Network.fromFile(source, useCache=False, writeCache=False)
+        features = features_of(network, Directions(ElementTree.parse(source).getroot()))  # noqa: S314 - Scenic read it
     except Exception as error:  # noqa: BLE001 - whatever Scenic's parser stumbles over is the map's fault here
         sys.stderr.write("\n" + explain(error, source).replace("\n", " ") + "\n")
         return 4
-    features = features_of(network, Directions(ElementTree.parse(source).getroot()))  # noqa: S314 - Scenic read it, too
     with open(target, "w", encoding="utf-8") as file:
         json.dump({"type": "FeatureCollection", "features": features}, file)
     return 0
@@ -283,8 +283,8 @@ def _uid(element: Any) -> str | None:
 
 
 def _listed(element: Any) -> list[str]:
-    """A reference that says also that there is none."""
-    return [] if element is None else [element.uid]
+    """A reference that says also that there is none; Scenic leaves the number of a lane that it does not find."""
+    return [] if element is None or isinstance(element, int) else [element.uid]
 
 
 def _ends(element: Any, turned: bool) -> dict[str, list[str]]:

@@ -6,6 +6,7 @@ lists of members. `write` makes files of it, without the importers' help.
 
 from __future__ import annotations
 
+import copy
 import json
 import struct
 from collections.abc import Iterator
@@ -286,7 +287,7 @@ class Forecasting:
         write_files(document, "argoverse2-forecasting", inner)
 
 
-WIDTHS = {"bbox": 4, "dimensions": 3, "location": 3, "velocity": 5, "acceleration": 6, "turn_rate": 6, "accuracy": 2,
+WIDTHS = {"bbox": 4, "dimensions": 3, "location": 3, "acceleration": 6, "turn_rate": 6, "accuracy": 2,
           "status": 5}  # fmt: skip
 
 
@@ -298,7 +299,8 @@ class Kitti:
     positional = ("label_02", "oxts")
     _label = ("frame", "track_id", "type", "truncated", "occluded", "alpha", "bbox", "dimensions", "location",
               "rotation_y", "score")  # fmt: skip
-    _oxts = ("lat", "lon", "alt", "roll", "pitch", "yaw", "velocity", "acceleration", "turn_rate", "accuracy", "status")
+    _oxts = ("lat", "lon", "alt", "roll", "pitch", "yaw", "vn", "ve", "vf", "vl", "vu", "acceleration", "turn_rate",
+             "accuracy", "status")  # fmt: skip
 
     def document(self) -> Document:
         values = ("1", "2", "Car", "1", "2", "0.5", "1 2 3 4", "1.5 1.8 4", "1 2 9", "0.5", "0.9")
@@ -501,6 +503,235 @@ class Interchange:
         (folder / "maps" / "town.geojson").write_text(json.dumps(document["geojson"]))
 
 
+class OpenLabel:
+    """Boxes in systems of each spelling, and objects that are named in each place where writers do."""
+
+    importer = "openlabel"
+    lists = ("openlabel",)
+
+    def document(self) -> Document:
+        def box(x: float, system: str, **more: Any) -> Document:
+            return {"val": [x, 1.0, 0.8, 0.1, 0.2, 0.3, 4.5, 1.9, 1.6], "coordinate_system": system, **more}
+
+        def shift(x: float) -> Document:
+            return {"matrix4x4": [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}
+
+        said = {"attributes": {kind: [{"name": f"inner {kind}", "val": value}] for kind, value in SAID.items()}}
+        more = {kind: [{"name": kind, "val": value}] for kind, value in SAID.items()}
+        inside = {"frame_start": 0, "frame_end": 0}
+        objects = {
+            "1": {"name": "a", "type": "car", "object_data": more | {"cuboid": [box(20.0, "vehicle-iso8855", **said)]}},
+            "2": {
+                "name": "b", "type": "car", "frame_intervals": [inside], "object_data": {"cuboid": [box(9.0, "lidar")]},
+            },
+            "3": {"object_data": {"name": "DontCare", "cuboid": [box(8.0, "vehicle-iso8855")]}},
+            "4": {"object_data": {"type": "pedestrian", "cuboid": [box(7.0, "camera")]}},
+            "5": {"name": "egocar", "type": "car", "object_data": {"cuboid": [box(0.0, "vehicle-iso8855")]}},
+            "6": {
+                "name": "c", "type": "car", "coordinate_system": "lidar",
+                "object_data": {"cuboid": [{"val": box(6.0, "")["val"]}]},
+            },
+        }  # fmt: skip
+        turned = {"translation": [1.0, 2.0, 0.5]}
+        vehicle = {"type": "local_cs", "parent": "odom", "children": ["lidar", "camera"]}
+        systems = {
+            "odom": {"type": "scene_cs", "parent": "", "children": ["vehicle-iso8855"]},
+            "vehicle-iso8855": vehicle | {"pose_wrt_parent": shift(5.0)},
+            "lidar": {"parent": "vehicle-iso8855", "pose_wrt_parent": turned | {"quaternion": [0.0, 0.0, 0.6, 0.8]}},
+            "camera": {
+                "parent": "vehicle-iso8855",
+                "pose_wrt_parent": turned | {"euler_angles": [0.3, 0.2, 0.1], "sequence": "XYZ"},
+            },
+        }
+        moved = {"src": "vehicle-iso8855", "dst": "odom", "transform_src_to_dst": shift(15.0)}
+        frames = {
+            str(number): {
+                "objects": {"7": {"object_data": {"type": "car", "cuboid": [box(30.0, "odom")]}}},
+                "frame_properties": {
+                    "timestamp": "0.5",
+                    "transforms": {"moved": moved},
+                    "streams": {"cam": {"stream_properties": {"sync": {"timestamp": 0.1 + number}}}},
+                },
+            }
+            for number in (0, 1)
+        }
+        frames["1"]["frame_properties"].pop("timestamp")
+        frames["1"]["frame_properties"].pop("transforms")
+        return {
+            "openlabel": {
+                "streams": {"cam": {"type": "camera"}},
+                "coordinate_systems": systems,
+                "objects": objects,
+                "frames": frames,
+            }
+        }
+
+    def write(self, document: Document, folder: Path) -> None:
+        (folder / "openlabel.json").write_text(json.dumps({"openlabel": document["openlabel"]}))
+
+
+SAID = {"boolean": True, "num": 1.5, "text": "x", "vec": [1.0]}
+
+
+class CommonRoad:
+    """A street with obstacles of each spelling; lanelets lie in the intersection by one word each."""
+
+    importer = "commonroad"
+    lists = ("commonroad",)
+
+    def document(self) -> Document:
+        def bound(first: float, last: float, y: float) -> Document:
+            return {"point": [{"x": first, "y": y}, {"x": last, "y": y}]}
+
+        def lanelet(name: int, first: float, last: float, y: float, kind: str = "urban", **links: Document) -> Document:
+            sides = {"leftBound": [bound(first, last, y)], "rightBound": [bound(first, last, y - 3.5)]}
+            return {"@id": str(name), **sides, "laneletType": [{"#text": kind}], **{k: [v] for k, v in links.items()}}
+
+        def to(name: int, way: str = "") -> Document:
+            return {"@ref": str(name)} | ({"@drivingDir": way} if way else {})
+
+        def state(step: int, x: float) -> Document:
+            said = {
+                name: [{"exact": value}] for name, value in (("orientation", 0.1), ("velocity", 3.0), ("time", step))
+            }
+            return {"position": [{"point": [{"x": x, "y": -1.0}]}], **said}
+
+        def obstacle(name: int, shape: Document, *more: Document, **fields: Any) -> Document:
+            return {
+                "@id": str(name), "type": [{"#text": "car"}], "shape": [shape], "initialState": [state(1, 9.0 + name)],
+                **({"trajectory": [{"state": list(more)}]} if more else {}), **fields,
+            }  # fmt: skip
+
+        rectangle = {"rectangle": [{"length": 4.5, "width": 1.9}]}
+        moving = obstacle(1, rectangle, state(2, 11.0), state(3, 12.0))
+        straight = {"successorsRight": to(3), "successorsStraight": to(4), "successorsLeft": to(5)}
+        return {
+            "commonroad": {
+                "@timeStepSize": "0.1",
+                "location": [{"environment": [{"timeOfDay": "day", "weather": "sunny", "underground": "wet"}]}],
+                "lanelet": [
+                    lanelet(1, 0, 60, 0, successor=to(3), adjacentRight=to(2, "same")),
+                    lanelet(2, 0, 60, -3.5, adjacentLeft=to(1, "same")),
+                    lanelet(3, 60, 80, 0, predecessor=to(1)),
+                    lanelet(4, 90, 99, 0),
+                    lanelet(5, 110, 120, 0),
+                    lanelet(6, 30, 33, 0, "crosswalk"),
+                ],
+                "intersection": [{"@id": "70", "incoming": [{"@id": "71", **straight}]}],
+                "dynamicObstacle": [
+                    moving,
+                    obstacle(2, {"circle": [{"radius": 0.4}]}, role="static"),
+                    obstacle(3, {"polygon": [{}]}, occupancySet=[{"occupancy": [{}]}]),
+                ],
+                "staticObstacle": [obstacle(4, rectangle)],
+                "obstacle": [obstacle(5, rectangle)],
+            }
+        }
+
+    def write(self, document: Document, folder: Path) -> None:
+        root = to_element("commonRoad", document["commonroad"])
+        ElementTree.ElementTree(root).write(folder / "tiny.xml")
+
+
+class OpenDrive:
+    """A street that forks, and one more for each type of lane."""
+
+    importer = "interchange"
+    lists = ("opendrive",)
+
+    def document(self) -> Document:
+        types = {path.rpartition("/")[2]: True for path in entries("opendrive") if path.startswith("lane/@type/")}
+
+        def lane(number: int, **more: Any) -> Document:
+            width = [{"@sOffset": "0", "@a": "3.5", "@b": "0", "@c": "0", "@d": "0"}]
+            return {"@id": str(number), "@type": "driving", "@level": "false", "width": width, **more}
+
+        def links(before: int = 0, after: int = 0) -> list[Document]:
+            found = {"predecessor": before, "successor": after}
+            return [{name: [{"@id": str(number)}] for name, number in found.items() if number}]
+
+        def section(s: float, left: list[Document], right: list[Document]) -> Document:
+            sides = {name: [{"lane": lanes}] for name, lanes in (("left", left), ("right", right)) if lanes}
+            return {"@s": str(s), "center": [{"lane": [{"@id": "0", "@type": "none"}]}], **sides}
+
+        def to(name: int, kind: str = "road", **more: str) -> Document:
+            return {"@elementType": kind, "@elementId": str(name), **{f"@{key}": value for key, value in more.items()}}
+
+        def road(name: int, x: float, y: float, sections: list[Document], **more: Any) -> Document:
+            line = {"@s": "0", "@x": str(x), "@y": str(y), "@hdg": "0", "@length": "50", "line": [{}]}
+            offset = {"@s": "0", "@a": "0.25", "@b": "0", "@c": "0", "@d": "0"}
+            return {
+                "@name": "street", "@length": "50", "@id": str(name), "@junction": "-1",
+                "planView": [{"geometry": [line]}], "lanes": [{"laneOffset": [offset], "laneSection": sections}],
+            } | more  # fmt: skip
+
+        way = {"userData": [{"vectorLane": [{"@travelDir": "forward"}]}]}
+        first = section(0, [], [lane(-1, link=links(after=-1)), lane(-2, link=links(after=-2))])
+        second = section(25, [], [lane(-1, link=links(-1, -1)), lane(-2, link=links(-2))])
+        signal = {
+            "@id": "s", "@s": "40", "@t": "-4", "@name": "", "@dynamic": "yes", "@orientation": "+", "@type": "1000001",
+            "@subtype": "-1", "@country": "OpenDRIVE", "@zOffset": "0", "@value": "-1",
+        }  # fmt: skip
+        reference = {"@id": "s", "@s": "45", "@t": "-4", "@orientation": "+"}
+        roads = [
+            road(
+                1, 0, 0, [first, second],
+                link=[{"successor": [to(7, "junction")]}], signals=[{"signal": [signal]}],
+            ),
+            road(
+                2, 50, 0, [section(0, [], [lane(-1, link=links(-1, -1))])], **{"@junction": "7"},
+                link=[{"predecessor": [to(1, contactPoint="end")], "successor": [to(3, contactPoint="start")]}],
+                signals=[{"signalReference": [reference]}],
+            ),
+            road(
+                3, 100, 0, [section(0, [], [lane(-1, link=links(before=-1))])],
+                link=[{"predecessor": [to(7, "junction")]}],
+            ),
+            road(4, 0, 99, [section(0, [lane(1), lane(2, **{"@direction": "reversed"})], [])], **{"@rule": "LHT"}),
+            road(
+                5, 0, 199,
+                [section(0, [lane(1, link=links(after=1), **way)], []), section(25, [lane(1, link=links(1))], [])],
+            ),
+        ]  # fmt: skip
+        connection = {
+            "@id": "0", "@type": "default", "@incomingRoad": "1", "@connectingRoad": "2", "@contactPoint": "start",
+            "laneLink": [{"@from": "-1", "@to": "-1"}],
+        }  # fmt: skip
+        return {
+            "opendrive": {
+                "header": [{"@revMajor": "1", "@revMinor": "7"}],
+                "road": roads,
+                "junction": [{"@id": "7", "connection": [connection]}],
+                "lane": {"@type": types},
+            }
+        }
+
+    def write(self, document: Document, folder: Path) -> None:
+        content = {key: value for key, value in document["opendrive"].items() if key != "lane"}
+        root = to_element("OpenDRIVE", content)
+        there = document["opendrive"]["lane"]["@type"]
+        for number, path in enumerate(path for path in entries("opendrive") if path.startswith("lane/@type/")):
+            kind = path.rpartition("/")[2]
+            root.append(to_element("road", self._street(100 + number, kind if kind in there else None)))
+        ElementTree.ElementTree(root).write(folder / "town.xodr")
+        (folder / "dataset.json").write_text('{"interchange": 1, "angle": "heading", "classes": "scenic"}')
+        label = {"id": "f", "recording": "r", "timestamp_us": 0, "map": "town", "objects": [], "ego": None}
+        (folder / "labels.jsonl").write_text(json.dumps(label) + "\n")
+
+    def _street(self, number: int, kind: str | None) -> Document:
+        """A street that may have a lane of a type beside the one for vehicles."""
+        (road,) = copy.deepcopy([each for each in OpenDrive().document()["opendrive"]["road"] if each["@id"] == "3"])
+        lanes = road["lanes"][0]["laneSection"][0]["right"][0]["lane"]
+        lanes[0].pop("link")
+        lanes += [lanes[0] | {"@id": "-2", "@type": kind}] if kind else []
+        road["planView"][0]["geometry"][0]["@y"] = str(10.0 * number)
+        road.pop("link")
+        return road | {"@id": str(number)}
+
+
 FORMATS: dict[str, Any] = {
-    kind.importer: kind() for kind in (Waymo, Argoverse2, Forecasting, Kitti, NuScenes, Interaction, Interchange)
-}
+    kind.lists[0]: kind()
+    for kind in (
+        Waymo, Argoverse2, Forecasting, Kitti, NuScenes, Interaction, Interchange, OpenLabel, CommonRoad, OpenDrive
+    )
+}  # fmt: skip

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import cmath
 import json
 import math
+import random
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -52,6 +54,25 @@ class TestKitti:
         assert {(label.ego.x, label.ego.y) for label in labels} == {(0.0, 0.0)}
         assert labels[1].objects[0].x == pytest.approx(38.2)
         assert any(entry.code == "file-missing" and entry.kept for entry in summary.left_out)
+
+    @pytest.mark.parametrize("unit", ["says", "is silent", "has six columns"])
+    def test_the_ego_is_as_fast_as_its_unit_says(self, tmp_path: Path, unit: str) -> None:
+        """Towards east and north is the oracle for ahead and to the left."""
+        draw = random.Random(unit)
+        source = copy("kitti_tiny", tmp_path)
+        poses = source / "training" / "oxts" / "0000.txt"
+        rows: list[list[str]] = []
+        moves: list[complex] = []
+        for line in poses.read_text().splitlines():
+            move, yaw = complex(draw.uniform(-20, 20), draw.uniform(-20, 20)), draw.uniform(-3, 3)
+            own = move * cmath.exp(-1j * yaw)
+            said = (move.imag, move.real, own.real, own.imag, 0.5) if unit == "says" else (0.0,) * 5
+            row = [*line.split()[:3], "0", "0", repr(yaw), *map(repr, said), *["0"] * 19]
+            rows.append(row[:6] if unit == "has six columns" else row)
+            moves.append(move if unit == "says" else 10 + 0j)
+        poses.write_text("".join(" ".join(row) + "\n" for row in rows))
+        labels, _ = read(source, tmp_path)
+        assert [complex(*label.ego.velocity) for label in labels] == pytest.approx(moves, abs=1e-4)
 
     @pytest.mark.parametrize("name", ["oxts", "calib"])
     def test_an_unsound_companion_leaves_the_sequence_out(self, tmp_path: Path, name: str) -> None:
