@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 from pathlib import Path
@@ -20,10 +19,10 @@ from scenicq.evaluate.evaluation import Evaluation
 from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview, tables
-from scenicq.query.execution.csv_cells import quote_cell
 from scenicq.report.write import check_target
 
 from .datasets import open_checked
+from .formats import CsvRows
 from .manual import Manual
 from .output import choose_format, destination, writing
 from .report import columns, plain, show
@@ -31,7 +30,7 @@ from .sources import SENSORS, sensor_root
 
 __all__ = ["evaluate"]
 
-_FORMATS = ("table", "json", "csv", "parquet")
+_FORMATS = ("table", "json", "csv", "spreadsheet", "parquet")
 _EXTENSIONS = {".json": "json"}
 
 
@@ -68,7 +67,8 @@ _EXTENSIONS = {".json": "json"}
               "`score` (the share missed, 0 to 1).")
 @click.option("--seed", metavar="N", type=click.IntRange(0), default=0, help="Seed of the resamples.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(_FORMATS),
-              help="table, json, csv or parquet.  [default: by the extension of FILE, else table]")
+              help="table, json, csv, spreadsheet (csv without formulas) or parquet.  [default: by the extension of "
+              "FILE, else table]")
 @click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write to a file.")
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures, too, the worst frames first: DIR/index.html.")
@@ -122,11 +122,11 @@ def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
         case "json":
             content = json.dumps(evaluation_record(found), ensure_ascii=False, indent=1, allow_nan=False)
             text = plain_json(content) + "\n"
-        case "csv":
+        case "csv" | "spreadsheet":
             lines = io.StringIO(newline="")
-            rows = csv.DictWriter(lines, COLUMNS, lineterminator="\n")
-            rows.writeheader()
-            rows.writerows({name: quote_cell(value) for name, value in row.items()} for row in flat_rows(found))
+            rows = CsvRows(lines, COLUMNS, spreadsheet=form == "spreadsheet")
+            for row in flat_rows(found):
+                rows.write(row)
             text = lines.getvalue()
         case "parquet":
             _write_parquet(found, sink)

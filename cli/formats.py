@@ -7,11 +7,11 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, BinaryIO, Protocol
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, BinaryIO, Protocol, TextIO
 
 from scenicq.errors import plain_json
-from scenicq.query.execution.csv_cells import quote_cell
+from scenicq.query.execution.csv_cells import SPREADSHEET_MARK, quote_cell
 from scenicq.query.execution.result_lines import json_line, json_text
 from scenicq.query.execution.result_origin import ORIGIN
 from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
@@ -21,10 +21,15 @@ from scenicq.store.frame_names import ShortNames
 from .report import plain
 from .table import Table, TextStream
 
-__all__ = ["FORMATS", "Writer", "make_writer", "result_writer"]
+__all__ = ["FORMATS", "SPREADSHEET_HELP", "CsvRows", "Writer", "make_writer", "result_writer"]
 
-FORMATS = ("table", "jsonl", "csv", "parquet", "ids")
+FORMATS = ("table", "jsonl", "csv", "spreadsheet", "parquet", "ids")
 """Names of the formats."""
+
+SPREADSHEET_HELP = (
+    "spreadsheet is csv that a spreadsheet opens: a cell that it would take for a formula (=, +, -, @) begins with ', "
+    "and is read back without it."
+)
 
 _COLUMNS: tuple[str, ...] = (
     "frame",
@@ -108,17 +113,38 @@ def _name(record: Mapping[str, Any]) -> str | None:
     return plain(name).replace("\n", "\\n")
 
 
-class _Csv:
-    def __init__(self, text: TextStream, names: tuple[str, ...]) -> None:
-        self._text, self._names = text, names
+class CsvRows:
+    """Rows of CSV, for programs or for a spreadsheet."""
+
+    def __init__(self, text: TextStream | TextIO, names: Collection[str], *, spreadsheet: bool) -> None:
+        """Write the header.
+
+        Args:
+            text: Where to.
+            names: Of the columns.
+            spreadsheet: Whether a spreadsheet is to read it.
+        """
+        self._spreadsheet = spreadsheet
+        if spreadsheet:
+            text.write(SPREADSHEET_MARK)
         self._rows = csv.DictWriter(text, names, lineterminator="\n")
         self._rows.writeheader()
+
+    def write(self, row: Mapping[str, Any]) -> None:
+        """Write a row: texts as `csv_cells` has them, all else as it is."""
+        self._rows.writerow({name: quote_cell(value, spreadsheet=self._spreadsheet) for name, value in row.items()})
+
+
+class _Csv:
+    def __init__(self, text: TextStream, names: tuple[str, ...], *, spreadsheet: bool) -> None:
+        self._text, self._names = text, names
+        self._rows = CsvRows(text, names, spreadsheet=spreadsheet)
 
     def write(self, record: Mapping[str, Any]) -> None:
         row = _flat(record, self._names) | {
             name: record.get(name) for name in (*DENSITY_COLUMNS, ORIGIN) if name in self._names
         }
-        self._rows.writerow({name: quote_cell(value) for name, value in row.items()})
+        self._rows.write(row)
         self._text.flush()
 
     def finish(self) -> None:
@@ -175,9 +201,9 @@ def make_writer(
     match name:
         case "table":
             return Table(text, shorten, over_time=over_time)
-        case "csv":
+        case "csv" | "spreadsheet":
             more = (*(DENSITY_COLUMNS if ranked else ()), *((ORIGIN,) if origin else ()))
-            return _Csv(text, (*names, *more))
+            return _Csv(text, (*names, *more), spreadsheet=name == "spreadsheet")
         case "ids":
             return _Lines(text, _name)
         case _:

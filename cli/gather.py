@@ -32,7 +32,7 @@ __all__ = ["gather"]
 )
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
-              help="table, jsonl, csv, parquet or ids.  [default: as for `match`]")  # fmt: skip
+              help="table, jsonl, csv, spreadsheet, parquet or ids.  [default: as for `match`]")  # fmt: skip
 @click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write to a file.")
 @click.option("--export", metavar="FORM DIR", type=(click.Choice(FORMS), click.Path(path_type=Path)),
               help="Hand the matching frames on, too, in a new folder DIR; as for `match`.")  # fmt: skip

@@ -28,7 +28,7 @@ from .combinations import check_combination, check_over_time
 from .datasets import open_checked
 from .deliver import Wanted, deliver
 from .engine import parse_engine
-from .formats import FORMATS
+from .formats import FORMATS, SPREADSHEET_HELP
 from .funnel import show_funnel
 from .main import INTERRUPTS, NOTHING
 from .manual import Manual
@@ -119,9 +119,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most, and how many frames each "
               "single change of the program would leave. Without it, this is said where hardly any frame matches.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
-              help="table, jsonl, csv, parquet or ids.  [default: by the extension of FILE, else table on a terminal "
-              "and jsonl in a pipe]  In csv, a cell that a spreadsheet would take for a formula (=, +, -, @) begins "
-              "with ', and is read back without it.")
+              help="table, jsonl, csv, spreadsheet, parquet or ids.  [default: by the extension of FILE, else table on "
+              f"a terminal and jsonl in a pipe]  {SPREADSHEET_HELP}")
 @click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path),
               help="Write to a file, which appears when it is complete; `-` is standard output.")
 @click.option("--shard", metavar="I/N", callback=parse_shard, help="Match only piece I of N; -o names the folder for "

@@ -217,11 +217,13 @@ def test_an_id_is_one_line_whatever_it_is():
     assert _written("ids") == "=cmd|' /C calc'!A0\\nother\\x1b[31m\\u202e\n"
 
 
-def test_a_cell_is_no_formula_and_moves_no_cursor():
-    text = _written("csv")
+@pytest.mark.parametrize("form", ["csv", "spreadsheet"])
+def test_a_cell_is_no_formula_and_moves_no_cursor(form):
+    text = _written(form)
+    assert text.startswith("\ufeff") == (form == "spreadsheet")
     assert "\x1b" not in text
     assert "\u202e" not in text
-    row = next(csv.DictReader(io.StringIO(text)))
+    row = next(csv.DictReader(io.StringIO(text.removeprefix("\ufeff"))))
     assert row["frame"].startswith("'=cmd")
     assert row["timestamp_us"] == "0"
 

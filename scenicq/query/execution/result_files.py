@@ -84,7 +84,7 @@ def _invalid(path: Path, why: str) -> DataError:
 
 def _text(path: Path, data: bytes) -> str:
     try:
-        return data.decode("utf-8")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise _invalid(path, "it is not text in UTF-8") from None
 

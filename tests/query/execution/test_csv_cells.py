@@ -1,4 +1,4 @@
-"""Whatever a text is, its cell is no formula and moves no cursor, and the text comes back."""
+"""Whatever a text is, its cell moves no cursor, is no formula for a spreadsheet, and the text comes back."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ from scenicq_cli.formats import make_writer
 EVIL = ["-1", "=1+1", "+1", "@x", "'x", "''", "'=x", "\tx", "x\r", "\x1b[31m", "\u202ex", "-\\n\\u202e", "\\", "'\\t"]
 
 
-@given(st.one_of(st.text(), st.text("=+-@'\\tnrxu0123\t\r\n\x1b\x9b\u202e\ufeff,\"")))
-def test_texts_come_back(text: str) -> None:
-    cell = quote_cell(text)
-    assert not cell.startswith(("=", "+", "-", "@", "\t", "\r"))
+@pytest.mark.parametrize("spreadsheet", [False, True])
+@given(text=st.one_of(st.text(), st.text("=+-@'\\tnrxu0123\t\r\n\x1b\x9b\u202e\ufeff,\"")))
+def test_texts_come_back(text: str, spreadsheet: bool) -> None:
+    cell = quote_cell(text, spreadsheet=spreadsheet)
+    assert not (spreadsheet and cell.startswith(("=", "+", "-", "@", "\t", "\r")))
+    assert spreadsheet or cell == text or text.startswith("'") or not text.isprintable()
     assert not {"\x1b", "\x9b", "\u202e", "\r", "\t"} & set(cell)
     assert unquote_cell(cell) == text
     lines = io.StringIO(newline="")
@@ -42,12 +44,12 @@ def test_records_come_back(tmp_path: Path, name: str) -> None:
         "sensors": {name: name},
     }
     read = {}
-    for form in ("csv", "jsonl"):
+    for form, suffix in (("csv", "csv"), ("spreadsheet", "csv"), ("jsonl", "jsonl")):
         sink = io.BytesIO()
         writer = make_writer(form, sink, lambda: ("ego", "other"), origin=f"{name}@1")
         writer.write(record)
         writer.finish()
-        (tmp_path / f"r.{form}").write_bytes(sink.getvalue())
-        (found,) = read_records(tmp_path / f"r.{form}")
+        (tmp_path / f"r.{suffix}").write_bytes(sink.getvalue())
+        (found,) = read_records(tmp_path / f"r.{suffix}")
         read[form] = {key: found[key] for key in record}
-    assert read["csv"] == read["jsonl"] == json.loads(json.dumps(record))
+    assert read["csv"] == read["spreadsheet"] == read["jsonl"] == json.loads(json.dumps(record))
