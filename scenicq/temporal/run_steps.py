@@ -117,9 +117,7 @@ class RunSteps:
         known = [number for number in self.machine.atoms if number not in self._of]
         code = np.zeros(len(stretches.labels), np.int64)
         for number in known:
-            if int(code.max(initial=0)) > 1 << 20:
-                code = np.unique(code, return_inverse=True)[1].reshape(-1)
-            code = code * 3 + self.atom(Atom(number))
+            code = _told_apart(code, self.atom(Atom(number)))
         firsts, self.code = alike(code)
         told: list[list[int]] = [self.atom(Atom(number))[firsts].tolist() for number in known]
         self.rows: list[dict[int, int]] = [
@@ -181,30 +179,28 @@ class RunSteps:
 
     def _stays(self, number: int, reads: list[int], sides: dict[int, NDArray[np.bool_]]) -> NDArray[np.bool_]:
         """At which places a situation leads to itself, with the sides of hidden numbers at each."""
-        code = self._codes(reads, slice(None), sides)
+        told = self._told(reads, slice(None), sides)
+        code = self.code
+        for each in told.values():
+            code = _told_apart(code, each)
         rows, which = alike(code)
         stays = Advance(number)
-        told = [self._row(each, reads, 3 ** len(reads)) for each in cast("list[int]", code[rows].tolist())]
-        held = [self.machine.advance(number, each, due=False) == stays for each in told]
+        held = [
+            self.machine.advance(number, self._row(place, told, place), due=False) == stays
+            for place in cast("list[int]", rows.tolist())
+        ]
         return np.array(held, dtype=np.bool_)[which]
 
-    def _codes(
+    def _told(
         self, reads: list[int], places: NDArray[np.int64] | slice, sides: dict[int, NDArray[np.bool_]]
-    ) -> NDArray[np.int64]:
-        """What is true at places, as numbers."""
-        code = self.code[places]
-        for number in reads:
-            assert self.hidden is not None
-            code = code * 3 + self.hidden.truth(number, places, sides)
-        return code
+    ) -> dict[int, Truth]:
+        """The values of conditions on hidden numbers at places."""
+        assert self.hidden is not None or not reads
+        return {number: self.hidden.truth(number, places, sides) for number in reads if self.hidden is not None}
 
-    def _row(self, code: int, reads: list[int], size: int) -> dict[int, int]:
-        """The value of each atom, read off such a number."""
-        row, rest = divmod(code, size)
-        values = dict(self.rows[row])
-        for number in reversed(reads):
-            rest, values[number] = divmod(rest, 3)
-        return values
+    def _row(self, place: int, told: dict[int, Truth], which: int) -> dict[int, int]:
+        """The value of each atom at a place, given the values of some at several places of which it is one."""
+        return self.rows[int(self.code[place])] | {number: int(each[which]) for number, each in told.items()}
 
     def _split(self, reads: list[int], ahead: Ahead, there: Places) -> tuple[
         NDArray[np.int64], Ahead, Places, dict[int, NDArray[np.bool_]]
@@ -257,16 +253,15 @@ class RunSteps:
         out = there > ahead.last
         notes.going[out] = True
         on = np.flatnonzero(~out)
-        if self.machine.timed:
-            kinds = there[on] * 3 ** len(reads)
-            kinds += self._codes(reads, there[on], _at(sides, on)) - self.code[there[on]] * 3 ** len(reads)
-        else:
-            kinds = self._codes(reads, there[on], _at(sides, on))
-        kinds = kinds * 2 + (ahead.due[on] == there[on])
-        for kind, chosen in groups(kinds):
+        told = self._told(reads, there[on], _at(sides, on))
+        kinds = there[on] if self.machine.timed else self.code[there[on]]
+        for each in (*told.values(), ahead.due[on] == there[on]):
+            kinds = _told_apart(kinds, each)
+        for _, chosen in groups(kinds):
             mine = on[chosen]
-            code, due = divmod(kind, 2)
-            advance = self._advance(number, code, reads, due=bool(due), here=int(there[mine[0]]))
+            here = int(there[mine[0]])
+            row, due = self._row(here, told, int(chosen[0])), bool(ahead.due[mine[0]] == here)
+            advance = self._advance(number, row, due=due, here=here)
             self._ends(notes, advance, mine, there[mine])
             if advance.situation is None:
                 continue
@@ -286,13 +281,10 @@ class RunSteps:
         ahead.at = there + 1
         return LaneStep(of, notes, ahead)
 
-    def _advance(self, number: int, code: int, reads: list[int], *, due: bool, here: int) -> Advance:
-        size = 3 ** len(reads)
+    def _advance(self, number: int, row: dict[int, int], *, due: bool, here: int) -> Advance:
         if not self.machine.timed:
-            return self.machine.advance(number, self._row(code, reads, size), due=due)
-        row = int(self.code[here]) * size + code % size
-        later = partial(self._later, here)
-        return self.machine.advance(number, self._row(row, reads, size), due=due, here=here, later=later)
+            return self.machine.advance(number, row, due=due)
+        return self.machine.advance(number, row, due=due, here=here, later=partial(self._later, here))
 
     def _later(self, here: int, time_s: float) -> int:
         """The first place of a stretch so many seconds after one, and at least the next one."""
@@ -338,6 +330,13 @@ class RunSteps:
         found = np.full(len(self._causes) + 1, None, dtype=object)
         found[: len(self._causes)] = self._causes
         return found[causes]
+
+
+def _told_apart(code: NDArray[np.int64], more: Truth | NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Numbers that are equal where others are and a truth value is, too; they stay small."""
+    if int(code.max(initial=0)) > 1 << 20:
+        code = np.unique(code, return_inverse=True)[1].reshape(-1)
+    return code * 3 + more
 
 
 def _at(sides: dict[int, NDArray[np.bool_]], which: NDArray[np.int64]) -> dict[int, NDArray[np.bool_]]:

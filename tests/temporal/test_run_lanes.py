@@ -150,6 +150,23 @@ def test_pieces_that_touch_and_stand_alike_are_one():
     assert pieces.high[pieces.runs.truth == TRUE].max() == np.nextafter(31.0, 0)
 
 
+@pytest.mark.parametrize("count", [3, 39, 40, 41, 64])
+def test_however_many_conditions_hang_on_a_hidden_number_each_counts(count):
+    """One of them decides, wherever it stands among the others."""
+    n = 3
+    stretches = Stretches(None, np.array([0, n]), np.arange(n), np.arange(n) / 10, np.array([0]), np.array([0]))
+    spans = [Span(SOURCE, k, k + 1) for k in range(count)]
+    for deciding in (0, count // 2, count - 1):
+        cuts = [Cut(0, np.full(n, 50.0 if k == deciding else 10.0)) for k in range(count)]
+        hidden = HiddenSides(np.array([20.0]), np.array([100.0]), cuts, {k: (k,) for k in range(count)})
+        hidden.values = {k: np.array([[FALSE] * n, [TRUE] * n]) for k in range(count)}
+        dynamics = Dynamics((), tuple(TemporalRequirement(Eventually(Atom(k)), span) for k, span in enumerate(spans)))
+        pieces = follow_pieces(RunMachine(dynamics), stretches, lambda atom: None, hidden)
+        found = dict(zip(pieces.low[:, 0].tolist(), pieces.runs.truth.tolist(), strict=True))
+        assert found == {20.0: FALSE, 50.0: TRUE}
+        assert pieces.runs.broken[pieces.runs.truth == FALSE].tolist() == [spans[deciding]]
+
+
 @pytest.mark.parametrize("after", [None, 1000.0])
 def test_work_grows_as_the_samples_of_a_recording(monkeypatch, after):
     """A run of a long recording costs no more than its share of short ones."""
