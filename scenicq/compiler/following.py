@@ -15,7 +15,7 @@ from scenicq.compiler.operators import direction_at, make_oriented_point
 from scenicq.compiler.values import Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.bounds import scalar_bounds
+from scenicq.forest.bounds import likely_bounds, scalar_bounds
 from scenicq.forest.nodes import ArithmeticOp, Constant, Node, Select
 from scenicq.forest.step_counts import FEWEST, LONGEST, StepCount
 from scenicq.limits import LIMITS
@@ -61,10 +61,11 @@ def _steps(length: Node, version: int, span: Span) -> tuple[int, int]:
         return FEWEST, FEWEST
     shortest, longest = scalar_bounds(length)
     limit = LONGEST * (LIMITS.known_way_steps if shortest == longest else LIMITS.random_way_steps)
-    if math.isfinite(longest) and longest > limit:
+    _, likely = likely_bounds(length)
+    if math.isfinite(likely) and likely > limit:
         raise fail("budget-exceeded", f"a field is followed for at most {limit:,.0f} m here", span,
-                   f"up to {longest:,.0f} m")  # fmt: skip
-    # what has no end by its definition, such as a normal distribution, is followed as far as the limit
+                   f"up to {likely:,.0f} m")  # fmt: skip
+    # what is hardly ever longer, such as a normal distribution, is followed as far as the limit
     return _count(shortest), _count(min(longest, limit))
 
 

@@ -11,13 +11,29 @@ import math
 from collections.abc import Mapping
 from typing import TypeAlias, cast
 
+from scenicq.forest import build
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.interval_ends import FLOATS
 from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector, can_hold
 from scenicq.forest.intervals import IntervalDomain
-from scenicq.forest.nodes import Constant, Identity, Node, PointIn, Rotate, Scale, VectorSum
+from scenicq.forest.nodes import (
+    ArithmeticOp,
+    Constant,
+    Identity,
+    Node,
+    Normal,
+    PointIn,
+    Rotate,
+    Scale,
+    TruncatedNormal,
+    VectorSum,
+)
+from scenicq.forest.walk import transform
 
-__all__ = ["Box", "FloatInterval", "leaf_boxes", "may_hold", "point_boxes", "scalar_bounds", "vector_bounds"]
+__all__ = [
+    "Box", "FloatInterval", "leaf_boxes", "likely_bounds", "likely_normal", "may_hold", "point_boxes", "scalar_bounds",
+    "vector_bounds",
+]  # fmt: skip
 
 FloatInterval: TypeAlias = tuple[float, float]
 Box: TypeAlias = tuple[FloatInterval, FloatInterval]
@@ -25,6 +41,8 @@ Box: TypeAlias = tuple[FloatInterval, FloatInterval]
 _EVERYTHING: FloatInterval = (-math.inf, math.inf)
 _PLANE: Box = (_EVERYTHING, _EVERYTHING)
 _DOMAIN = IntervalDomain(FLOATS)
+_DEVIATIONS = 6.0
+"""Standard deviations from the mean within which a value is likely."""
 
 
 def _pair(value: IntervalValue[float]) -> FloatInterval:
@@ -48,6 +66,19 @@ def scalar_bounds(node: Node, leaves: Mapping[Identity, Box] | None = None) -> F
         leaves: Tighter boxes for some random points.
     """
     return _pair(_bounds(node, leaves))
+
+
+def likely_normal(node: Normal) -> TruncatedNormal:
+    """A normal variable within a few standard deviations of its mean; it is the same variable."""
+    away = build.arithmetic(ArithmeticOp.MUL, node.deviation, build.constant(_DEVIATIONS))
+    low = build.arithmetic(ArithmeticOp.SUB, node.mean, away)
+    high = build.arithmetic(ArithmeticOp.ADD, node.mean, away)
+    return TruncatedNormal(node.mean, node.deviation, low, high, identity=node.identity, span=node.span)
+
+
+def likely_bounds(node: Node) -> FloatInterval:
+    """Bounds of a scalar expression over likely values of its normal variables."""
+    return scalar_bounds(transform(node, lambda each: likely_normal(each) if isinstance(each, Normal) else each))
 
 
 def vector_bounds(node: Node, leaves: Mapping[Identity, Box] | None = None) -> Box:

@@ -119,3 +119,14 @@ def test_a_way_beyond_the_budget_is_refused() -> None:
     with pytest.raises(ScenarioError) as refusal:
         program("Range(10, 600)")
     assert refusal.value.diagnostics[0].code == "budget-exceeded"
+
+
+@pytest.mark.parametrize("distance", ["Normal(1000, 20)", "abs(Normal(-1000, 20))", "Normal(Range(1, 9), 100)"])
+def test_a_distance_that_is_likely_too_long_is_refused(distance: str) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        program(distance)
+    assert refused.value.diagnostics[0].code == "budget-exceeded"
+
+
+def test_a_distance_that_is_hardly_ever_too_long_is_followed() -> None:
+    assert isinstance(Matcher(program("Normal(20, 5)")).match(label(31.0, steps_of(31.0))), Match)

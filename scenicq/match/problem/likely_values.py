@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from scenicq.forest import build
+from scenicq.forest.bounds import likely_normal
 from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison, Group
 from scenicq.forest.interpret import interpret, steps_of
@@ -18,14 +19,12 @@ from scenicq.forest.interval_ends import FLOATS
 from scenicq.forest.interval_values import can_hold
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import (
-    ArithmeticOp,
     Constant,
     Identity,
     Index,
     Node,
     Normal,
     Select,
-    TruncatedNormal,
     Value,
 )
 from scenicq.forest.walk import leaves, postorder
@@ -33,8 +32,6 @@ from scenicq.match.problem.outcome import Satisfied
 
 __all__ = ["LikelyGroup", "likely_group"]
 
-_DEVIATIONS = 6.0
-"""Standard deviations from the mean within which a value is likely."""
 _DOMAIN = IntervalDomain(FLOATS)
 
 
@@ -73,12 +70,7 @@ def likely_group(group: Group) -> LikelyGroup | None:
     normals: dict[int, Node] = {}
     for node in postorder([constraint.expression for constraint in group.constraints]):
         if isinstance(node, Normal):
-            away = build.arithmetic(ArithmeticOp.MUL, node.deviation, build.constant(_DEVIATIONS))
-            low = build.arithmetic(ArithmeticOp.SUB, node.mean, away)
-            high = build.arithmetic(ArithmeticOp.ADD, node.mean, away)
-            normals[id(node)] = TruncatedNormal(
-                node.mean, node.deviation, low, high, identity=node.identity, span=node.span
-            )
+            normals[id(node)] = likely_normal(node)
     memo = dict(normals)
     options: dict[Identity, tuple[Identity, tuple[int, ...]]] = {}
     for constraint in group.constraints:
