@@ -62,7 +62,7 @@ from scenicq.forest.nodes import (
     VectorOf,
     VectorSum,
 )
-from scenicq.geometry.angles import azimuth_array, normalize_array
+from scenicq.geometry.angles import azimuth_array, wrap_array
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import SLACK, Region
@@ -94,7 +94,7 @@ _UNARY: Mapping[ArithmeticOp, Callable[[Array], Array]] = {
     ArithmeticOp.LOG: np.log,
     ArithmeticOp.FLOOR: np.floor,
     ArithmeticOp.CEIL: np.ceil,
-    ArithmeticOp.WRAP: normalize_array,
+    ArithmeticOp.WRAP: wrap_array,
 }
 _BINARY: Mapping[ArithmeticOp, Callable[[Array, Array], Array]] = {
     ArithmeticOp.ADD: np.add,

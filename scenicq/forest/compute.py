@@ -46,7 +46,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children, is_leaf
-from scenicq.geometry.angles import azimuth, normalize, rotate
+from scenicq.geometry.angles import azimuth, rotate, wrap
 from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.containment import covers, overlaps
 from scenicq.geometry.fields import VectorField
@@ -118,7 +118,7 @@ _SCALAR: dict[ArithmeticOp, Callable[[_Numbers], float]] = {
     ArithmeticOp.LOG: _unary(math.log),
     ArithmeticOp.FLOOR: _floor,
     ArithmeticOp.CEIL: _ceil,
-    ArithmeticOp.WRAP: _unary(normalize),
+    ArithmeticOp.WRAP: _unary(wrap),
 }
 
 _ORDER: dict[CompareOp, Callable[[float, float], bool]] = {

@@ -154,7 +154,7 @@ class IntervalArithmetic(Generic[E]):
         return self.ends.most([self.ends.number(0.0), a.low, self.ends.negative(a.high)])
 
     def _wrapped(self, angle: Interval[E]) -> Interval[E]:
-        """An angle in (-pi, pi]: beyond half a turn, and where rounding may decide at the seam, it is anything."""
+        """An angle in [-pi, pi]: beyond half a turn, and where rounding may decide at the seam, it is anything."""
         ends, most = self.ends, self.ends.number(math.pi - self.slack)
         if angle.exact:
             value = ends.turned(angle.low)

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar, cast
 import numpy as np
 
 from scenicq.forest.interval_values import FloatOrArray, Interval
-from scenicq.geometry.angles import azimuth, azimuth_array, normalize
+from scenicq.geometry.angles import azimuth, azimuth_array, wrap
 
 __all__ = ["ARRAYS", "FLOATS", "Ends"]
 
@@ -153,7 +153,7 @@ class _Floats:
         return azimuth(x, y)
 
     def turned(self, a: float) -> float:
-        return normalize(a) if math.isfinite(a) else math.nan
+        return wrap(a) if math.isfinite(a) else math.nan
 
     def at_most(self, a: float, b: float) -> bool:
         return a <= b

@@ -47,7 +47,7 @@ Value: TypeAlias = float | bool | str | Vector | Region | VectorField | Undefine
 
 
 class ArithmeticOp(StrEnum):
-    """Operations on scalars; `WRAP` normalises an angle to (-pi, pi]."""
+    """Operations on scalars; `WRAP` brings an angle into [-pi, pi]."""
 
     ADD = "+"
     SUB = "-"

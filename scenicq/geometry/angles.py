@@ -18,6 +18,8 @@ __all__ = [
     "normalize",
     "normalize_array",
     "rotate",
+    "wrap",
+    "wrap_array",
 ]
 
 _TURN = 2 * math.pi
@@ -38,6 +40,18 @@ def normalize_array(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     wrapped = np.fmod(angles, _TURN)
     wrapped = np.where(wrapped > math.pi, wrapped - _TURN, wrapped)
     return np.where(wrapped <= -math.pi, wrapped + _TURN, wrapped)
+
+
+def wrap(angle: float) -> float:
+    """The angle in [-pi, pi] that differs by whole turns; half a turn keeps its sign, as in Scenic."""
+    wrapped = math.remainder(angle, _TURN)
+    return math.copysign(wrapped, angle) if abs(wrapped) == math.pi else wrapped
+
+
+def wrap_array(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`wrap` of every angle of an array of any shape."""
+    wrapped = np.fmod(angles, _TURN)
+    return np.where(wrapped > math.pi, wrapped - _TURN, np.where(wrapped < -math.pi, wrapped + _TURN, wrapped))
 
 
 def difference(a: float, b: float) -> float:

@@ -33,6 +33,29 @@ def test_normalize_keeps_the_direction(angle: float) -> None:
     assert angles.normalize(wrapped) == wrapped
 
 
+def in_one_turn(angle: float) -> float:
+    """As Scenic does it: whole turns are taken off what is beyond half a turn, at which an angle keeps its sign."""
+    while angle > math.pi:
+        angle -= math.tau
+    while angle < -math.pi:
+        angle += math.tau
+    return angle
+
+
+@pytest.mark.parametrize("turns", [-5, -3, -1, -0.75, 0, 0.25, 1, 3, 5])
+def test_half_a_turn_keeps_its_sign(turns: float) -> None:
+    angle = turns * math.pi
+    assert angles.wrap(angle) == in_one_turn(angle)
+    assert angles.wrap_array(np.array([angle]))[0] == in_one_turn(angle)
+
+
+@given(finite)
+def test_wrap_and_normalize_differ_at_half_a_turn_alone(angle: float) -> None:
+    wrapped, same = angles.wrap(angle), angles.normalize(angle)
+    assert wrapped == same or (wrapped, same) == (-math.pi, math.pi)
+    assert float(angles.wrap_array(np.array([angle]))[0]) == pytest.approx(wrapped, abs=1e-11)
+
+
 @given(finite, finite)
 def test_difference_turns_b_into_a(a: float, b: float) -> None:
     turn = angles.difference(a, b)

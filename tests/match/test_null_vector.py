@@ -1,4 +1,4 @@
-"""The direction of the null vector is Scenic's, and the same however it comes about: a heading of -90 degrees."""
+"""Angles at ties are Scenic's: the null vector's direction is -90 degrees, what lies opposite keeps its sign."""
 
 import math
 
@@ -46,3 +46,19 @@ def test_its_direction_is_to_the_right(placed, method):
 def test_straight_behind_is_half_a_turn_clockwise(condition, holds):
     text = f"ego = new Object at (0, 0)\no = new Object at (0, -9)\nrequire {condition}\n"
     assert isinstance(Matcher(compiled(text)).match(label(0.0, -9.0, 0.0)), Match) is holds
+
+
+@pytest.mark.parametrize("ego", [k * math.pi / 4 for k in range(-3, 5)])
+@pytest.mark.parametrize("turn", [-math.pi, math.pi])
+def test_opposite_ways_are_half_a_turn_apart_in_the_sense_of_their_difference(ego, turn):
+    other = ego + turn
+    for condition, apart in (("relative heading of o", other - ego), ("relative heading of ego from o", ego - other)):
+        for sign in (">", "<"):
+            text = f"ego = new Object at (0, 0), facing {ego} \no = new Object at (0, -9), facing {other}\n"
+            text += f"require ({condition}) {sign} 0\n"
+            seen = Label(
+                "f", "r", 0, "street", LabelObject("ego", "Object", "thing", 0.0, 0.0, ego, 2.0, 4.0),
+                (LabelObject("o", "Object", "thing", 0.0, -9.0, other, 1.0, 1.0),),
+            )  # fmt: skip
+            expected = (apart > 0) is (sign == ">")
+            assert isinstance(Matcher(compiled(text)).match(seen), Match) is expected, (condition, sign)
