@@ -237,6 +237,10 @@ _PLACES = {
 }
 
 
+_OF_BOXES = frozenset({"containsPoint", "intersects"})
+"""Methods of objects that are those of their boxes; from Scenic 3 on their distance is, too."""
+
+
 def _of_instance(run: Interpreter, value: Instance, name: str, span: Span) -> ModelValue:
     if name in value.properties:
         found = property_node(value, name, span)
@@ -253,6 +257,8 @@ def _of_instance(run: Interpreter, value: Instance, name: str, span: Span) -> Mo
             return attribute(run, found, "opposite", span) if place is not name else found
     if name == "visibleRegion":
         return operators.visible_region(value, span)
+    if value.index is not None and (name in _OF_BOXES or (name == "distanceTo" and run.version == 3)):
+        return REGION_METHODS[name](operators.object_box(value, span))
     if name == "distanceTo":
         return Builtin(name, lambda span, other: operators.distance_to(other, value, span))
     if name == "angleTo":

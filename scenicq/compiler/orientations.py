@@ -22,9 +22,17 @@ from scenicq.forest.nodes import (
     Select,
     Undefined,
 )
-from scenicq.geometry.regions import PolygonSet, Region, UnionOf, orientation_of
+from scenicq.geometry.regions import (
+    DifferenceOf,
+    IntersectionOf,
+    PolygonSet,
+    PolylineSet,
+    Region,
+    UnionOf,
+    orientation_of,
+)
 
-__all__ = ["is_always_there", "orientation"]
+__all__ = ["orientation", "surely_gives_a_heading"]
 
 
 def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
@@ -55,10 +63,12 @@ def orientation(region: Node, point: Node, span: Span | None) -> Node | None:
             return None
 
 
-def is_always_there(region: Node, may_lack: Callable[[Node], bool]) -> bool:
-    """Whether a region is there in every outcome; an element that is chosen at random may lack the part asked for.
+def surely_gives_a_heading(region: Node, may_lack: Callable[[Node], bool]) -> bool:
+    """Whether a region with a preferred heading gives it in every outcome.
 
-    Scenic draws a random region once, while it compiles: only where that succeeds does the region give a heading.
+    An element that is chosen at random may lack the part asked for: Scenic draws a random region once, while it
+    compiles, and only where that succeeds does the region give a heading. Lines that something is taken off lose theirs
+    in Scenic.
 
     Args:
         region: The region.
@@ -66,7 +76,7 @@ def is_always_there(region: Node, may_lack: Callable[[Node], bool]) -> bool:
     """
     todo = [region]
     while todo:
-        part = todo.pop()
+        part = _opened(todo.pop())
         match part:
             case Select():
                 if may_lack(part.index):
@@ -75,10 +85,42 @@ def is_always_there(region: Node, may_lack: Callable[[Node], bool]) -> bool:
             case RegionIntersection() | RegionUnion():
                 todo += part.parts
             case RegionDifference():
+                if _is_of_lines(part.base):
+                    return False
                 todo += [part.base, part.removed]
             case _:
                 pass
     return True
+
+
+def _is_of_lines(region: Node) -> bool:
+    """Whether some option of a region is lines."""
+    todo = [region]
+    while todo:
+        part = _opened(todo.pop())
+        match part:
+            case Constant(value=PolylineSet()):
+                return True
+            case Select():
+                todo += part.options
+            case RegionIntersection():
+                todo += part.parts
+            case RegionDifference():
+                todo.append(part.base)
+            case _:
+                pass
+    return False
+
+
+def _opened(region: Node) -> Node:
+    """A known region that is made of others as what it is made of."""
+    match region:
+        case Constant(value=DifferenceOf() as known):
+            return RegionDifference(build.constant(known.base), build.constant(known.removed))
+        case Constant(value=IntersectionOf() as known):
+            return RegionIntersection(tuple(map(build.constant, known.parts)))
+        case _:
+            return region
 
 
 def _of_union(parts: Sequence[Node], point: Node, span: Span | None) -> Node | None:

@@ -16,7 +16,7 @@ from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to
 from scenicq.compiler.deviations import DEVIATIONS, deviation, leaves_the_plane
 from scenicq.compiler.environment import FIRST_NAMES, Budget
 from scenicq.compiler.following import follow
-from scenicq.compiler.orientations import is_always_there, orientation
+from scenicq.compiler.orientations import orientation, surely_gives_a_heading
 from scenicq.compiler.specifiers import BoundSpecifier
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, lift
 from scenicq.errors import Span
@@ -127,7 +127,7 @@ def _in_region(
 
     gives = "position regionContainedIn" if contained else "position"
     optional = "heading" if has_heading else ""
-    perhaps = has_heading and not is_always_there(area, around.may_lack)
+    perhaps = has_heading and not surely_gives_a_heading(area, around.may_lack)
     if not modifies:
         return replace(_specifier(span, gives, evaluate, optionally=optional), perhaps=perhaps)
     # in the plane, projecting a position that is given otherwise onto a region is to demand that it lies there

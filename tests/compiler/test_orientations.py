@@ -45,6 +45,18 @@ def test_what_lies_on_a_part_that_some_elements_lack_has_either_heading(place: s
     assert found == ({Range, DirectionAt} if either else {DirectionAt})
 
 
+@pytest.mark.parametrize("base", ["ego.lane.centerline", "network.lanes[0].centerline", "network.lanes[0].leftEdge"])
+@pytest.mark.parametrize("taken", ["intersection", "CircularRegion((0, 0), 4)", "ego.laneSection"])
+@pytest.mark.parametrize("more", ["", ".intersect(road)", ".difference(sidewalk)"])
+def test_lines_that_something_is_taken_off_have_either_heading(base: str, taken: str, more: str) -> None:
+    for made, either in ((f"{base}.difference({taken}){more}", True), (f"{base}.intersect(road)", False)):
+        nodes = postorder([heading_of_the_last(f"new Car on {made}\n")])
+        fields = [node.field for node in nodes if isinstance(node, DirectionAt)]
+        known = {field.value.name for field in fields if isinstance(field, Constant)}
+        assert (street().roadDirection.name in known) is either, made
+        assert len(fields) > either, made
+
+
 def test_what_a_part_that_some_elements_lack_gives_and_what_the_class_says_are_both_directions() -> None:
     heading = heading_of_the_last("new Car on ego.laneGroup.opposite\n")
     nodes = list(postorder([heading]))

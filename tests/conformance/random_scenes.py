@@ -127,7 +127,8 @@ class Judge:
             return
         scenario, fault = self.compiled(town, text)
         if scenario is None:
-            yield Finding(fault.kind, fault.why, answer["scenes"][0], fault.excuse)
+            first = answer["scenes"][0]
+            yield Finding(fault.kind, fault.why, first, excuse(text, first, fault.why))
             return
         matcher = Matcher(scenario, MatchOptions(tolerance=TOLERANCE, timeout_s=CLOCK_S), self.solver)
         for number, scene in enumerate(answer["scenes"]):
@@ -203,8 +204,10 @@ class Judge:
 _PLACE = re.compile(r"\d+:\d+")
 
 
-def excuse(text: str, scene: dict[str, Any]) -> str:
-    """The known difference that may keep a scene from matching, or nothing."""
+def excuse(text: str, scene: dict[str, Any], why: str = "") -> str:
+    """The known difference that may keep a scene from matching, or nothing; `why` is what ours refuses."""
+    if why.startswith("wrong-value") and "must be positive" in why:
+        return "size that is not positive"
     if scene.get("directions_off_road"):
         return "direction off the road"
     if "mutate" in text and "require" in text.replace("with requireVisible", ""):
