@@ -146,9 +146,10 @@ def info(dataset: str, *, verify: bool, format_: str) -> None:
     """Say what a dataset holds and what was left out of it."""
     opened = open_checked(dataset)
     if verify:
-        opened.verify()
-        check_dataset(opened)
-        verify_computed(opened)
+        with opened.blamed():
+            opened.verify()
+            check_dataset(opened)
+            verify_computed(opened)
     if format_ == "json":
         say(plain_json(opened.manifest.to_json()), nl=False)
     else:

@@ -61,14 +61,16 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
     if labels != before.tables["labels"]:
         message = f"{dataset.path} lacks descriptions of its parts"
         raise DataError(Diagnostic("store-damaged", message, hints=("ingest the source again",)))
-    for each, file in zip(before.tables["regions"], dataset.files("regions"), strict=True):
-        check_regions(read_sound("regions", file, each.path), each.path, before.maps)
+    with dataset.blamed():
+        for each, file in zip(before.tables["regions"], dataset.files("regions"), strict=True):
+            check_regions(read_sound("regions", file, each.path), each.path, before.maps)
     maps = {name: dataset.features(name) for name in before.maps}
     indexes = MapIndexes(maps)
     with DatasetWriter(dataset.path, maps, update=True) as writer:
         try:
             for number, old in segments.items():
-                rows = _sources(dataset, number)
+                with dataset.blamed():
+                    rows = _sources(dataset, number)
                 part = SegmentWriter(writer.folder, number)
                 try:
                     part.open()

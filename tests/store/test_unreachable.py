@@ -35,24 +35,67 @@ def _read_all(address: str | Path) -> None:
     dataset.verify()
 
 
-@pytest.mark.parametrize("when", ["problems", "stamp", "file", "checksum"])
+FRAME = "03-busy-intersection/10"
+READING = {
+    "match": ("match", PROGRAM, "TOWN"),
+    "without conditions": ("match", PROGRAM, "TOWN", "--no-prefilter", "--all"),
+    "info": ("info", "TOWN", "--verify"),
+    "index": ("index", "TOWN"),
+    "sample": ("sample", PROGRAM, "TOWN", "-n", "1"),
+    "show": ("show", "TOWN", FRAME),
+    "check": ("check", PROGRAM, "TOWN"),
+    "explain": ("explain", PROGRAM, "TOWN", FRAME),
+    "export": ("match", PROGRAM, "TOWN", "--export", "interchange", "handed"),
+}
+"""Commands that read a dataset."""
+
+
+@pytest.mark.parametrize("what", READING)
+@pytest.mark.one_in(5)
 def test_a_dataset_that_is_removed_while_it_is_read(
-    when: str, crossroads: Path, tmp_path: Path, run: Any, monkeypatch: pytest.MonkeyPatch
+    what: str, crossroads: Path, tmp_path: Path, run: Any, rounds: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It goes as soon as somebody asks for something of it, in this process; others find it gone at any time."""
-    shutil.copytree(crossroads, tmp_path / "town")
-    real = getattr(LocalFolder, when)
+    monkeypatch.chdir(tmp_path)
+    town, left = tmp_path / "town", [10**9]
 
-    def gone(folder: LocalFolder, *given: Any) -> Any:
-        shutil.rmtree(tmp_path / "town", ignore_errors=True)
-        return real(folder, *given)
+    def going(real: Any) -> Any:
+        def look(folder: LocalFolder, *given: Any) -> Any:
+            left[0] -= 1
+            if left[0] < 0:
+                shutil.rmtree(town, ignore_errors=True)
+            return real(folder, *given)
 
-    monkeypatch.setattr(LocalFolder, when, gone)
-    words = ["info", tmp_path / "town", "--verify"] if when == "checksum" else ["match", PROGRAM, tmp_path / "town"]
-    done = run(*words)
-    assert done.exit_code == 2
-    assert done.stderr.startswith(("error[store-damaged]", "error[store-missing]")), done.stderr
-    assert "Error:" not in done.stderr
+        return look
+
+    for name in ("manifest", "problems", "stamp", "file", "checksum"):
+        monkeypatch.setattr(LocalFolder, name, going(getattr(LocalFolder, name)))
+    for remembered in (False, True):  # what has been found sound before is not looked at again
+        shutil.rmtree(town, ignore_errors=True)
+        shutil.copytree(crossroads, town)
+        words = [town if word == "TOWN" else word for word in READING[what]]
+        if remembered:
+            run(*words)
+        shutil.rmtree(tmp_path / "handed", ignore_errors=True)
+        left[0] = 10**9
+        usual = run(*words)
+        requests = 10**9 - left[0]
+        assert requests > 0
+        for number in sorted({requests * part // 12 for part in range(0, 12, 12 // rounds(12))}):
+            shutil.rmtree(tmp_path / "handed", ignore_errors=True)
+            shutil.rmtree(town, ignore_errors=True)
+            left[0] = 10**9
+            shutil.copytree(crossroads, town)
+            if remembered:
+                run("check", PROGRAM, town)
+            left[0] = number
+            done = run(*words)
+            if done.exit_code == usual.exit_code:  # all had been opened
+                assert done.stdout == usual.stdout
+            else:
+                assert done.exit_code == 2
+                assert done.stderr.startswith(("error[store-damaged]", "error[store-missing]")), (number, done.stderr)
+                assert "Error:" not in done.stderr
 
 
 class NoCredentialsError(Exception):
