@@ -20,7 +20,7 @@ from contextvars import ContextVar, Token
 from dataclasses import dataclass
 
 __all__ = [
-    "TimeIsUp",
+    "Exhausted",
     "Trials",
     "clock",
     "leave_out",
@@ -33,8 +33,19 @@ __all__ = [
 ]
 
 
-class TimeIsUp(Exception):
-    """The label has taken all the time that it may; what is not decided stays unknown."""
+class Exhausted(Exception):
+    """A limit is used up, or the time; what is not decided stays unknown.
+
+    Attributes:
+        reason: As of `Unknown`: "timeout", "budget", ...
+        detail: Which limit it was, in words.
+    """
+
+    def __init__(self, reason: str, detail: str = "") -> None:
+        """Take both."""
+        super().__init__(reason)
+        self.reason = reason
+        self.detail = detail
 
 
 @dataclass(slots=True)
@@ -101,7 +112,7 @@ def look() -> None:
     """Look at the clock.
 
     Raises:
-        TimeIsUp: The time is used up.
+        Exhausted: The time is used up.
     """
     limit = _LIMIT.get()
     # the thread's clock takes ten times as long to read as the wall's
@@ -109,7 +120,7 @@ def look() -> None:
         return
     left = limit.until - time.thread_time()
     if left < 0:
-        raise TimeIsUp
+        raise Exhausted("timeout")
     limit.not_before = time.perf_counter() + left
 
 
@@ -117,7 +128,7 @@ def time_is_up() -> bool:
     """Whether the time of the block around is used up."""
     try:
         look()
-    except TimeIsUp:
+    except Exhausted:
         return True
     return False
 
@@ -160,7 +171,7 @@ def waiting(seconds: float) -> Generator[float]:
         seconds: At most.
 
     Raises:
-        TimeIsUp: Nothing is left.
+        Exhausted: Nothing is left.
     """
     look()
     limit, began = _LIMIT.get(), clock()

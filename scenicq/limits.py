@@ -13,7 +13,9 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, cast
 
-__all__ = ["LIMITS", "Beyond", "Limit", "Limits", "limits"]
+from scenicq.budget import Exhausted
+
+__all__ = ["LIMITS", "Beyond", "Limit", "Limits", "exhausted", "limits"]
 
 
 class Beyond(Enum):
@@ -252,7 +254,10 @@ class Limits:
     rounded_values: int = _undecided(1000, "values", "of a number that is rounded down", "unsupported")
     integer_values: int = _undecided(1000, "values", "of a random whole number", "unsupported")
     formula_nesting: int = _undecided(
-        100, "choices", "in one another, in a question to the portable solver", "unsupported"
+        100,
+        "choices",
+        "in one another, in a question to the portable solver",
+        "unsupported: conjunctions and disjunctions nested too deep",
     )
     split_cases: int = _coarser(
         64, "alternatives", "of a question that is asked again one by one", "the question is not asked again"
@@ -384,3 +389,9 @@ def limits() -> Iterator[Limit]:
         told = each.metadata
         value = cast("float", each.default)
         yield Limit(each.name, value, told["unit"], told["guards"], told["beyond"], told["more"])
+
+
+def exhausted(name: str) -> Exhausted:
+    """What ends a search at a limit that leaves it undecided: the reason, and in words which limit it was."""
+    told = Limits.__dataclass_fields__[name].metadata
+    return Exhausted(told["more"], f"more than {getattr(LIMITS, name):,} {told['unit']} {told['guards']}")

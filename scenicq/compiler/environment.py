@@ -47,7 +47,7 @@ class Budget:
 
         Raises:
             ScenarioError: budget-exceeded.
-            TimeIsUp: See `scenicq.budget`.
+            Exhausted: See `scenicq.budget`.
         """
         look()
         self.steps -= count

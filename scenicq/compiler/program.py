@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeVar, cast
 
-from scenicq.budget import TimeIsUp, limited
+from scenicq.budget import Exhausted, limited
 from scenicq.compiler import operators
 from scenicq.compiler.absent import check_directions
 from scenicq.compiler.arithmetic import no_number
@@ -68,7 +68,7 @@ def compile_scenario(
         with limited(LIMITS.program_seconds):
             timed = None if initial or behaviors is None else TimedStatements(behaviors)
             return _compiled(source, network, version, initial=initial, timed=timed, loader=loader, model=model)
-    except TimeIsUp:
+    except Exhausted:
         what = f"evaluating the program takes more than {LIMITS.program_seconds:g} s"
         raise fail("budget-exceeded", what, _start(source), "",
                    ("make loops shorter, and ask less of the map in them",)) from None  # fmt: skip

@@ -7,7 +7,7 @@ import random
 from collections.abc import Iterable, Iterator, Set
 from pathlib import Path
 
-from scenicq.budget import TimeIsUp, limited
+from scenicq.budget import Exhausted, limited
 from scenicq.errors import DataError, Diagnostic, Note, ScenarioError
 from scenicq.exporters.interchange import label_record, write_map
 from scenicq.forest.improvise import Improviser, Scene
@@ -86,7 +86,7 @@ def sample_labels(
         try:
             with limited(timeout_s):
                 scene = improviser.draw(rng, attempts)
-        except TimeIsUp:
+        except Exhausted:
             raise _late(scenario, improviser, number, timeout_s) from None
         if scene is None:
             raise _hopeless(scenario, improviser, number)

@@ -86,7 +86,7 @@ class Improviser:
             attempts: Failures to endure.
 
         Raises:
-            TimeIsUp: The time that the caller allows (`budget.limited`) is over.
+            Exhausted: The time that the caller allows (`budget.limited`) is over.
         """
         # once a scene, not once an attempt: the requirement then holds in a share p of the scenes, or more
         waived = {

@@ -26,8 +26,7 @@ def correspondences(
         every_open: Whether all that are open are wanted; else the search notes the first one, and none is told.
 
     Raises:
-        Exhausted: The search takes more steps than it may.
-        TimeIsUp: See `scenicq.budget`.
+        Exhausted: The search takes more steps, or more time, than it may.
     """
     for signature, candidates in search.problem.signatures(plans.relevant):
         plan = plans.plan(signature)

@@ -16,12 +16,12 @@ from contextlib import suppress
 from dataclasses import InitVar, dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from scenicq.budget import TimeIsUp, limited
+from scenicq.budget import Exhausted, limited
 from scenicq.forest.scenario import Scenario
 from scenicq.match.correspondences import correspondences
 from scenicq.match.decide.solver_step import ask
 from scenicq.match.explanation import Finding
-from scenicq.match.options import Exhausted, MatchOptions
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates, egos, find_candidates
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
@@ -31,7 +31,7 @@ from scenicq.match.search.backtracking import Reporter
 from scenicq.match.search.batch_lookups import look_up_positions
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.search.plan_cache import PlanCache
-from scenicq.match.search.verdict_builder import Ended, VerdictBuilder
+from scenicq.match.search.verdict_builder import VerdictBuilder
 from scenicq.match.verdict import Cause, Match, Unknown, Verdict
 from scenicq.store.labels import Label
 
@@ -131,7 +131,7 @@ class Matcher:
         """The verdicts of labels: by first fit side by side, else each by a search of its own."""
         found: dict[int, Match] = {}
         time_for_all = limited(self.options.timeout_s * len(labels))
-        with suppress(TimeIsUp), time_for_all, limited(self.options.timeout_s * len(labels) / 2):
+        with suppress(Exhausted), time_for_all, limited(self.options.timeout_s * len(labels) / 2):
             for fit, rows in self.plans.first_fits(labels, given).items():
                 for batch in fit.fill(rows, self.options, lookups):
                     found.update(self._verdicts.matches(fit, batch))
@@ -159,19 +159,18 @@ class Matcher:
                 rest.append((0, Finding(self._verdicts.excluded(label, ego, roles))))
                 continue
             search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups or MapLookups())
-            ended: Ended | None = None
+            ended: Exhausted | None = None
             try:
                 for finding in correspondences(label, search, self.plans, self._verdicts, every_open=every_open):
                     told += 1
                     if told > self.options.correspondences:
-                        raise Exhausted
+                        raise Exhausted("budget", f"more than {self.options.correspondences:,} correspondences")
                     yield finding
-            except (Exhausted, TimeIsUp) as error:
-                ended = "timeout" if isinstance(error, TimeIsUp) else "budget"
-                ended = "correspondences" if told > self.options.correspondences else ended
+            except Exhausted as error:
+                ended = error
             weight, verdict = self._verdicts.without_match(label, search, ended)
             rest.append((weight, Finding(verdict, search)))
-            if ended == "correspondences":
+            if told > self.options.correspondences:
                 break
         if not told:
             # an unknown outweighs every no; among equals, what came furthest

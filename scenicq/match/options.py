@@ -9,7 +9,7 @@ from scenicq.forest.scenario import BuiltIn
 from scenicq.match.tolerance import Tolerance
 from scenicq.store.classes import Granularity
 
-__all__ = ["Exhausted", "MatchOptions", "Method"]
+__all__ = ["MatchOptions", "Method"]
 
 Method = Literal["auto", "smt", "monolithic"]
 
@@ -17,10 +17,6 @@ EXEMPT_PARAMS = frozenset(
     {"map", "carla_map", "lgsvl_map", "render", "use2DMap", "time_step", "timestep", "weather_file"}
 )
 """Parameters that say how to simulate, not what the scene is."""
-
-
-class Exhausted(Exception):
-    """The search took more steps than `MatchOptions.budget` allows, or found more than `correspondences`."""
 
 
 @dataclass(frozen=True, slots=True)

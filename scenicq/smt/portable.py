@@ -16,12 +16,13 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
+from scenicq.budget import Exhausted
 from scenicq.limits import LIMITS
 from scenicq.smt.affine import EMPTY, ENTAILED
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem, Relation, TermComparison, postorder
-from scenicq.smt.system import Alternative, System, TooDeepError, compile_system, contract_choice
+from scenicq.smt.system import Alternative, System, compile_system, contract_choice
 from scenicq.smt.variable_isolation import Recipe, recipes
 
 __all__ = ["check"]
@@ -57,8 +58,8 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
     index = {variable.name: number for number, variable in enumerate(problem.variables)}
     try:
         system = compile_system(problem.constraint, index)
-    except TooDeepError:
-        return NoAnswer("unsupported: conjunctions and disjunctions nested too deep")
+    except Exhausted as error:
+        return NoAnswer(error.reason)
     return _Search(problem, system, index, precision).run(time.thread_time() + timeout_s)
 
 

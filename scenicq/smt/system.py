@@ -11,13 +11,13 @@ import math
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 
-from scenicq.limits import LIMITS
+from scenicq.limits import LIMITS, exhausted
 from scenicq.smt.affine import EMPTY, ENTAILED, MAYBE, AffineAtom, Forms, affine_atoms, contract_affine
 from scenicq.smt.evaluation import Evaluator
 from scenicq.smt.formula import Conjunction, Disjunction, Formula, Relation, TermComparison, free_variables, postorder
 from scenicq.smt.hc4 import Tape
 
-__all__ = ["Alternative", "System", "TooDeepError", "compile_system", "contract_choice"]
+__all__ = ["Alternative", "System", "compile_system", "contract_choice"]
 
 
 class System:
@@ -124,10 +124,6 @@ def contract_choice(choice: Iterable[System], low: list[float], high: list[float
     return MAYBE, live
 
 
-class TooDeepError(Exception):
-    """Conjunctions and disjunctions are nested deeper than can be handled."""
-
-
 def compile_system(constraint: Formula, index: Mapping[str, int]) -> System:
     """Compile a formula.
 
@@ -136,7 +132,7 @@ def compile_system(constraint: Formula, index: Mapping[str, int]) -> System:
         index: The number of each variable.
 
     Raises:
-        TooDeepError: Choices are nested deeper than `LIMITS.formula_nesting`.
+        Exhausted: Choices are nested deeper than `LIMITS.formula_nesting`.
     """
     forms: Forms = {}
     systems: dict[int, System] = {}
@@ -159,5 +155,5 @@ def compile_system(constraint: Formula, index: Mapping[str, int]) -> System:
             case _:
                 continue
         if nesting[id(node)] > LIMITS.formula_nesting:
-            raise TooDeepError
+            raise exhausted("formula_nesting")
     return systems[id(constraint)]

@@ -11,7 +11,7 @@ from typing import TypeVarTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.budget import TimeIsUp, limited, look
+from scenicq.budget import Exhausted, limited, look
 from scenicq.forest.nodes import Compare, CompareOp, Constant, Identity, Logic, LogicOp, Node, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import roots_of
@@ -110,7 +110,7 @@ class HiddenRuns:
         try:
             with limited(self.match.timeout_s * (len(stretches.bounds) - 1)):
                 return self._by_values(stretches, columns, expanded, remember)
-        except (UnclearVariable, HiddenVariable, TimeIsUp):
+        except (UnclearVariable, HiddenVariable, Exhausted):
             pass
         # what is unclear of one stretch is not so of all
         found = HiddenFound(Runs.unknown(stretches.ends()))
@@ -128,9 +128,9 @@ class HiddenRuns:
         try:
             with limited(self.match.timeout_s):
                 return self._by_values(stretch, columns, expanded, remember)
-        except (UnclearVariable, HiddenVariable, TimeIsUp) as error:
+        except (UnclearVariable, HiddenVariable, Exhausted) as error:
             unclear = error
-        reason = "timeout" if isinstance(unclear, TimeIsUp) else str(unclear) or "a hidden random variable over time"
+        reason = str(unclear) or "a hidden random variable over time"
         found = HiddenFound(Runs.unknown(stretch.ends()))
         for start, number in enumerate(cast("list[int]", stretch.numbers.tolist())):
             if isinstance(unclear, UnclearVariable):
@@ -212,7 +212,7 @@ class HiddenRuns:
         try:
             with limited(self.match.timeout_s):
                 outcomes = asked.outcomes()
-        except (HiddenVariable, TimeIsUp):
+        except (HiddenVariable, Exhausted):
             pass
         if outcomes and all(each.run.truth == FALSE for each in outcomes):
             return [(max((each.run for each in outcomes), key=lambda run: (run.cut_off, run.end)), ("", {}))]

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next, Not, Or, Until
-from scenicq.limits import LIMITS
+from scenicq.limits import LIMITS, exhausted
 from scenicq.temporal.folding import folded
 
-__all__ = ["HOLDS", "LOST", "Progression", "Rest", "TooManyClausesError", "accepts"]
+__all__ = ["HOLDS", "LOST", "Progression", "Rest", "accepts"]
 
 
 Obligation = tuple[int, bool]
@@ -25,10 +25,6 @@ Rest = frozenset[frozenset[Obligation]]
 
 LOST: Rest = frozenset()
 HOLDS: Rest = frozenset((frozenset[Obligation](),))
-
-
-class TooManyClausesError(Exception):
-    """What is left of a formula has too many clauses."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +86,7 @@ class Progression:
             holds: Whether an atom holds there, by its number.
 
         Raises:
-            TooManyClausesError: It has too many clauses.
+            Exhausted: It has too many clauses.
         """
         values: dict[int, Rest] = {}
         for number in self._here({number for clause in rest for number, _ in clause}):
@@ -165,7 +161,7 @@ def _all_of(rests: Iterable[Rest]) -> Rest:
 def _without_implied(clauses: set[frozenset[Obligation]]) -> Rest:
     """The clauses that imply no other one."""
     if len(clauses) > LIMITS.formula_clauses:
-        raise TooManyClausesError
+        raise exhausted("formula_clauses")
     if len(clauses) < 2:
         return frozenset(clauses)
     return frozenset(one for one in clauses if not any(other < one for other in clauses))

@@ -11,11 +11,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import assert_never
 
+from scenicq.budget import Exhausted
 from scenicq.errors import Span
 from scenicq.forest.temporal import Atom, Dynamics, End, Formula, Goto, Monitor, Reject, Terminate, Test, Wait, operands
-from scenicq.limits import LIMITS
+from scenicq.limits import LIMITS, exhausted
 from scenicq.temporal.literals import Literal, literals_of
-from scenicq.temporal.progression import LOST, Progression, Rest, TooManyClausesError, accepts
+from scenicq.temporal.progression import LOST, Progression, Rest, accepts
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 __all__ = ["Advance", "RunMachine", "Situation"]
@@ -182,7 +183,7 @@ class RunMachine:
             for mode in modes:
                 for after, over in self._ways_of(mode, told, values, due=due, here=here, later=later):
                     (ended if over else going).add(after)
-        except TooManyClausesError:
+        except Exhausted:
             return Advance(self._undecided())
         if len(going) > LIMITS.run_modes:
             return Advance(self._undecided())
@@ -208,7 +209,7 @@ class RunMachine:
                 assumed = stack.pop()
                 tried += 1
                 if tried > LIMITS.observation_ways:
-                    raise TooManyClausesError
+                    raise exhausted("observation_ways")
                 try:
                     found.add(self._step(mode, self._holding(values, assumed), due=due, here=here, later=later))
                 except _NotObserved as error:

@@ -35,7 +35,7 @@ from road_programs import Places, compose
 from run_conformance import SCENIC, read_map
 from shrinking import shrink
 
-from scenicq.budget import TimeIsUp, limited
+from scenicq.budget import Exhausted, limited
 from scenicq.errors import ScenarioError
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
@@ -146,7 +146,7 @@ class Judge:
         except ScenarioError as error:
             first = error.diagnostics[0]
             return None, Finding("refused", f"{first.code}: {first.message} [{first.span.text if first.span else ''}]")
-        except (OutOfPatienceError, TimeIsUp):
+        except (OutOfPatienceError, Exhausted):
             return None, Finding("late", "compiling")
         except Exception:
             return None, Finding("crash", "compiling: " + traceback.format_exc(limit=-3))

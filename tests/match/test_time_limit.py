@@ -60,14 +60,14 @@ def test_nothing_is_limited_without_a_block():
 
 def test_time_is_up_within_the_block_alone(start):
     start()
-    with budget.limited(50.0), pytest.raises(budget.TimeIsUp):
+    with budget.limited(50.0), pytest.raises(budget.Exhausted):
         _look_often()
     budget.look()
 
 
 def test_an_inner_block_gives_no_more_than_an_outer_one(start):
     start()
-    with budget.limited(30.0), budget.limited(math.inf), pytest.raises(budget.TimeIsUp):
+    with budget.limited(30.0), budget.limited(math.inf), pytest.raises(budget.Exhausted):
         _look_often()
 
 
@@ -79,7 +79,7 @@ def test_what_a_solver_takes_counts(monkeypatch):
     with budget.limited(3.0):
         with budget.waiting(10.0) as left:
             assert left == 3.0
-        with pytest.raises(budget.TimeIsUp):
+        with pytest.raises(budget.Exhausted):
             budget.look()
 
 

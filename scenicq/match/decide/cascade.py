@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from scenicq.budget import look
+from scenicq.budget import Exhausted, look
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import (
     Constant,
@@ -17,7 +17,7 @@ from scenicq.forest.nodes import (
     Value,
 )
 from scenicq.forest.walk import deciding_first, leaves
-from scenicq.limits import LIMITS
+from scenicq.limits import LIMITS, exhausted
 from scenicq.match.linear.affine_forms import affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
 from scenicq.match.linear.linear_program import NotLinear
@@ -34,12 +34,8 @@ def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
     """Decide a group without a solver; `Undecided` with reason "nonlinear" where one is needed."""
     try:
         return _Cascade(tolerance).decide(items, {}, 0)
-    except _Exhausted:
-        return Undecided(items[0][0], "nonlinear")
-
-
-class _Exhausted(Exception):
-    """A decision has taken all the linear programs, or made all the choices, that it may."""
+    except Exhausted as error:
+        return Undecided.by(items[0][0], error)
 
 
 class _Cascade:
@@ -68,7 +64,7 @@ class _Cascade:
         if not open_items:
             return Satisfied(given)
         if depth > LIMITS.cascade_nesting:
-            raise _Exhausted
+            raise exhausted("cascade_nesting")
         for leaf in deciding_first([node for _, node, _ in open_items]):
             options = options_of(leaf)
             if options is not None:
@@ -90,7 +86,7 @@ class _Cascade:
             if isinstance(outcome, Undecided) or (number == 0 and isinstance(blamed, Refuted)):
                 blamed = outcome
             if self.branches > LIMITS.cascade_outcomes:
-                return Undecided(constraint, "nonlinear")
+                raise exhausted("cascade_outcomes")
         return blamed
 
     def _try_each(
@@ -128,7 +124,7 @@ class _Cascade:
         constraint = items[0][0]
         self.programs += 1
         if self.programs > LIMITS.cascade_programs:
-            raise _Exhausted
+            raise exhausted("cascade_programs")
         try:
             found = solve_affine(items, [], self.tolerance)
         except NotLinear:

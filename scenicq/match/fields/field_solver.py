@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from scenicq.budget import Exhausted, look
 from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import DiscreteRange, Identity, Index, Value
@@ -20,7 +21,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_of, solved
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
-from scenicq.match.fields.heading_propagation import LimitError, bisected, directed, propagated
+from scenicq.match.fields.heading_propagation import bisected, directed, propagated
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.fields.witness_search import THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, conditioned
@@ -65,8 +66,8 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
             limits = _joined(found, shared)
         # what a later part excludes of the shared number excludes ways of the earlier ones
         chosen = [_within(found, shared, limits) for found in chosen]
-    except LimitError:
-        return _searched(start) or Undecided(first, "nonlinear")
+    except Exhausted as error:
+        return _searched(start) or Undecided.by(first, error)
     ways = [_ways(found, shared) for found in chosen]
     if not all(ways):
         return Refuted(first)
@@ -105,8 +106,8 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
             found = _halved(todo, first, tolerance)
             if not isinstance(found, Undecided):
                 return found
-    except LimitError:
-        pass
+    except Exhausted as error:
+        doubt = Undecided.by(first, error)
     return doubt if searched else _searched(start) or doubt
 
 
@@ -130,6 +131,7 @@ def _halved(todo: deque[HeadingAssignment], first: Constraint, tolerance: Tolera
 
 def _searched(start: BoxSet) -> Satisfied | None:
     """A witness of one part by more draws than at first."""
+    look()
     narrowed = start.narrowed()
     return find_witness(narrowed, THOROUGH) if narrowed.size else None
 
@@ -138,7 +140,7 @@ def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAss
     """What is left of a way in cells that cover too much over either half of the widest range that matters there."""
     try:
         halves = [propagated(half) for half in bisected(way.case, leaves(*way.vague))]
-    except LimitError:
+    except Exhausted:
         return None
     return _ways([half for half in halves if half.size], shared)
 

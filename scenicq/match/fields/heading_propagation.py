@@ -20,11 +20,11 @@ from scenicq.geometry import shapes
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.geometry.regions import SLACK, PointSet, PolygonSet, PolylineSet
-from scenicq.limits import LIMITS
+from scenicq.limits import LIMITS, exhausted
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
 
-__all__ = ["LimitError", "bisected", "directed", "propagated"]
+__all__ = ["bisected", "directed", "propagated"]
 
 _AT_ONCE = 256
 """Cases that are narrowed together: what one of them finds may make the others needless."""
@@ -40,10 +40,6 @@ _LONG = 1.0
 """Width of a range of numbers that is divided before directions are, where these are many."""
 
 
-class LimitError(Exception):
-    """There are too many cases, or nothing is left that bisecting would narrow."""
-
-
 def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
     """The cases in which every field has one direction and something is left, those found first at once.
 
@@ -52,7 +48,7 @@ def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
         soon: After how many cases an empty set says that it takes long.
 
     Raises:
-        LimitError: There are too many cases.
+        Exhausted: There are too many cases.
     """
     todo, seen = [start], 0
     while todo:
@@ -61,7 +57,7 @@ def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
             yield cases.take(np.arange(0))
         seen += cases.size
         if seen > LIMITS.heading_cases:
-            raise LimitError
+            raise exhausted("heading_cases")
         cases = propagated(cases)
         if not cases.size:
             continue
@@ -94,11 +90,11 @@ def bisected(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
         below: The random variables that come into question.
 
     Raises:
-        LimitError: There is none.
+        Exhausted: There is none.
     """
     found = _widest(cases, below)
     if found is None or found[0] <= LIMITS.heading_width:
-        raise LimitError
+        raise exhausted("heading_width")
     return _halves(cases, *found[1:])
 
 

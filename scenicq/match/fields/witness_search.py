@@ -17,10 +17,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.budget import Trials, trials_left
+from scenicq.budget import Exhausted, Trials, trials_left
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.nodes import Identity, Index, Leaf, PointIn, Value
-from scenicq.limits import LIMITS
+from scenicq.limits import LIMITS, exhausted
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.damped_steps import damped_steps
@@ -93,7 +93,7 @@ def find_witness(start: BoxSet, effort: Effort = QUICK, outcomes: Sequence[Outco
     trials = trials_left()
     search = _Search(start, effort, outcomes, trials)
     found = None
-    with suppress(CannotEvaluate, _SpentError):
+    with suppress(CannotEvaluate, Exhausted):
         found = search.run()
     if found is None:
         trials.left -= search.tried
@@ -106,10 +106,6 @@ def search_witness(
     """A witness of constraints, conditioned, or None if none was found; other arguments as of `find_witness`."""
     start = BoxSet.start(ConstraintNetwork(items, tolerance), {}).narrowed()
     return find_witness(start, effort, outcomes) if start.size else None
-
-
-class _SpentError(Exception):
-    """A search has tried as often as it may."""
 
 
 class _Search:
@@ -160,10 +156,10 @@ class _Search:
         """What draws come out as.
 
         Raises:
-            _SpentError: This search has had its share.
+            Exhausted: This search has had its share.
         """
         if self.tried >= self.most:
-            raise _SpentError
+            raise exhausted("witness_trials")
         self.tried += 1
         return self.space.run(draws)
 

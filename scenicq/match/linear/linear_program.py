@@ -12,15 +12,11 @@ from typing import Any
 from scenicq.match.linear.affine_forms import Affine, VariableAxis
 from scenicq.processes import discard_output
 
-__all__ = ["LinearSystem", "NotLinear", "NotSolved", "Row"]
+__all__ = ["LinearSystem", "NotLinear", "Row"]
 
 
 class NotLinear(Exception):
     """Constraints are not affine, or linear programs do not tell."""
-
-
-class NotSolved(Exception):
-    """The linear program came to no answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +52,7 @@ class LinearSystem:
         feasibility tolerance of the linear program, 1e-9.
 
         Raises:
-            NotSolved: The solver came to no answer.
+            NotLinear: The solver came to no answer.
         """
         rows = [*self.rows, *more]
         if not _settled(rows):
@@ -73,7 +69,7 @@ class LinearSystem:
         Strict rows may hold with equality.
 
         Raises:
-            NotSolved: The solver came to no answer, or nothing bounds the variable.
+            NotLinear: The solver came to no answer, or nothing bounds the variable.
         """
         rows = [replace(row, strict=False) if row.strict else row for row in (*self.rows, *more)]
         if not _settled(rows):
@@ -81,7 +77,7 @@ class LinearSystem:
         rows = [row for row in rows if row.form.terms]
         variables = list({each: None for row in rows for each in row.form.terms})
         if variable not in variables:
-            raise NotSolved
+            raise NotLinear
         least = _solve(rows, variables, (variable, 1.0))
         most = None if least is None else _solve(rows, variables, (variable, -1.0))
         return None if least is None or most is None else (least[variable], most[variable])
@@ -159,7 +155,7 @@ def _solve(
     if status == highs.HighsModelStatus.kInfeasible:
         return None
     if status != highs.HighsModelStatus.kOptimal:
-        raise NotSolved
+        raise NotLinear
     found = list(solver.getSolution().col_value)
     if strict and found[margin] <= _MARGIN:
         return None

@@ -39,7 +39,7 @@ from scenicq.geometry.regions import (
 from scenicq.limits import LIMITS
 from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import ends
-from scenicq.match.linear.linear_program import LinearSystem, NotLinear, NotSolved, Row
+from scenicq.match.linear.linear_program import LinearSystem, NotLinear, Row
 from scenicq.match.linear.region_rows import Alternative, disc_rows, region_rows, sector_rows
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import ROUNDING, SLACK, Tolerance
@@ -258,14 +258,11 @@ class _Problem:
     def solve(self) -> Mapping[tuple[Identity, int], float] | None:
         """A solution, or None if there is none."""
         ordered = sorted(self.alternatives, key=len)
-        try:
-            found = _search(self.system, ordered, [*disc_rows(self.discs, outer=True)])
-            if found is not None and self.discs:
-                found = _search(self.system, ordered, [*disc_rows(self.discs, outer=False)])
-                if found is None:
-                    raise NotLinear
-        except NotSolved:
-            raise NotLinear from None
+        found = _search(self.system, ordered, [*disc_rows(self.discs, outer=True)])
+        if found is not None and self.discs:
+            found = _search(self.system, ordered, [*disc_rows(self.discs, outer=False)])
+            if found is None:
+                raise NotLinear
         return found
 
     def extent(self, variable: VariableAxis) -> tuple[float, float] | None:
@@ -274,13 +271,10 @@ class _Problem:
         if math.prod(map(len, self.alternatives)) > LIMITS.extent_combinations:
             raise NotLinear
         found: tuple[float, float] | None = None
-        try:
-            for chosen in itertools.product(*self.alternatives):
-                own = self.system.extent([*around, *itertools.chain.from_iterable(chosen)], variable)
-                if own is not None:
-                    found = own if found is None else (min(found[0], own[0]), max(found[1], own[1]))
-        except NotSolved:
-            raise NotLinear from None
+        for chosen in itertools.product(*self.alternatives):
+            own = self.system.extent([*around, *itertools.chain.from_iterable(chosen)], variable)
+            if own is not None:
+                found = own if found is None else (min(found[0], own[0]), max(found[1], own[1]))
         return found
 
 

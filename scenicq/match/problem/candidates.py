@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
-from scenicq.limits import LIMITS
-from scenicq.match.options import Exhausted, MatchOptions
+from scenicq.limits import LIMITS, exhausted
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.observation import observe, observe_params
@@ -66,7 +66,7 @@ class LabelProblem:
         params = frozenset(self.params)
         for count, chosen in enumerate(itertools.product(*choices)):
             if count >= LIMITS.signatures:
-                raise Exhausted
+                raise exhausted("signatures")
             yield (*(names for names, _ in chosen), params), {i: numbers for i, (_, numbers) in enumerate(chosen)}
 
 

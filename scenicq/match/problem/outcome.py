@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from scenicq.budget import Exhausted
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Identity, Value
 
@@ -46,10 +47,17 @@ class Undecided:
     Attributes:
         constraint: The one to blame, or the first of several.
         reason: As of `Unknown`.
+        detail: Which limit ended it, in words, where one did.
     """
 
     constraint: Constraint
     reason: str
+    detail: str = ""
+
+    @classmethod
+    def by(cls, constraint: Constraint, error: Exhausted) -> Undecided:
+        """What is left undecided by a limit."""
+        return cls(constraint, error.reason, error.detail)
 
 
 Outcome = Satisfied | Refuted | Undecided

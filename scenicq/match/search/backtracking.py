@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
-from scenicq.budget import look
-from scenicq.match.options import Exhausted
+from scenicq.budget import Exhausted, look
 from scenicq.match.problem.bipartite_matching import BipartiteMatching, Slot
 
 __all__ = ["Consistency", "Reporter", "SilentReporter", "find_assignments"]
@@ -95,7 +94,7 @@ def find_assignments(
     Raises:
         Exhausted: The budget is used up.
     """
-    watch = reporter or SilentReporter()
+    watch, most = reporter or SilentReporter(), budget
     assignment = dict(fixed or {})
     used = {candidate: slot for slot, candidate in assignment.items()}
     twin_of = twins or {}
@@ -138,7 +137,7 @@ def find_assignments(
             look()
             budget -= 1
             if budget < 0:
-                raise Exhausted
+                raise Exhausted("budget", f"more than {most:,} steps")
             assignment[slot] = candidate
             answer, blamed = check(slot, assignment)
             if answer is not Consistency.NO:

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from scenicq.budget import Exhausted
 from scenicq.forest import build
 from scenicq.forest.groups import Constraint
 from scenicq.forest.kinds import kind_of
@@ -25,8 +26,7 @@ from scenicq.forest.nodes import (
     Node,
     Value,
 )
-from scenicq.limits import LIMITS
-from scenicq.match.options import Exhausted
+from scenicq.limits import LIMITS, exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_field
 from scenicq.match.problem.evaluation import ground_cause, holds
@@ -34,7 +34,6 @@ from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
 from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices
 from scenicq.match.search.outcome_bounds import possible_outcomes
-from scenicq.match.search.outcome_tables import TooManyOutcomesError
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["Ask", "decide_with_choices"]
@@ -68,17 +67,17 @@ def decide_with_choices(
         depth: In how many other searches it is asked for.
 
     Raises:
-        TimeIsUp: See `scenicq.budget`.
+        Exhausted: The time is up.
     """
     parts = [part for item in items for part in item_conjuncts(item)]
     try:
         found = [ConstraintChoices(item) for item in parts]
-    except TooManyOutcomesError:
-        return Undecided(items[0][0], "budget")
+    except Exhausted as error:
+        return Undecided.by(items[0][0], error)
     if not any(part.trees for part in found):
         return None
     if depth > LIMITS.choice_nesting:
-        return Undecided(items[0][0], "budget")
+        return Undecided.by(items[0][0], exhausted("choice_nesting"))
     for part in found:
         if any(not tree.results for tree in part.trees.values()):
             return Refuted(part.item[0])
@@ -138,8 +137,8 @@ class _ChoiceSearch:
         try:
             for assignment in self._assignments():
                 return unsettled or self._values(assignment, values)
-        except Exhausted:
-            return Undecided(self.items[0][0], "budget")
+        except Exhausted as error:
+            return Undecided.by(self.items[0][0], error)
         if self.doubt is not None:
             return self.doubt
         return Refuted(self.items[0][0]) if self.blamed is None else self.blamed[1]

@@ -111,7 +111,7 @@ class FirstFit:
             lookups: What is known of the map.
 
         Raises:
-            TimeIsUp: The time is used up.
+            Exhausted: The time is used up.
         """
         todo = [_Batch(self, rows, [(0,)] * len(rows))]
         while todo:

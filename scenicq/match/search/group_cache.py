@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from scenicq.budget import TimeIsUp, Trials, look
+from scenicq.budget import Exhausted, Trials, look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Value
@@ -105,8 +105,8 @@ class GroupCache:
                 return self._decided(self.items(group, assignment), self._at_last)
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")
-        except TimeIsUp:
-            return Undecided(group.constraints[0], "timeout")
+        except Exhausted as error:
+            return Undecided.by(group.constraints[0], error)
 
     def _decided(self, items: list[Item], at_last: Ask) -> Outcome:
         """What the cascade says of constraints, and where it says nothing, what is asked at last."""
@@ -146,7 +146,7 @@ def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:
     sources, targets = ((*each.doubtful, *each.constraints, *each.certain) for each in (source, target))
     constraint = targets[sources.index(outcome.constraint)]
     return (
-        Refuted(constraint, outcome.detail) if isinstance(outcome, Refuted) else Undecided(constraint, outcome.reason)
+        Refuted(constraint, outcome.detail) if isinstance(outcome, Refuted) else replace(outcome, constraint=constraint)
     )
 
 

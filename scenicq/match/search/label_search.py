@@ -10,12 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
 
+from scenicq.budget import Exhausted
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.options import Exhausted, MatchOptions
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item

@@ -26,19 +26,15 @@ from scenicq.forest.walk import children, leaves, postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
-from scenicq.limits import LIMITS
+from scenicq.limits import LIMITS, exhausted
 from scenicq.match.tolerance import SLACK
 
-__all__ = ["ChoiceTree", "ChoiceVariable", "Outcomes", "TooManyOutcomesError", "above_choices", "tree_of"]
+__all__ = ["ChoiceTree", "ChoiceVariable", "Outcomes", "above_choices", "tree_of"]
 
 ChoiceVariable: TypeAlias = Identity | Node
 """A random index by its identity; else the expression that says which option is taken."""
 
 _DOMAIN = IntervalDomain(ARRAYS)
-
-
-class TooManyOutcomesError(Exception):
-    """Choices nested in each other have more outcomes than are listed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,7 +136,7 @@ def tree_of(root: Select) -> ChoiceTree:
     """The outcomes of a choice and of all choices nested in it.
 
     Raises:
-        TooManyOutcomesError: There are more than can be listed.
+        Exhausted: There are more than can be listed.
     """
     columns: dict[ChoiceVariable, int] = {}
     rows: list[dict[ChoiceVariable, int]] = []
@@ -152,7 +148,7 @@ def tree_of(root: Select) -> ChoiceTree:
             rows.append(path)
             results.append(node)
             if len(rows) > LIMITS.nested_outcomes:
-                raise TooManyOutcomesError
+                raise exhausted("nested_outcomes")
             for variable in path:
                 columns.setdefault(variable, len(columns))
             continue

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
+from scenicq.budget import Exhausted
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Leaf, Value
 from scenicq.forest.scenario import Scenario
@@ -17,10 +17,7 @@ from scenicq.match.search.label_search import Failure, LabelSearch, Solution
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.store.labels import Label
 
-__all__ = ["Ended", "VerdictBuilder"]
-
-Ended = Literal["budget", "correspondences", "timeout"]
-"""What may end a search early: its steps, that enough is found, or the clock."""
+__all__ = ["VerdictBuilder"]
 
 _SHOWN = (float, tuple)
 """Kinds of values that a witness has."""
@@ -62,7 +59,7 @@ class VerdictBuilder:
             names = {name: objects[numbers[rank] - 1].id if numbers[rank] else "ego" for name, rank in ranks}
             yield row.number, Match(names, _witness(keys, values))
 
-    def without_match(self, label: Label, search: LabelSearch, ended: Ended | None) -> tuple[int, Verdict]:
+    def without_match(self, label: Label, search: LabelSearch, ended: Exhausted | None) -> tuple[int, Verdict]:
         """The verdict of a search without a match, and its weight: an unknown outweighs every no.
 
         Args:
@@ -74,13 +71,8 @@ class VerdictBuilder:
         if search.undecided is not None:
             return _UNDECIDED, self.open(label, search, search.undecided)
         if ended is not None:
-            most = {
-                "budget": f"{self.options.budget:,} steps",
-                "correspondences": f"{self.options.correspondences:,} correspondences",
-                "timeout": f"{self.options.timeout_s:g} s",
-            }
-            reason = "timeout" if ended == "timeout" else "budget"
-            return _EXHAUSTED, Unknown(reason, Cause("correspondence search", f"more than {most[ended]}"))
+            detail = ended.detail or f"more than {self.options.timeout_s:g} s"
+            return _EXHAUSTED, Unknown(ended.reason, Cause("correspondence search", detail))
         if failure is None:
             return 0, self.excluded(
                 label, search.problem.ego, Cause("correspondence", "no distinct label objects for all objects")
@@ -117,8 +109,7 @@ class VerdictBuilder:
     def _cause(self, failure: Failure) -> Cause:
         constraint = failure.constraint
         about = (constraint.object,) if isinstance(constraint, Comparison) else constraint.requirement.objects
-        detail = failure.outcome.detail if isinstance(failure.outcome, Refuted) else ""
-        return Cause(describe_constraint(self.scenario, constraint), detail, constraint.span, about)
+        return Cause(describe_constraint(self.scenario, constraint), failure.outcome.detail, constraint.span, about)
 
     def _named(self, variables: Sequence[Leaf]) -> list[str]:
         """What a witness calls random variables: their places in the program, numbered where several share one."""

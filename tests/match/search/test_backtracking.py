@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenicq.match.options import Exhausted
+from scenicq.budget import Exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.search.backtracking import Consistency, find_assignments
 
