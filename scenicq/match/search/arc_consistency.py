@@ -13,7 +13,6 @@ from scenicq.forest.nodes import Value
 from scenicq.limits import LIMITS
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
-from scenicq.match.search.interval_relaxation import possible
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["arc_consistent"]
@@ -40,11 +39,11 @@ def arc_consistent(
     pairs: list[tuple[GroupPlan, NDArray[np.bool_]]] = []
     known: dict[tuple[int, tuple[tuple[int, ...], ...]], Any] = {}
     for group in [*(each for found in plan.unary.values() for each in found), *plan.joint]:
-        if len(group.roles) > LIMITS.arc_roles:
+        if group.relaxation is None or len(group.roles) > LIMITS.arc_roles:
             continue
         options = tuple(candidates[index] for index in group.roles)
         if (group.kind, options) not in known:
-            known[group.kind, options] = possible(group.group, group.steps, columns.of(group, options), tolerance)
+            known[group.kind, options] = group.relaxation.possible(columns.of(group, options), tolerance)
         answer: Any = known[group.kind, options]
         if len(group.roles) == 1:
             alive[group.roles[0]] &= np.broadcast_to(answer, len(options[0]))

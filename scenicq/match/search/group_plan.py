@@ -6,7 +6,6 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
 from scenicq.forest.groups import Group
-from scenicq.forest.interpret import Steps, steps_of
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.closed_forms import closed_form_of
@@ -14,6 +13,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import Signature, build_groups
 from scenicq.match.problem.subgroups import subgroups_of
 from scenicq.match.problem.symmetry import GroupShape, interchangeable, shape_of
+from scenicq.match.search.interval_relaxation import Relaxation
 
 __all__ = ["GroupPlan", "MatchPlan", "make_plan"]
 
@@ -28,7 +28,7 @@ class GroupPlan:
         roles: The objects that it is about, the ego left out, in the order in which the question speaks of them.
         closed_form: Its closed form, if it has one.
         parts: What a group about many objects demands of one or two of them.
-        steps: In which its necessary conditions are evaluated.
+        relaxation: Its necessary conditions.
     """
 
     group: Group
@@ -36,7 +36,7 @@ class GroupPlan:
     roles: tuple[int, ...]
     closed_form: ClosedForm | None = None
     parts: tuple[GroupPlan, ...] = ()
-    steps: Steps = ()
+    relaxation: Relaxation | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,8 +85,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
             parts.append(GroupPlan(part, number, small.roles, closed_form_of(part, scenario.ego)))
         number = kinds.setdefault(shape.key, len(kinds))
         form = None if group.doubtful else closed_form_of(group, scenario.ego)
-        steps = steps_of(*(item.expression for item in group.constraints))
-        groups.append(GroupPlan(group, number, shape.roles, form, tuple(parts), steps))
+        groups.append(GroupPlan(group, number, shape.roles, form, tuple(parts), Relaxation.of(group)))
         paired = [part.roles for part in parts if len(part.roles) > 1]
         # of a chain, the next one is what can be checked next
         chained = set(shape.roles) == {index for roles in paired for index in roles}

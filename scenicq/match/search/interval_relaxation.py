@@ -8,51 +8,79 @@ that passes has proven nothing. In the frame of an observed heading, "ahead of i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 
 from scenicq.forest.groups import Comparison, Group
-from scenicq.forest.interpret import Steps, interpret
+from scenicq.forest.interpret import Steps, interpret, steps_of
 from scenicq.forest.interval_ends import ARRAYS
 from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue, IntervalVector, can_hold
 from scenicq.forest.intervals import IntervalDomain
-from scenicq.forest.nodes import Feature, Node, Rotate, VectorSum
+from scenicq.forest.nodes import Feature, Node, Rotate, Select, VectorSum
 from scenicq.match.tolerance import SLACK, Margin, Tolerance
 
-__all__ = ["Observed", "possible", "within_margin"]
+__all__ = ["Observed", "Relaxation", "within_margin"]
 
 Observed = Callable[[int, str], FloatOrArray | tuple[FloatOrArray, FloatOrArray] | None]
 """What is observed of an object: numbers or a pair of them for all its candidates; None where it is no number."""
 
 
-def possible(group: Group, steps: Steps, observed: Observed, tolerance: Tolerance) -> FloatOrArray:
-    """For which candidates of its roles a group may be satisfiable.
+@dataclass(frozen=True, slots=True, eq=False)
+class Relaxation:
+    """A group as bounds of what it compares.
 
-    Args:
+    Attributes:
         group: The group.
-        steps: Those of its constraints.
-        observed: Values of features, as arrays that broadcast against each other.
-        tolerance: Per feature.
-
-    Returns:
-        A boolean or a boolean array of the broadcast shape; False only where no solution exists.
+        steps: In which its constraints are evaluated.
+        given: The bounds of what no label tells anything of, by the ids of nodes: they are found once.
     """
 
-    def seen(node: Feature) -> IntervalValue[FloatOrArray]:
-        return _bounds(observed(node.object, node.property))
+    group: Group
+    steps: Steps
+    given: Mapping[int, IntervalValue[FloatOrArray]]
 
-    with np.errstate(all="ignore"):
-        known = interpret(steps, IntervalDomain(ARRAYS, seen, slack=SLACK, boxed=False))
-        result: FloatOrArray = True
-        for item in group.constraints:
-            if isinstance(item, Comparison):
-                answer = _reachable(item, observed(item.object, item.property), known, tolerance)
-            else:
-                answer = can_hold(known[id(item.expression)])
-            result = answer if result is True else np.logical_and(result, answer)
-    return result
+    @classmethod
+    def of(cls, group: Group) -> Relaxation:
+        """The relaxation of a group."""
+        roots = [item.expression for item in group.constraints]
+        domain: IntervalDomain[FloatOrArray] = IntervalDomain(ARRAYS, slack=SLACK, boxed=False)
+        given: dict[int, IntervalValue[FloatOrArray]] = {}
+        for step in steps_of(*roots):
+            node, below = step
+            # the bounds of all options do not hang on which of them is meant
+            needed = below[1:] if isinstance(node, Select) else below
+            if not isinstance(node, Feature) and all(id(each) in given for each in needed):
+                known = {id(each): given.get(id(each)) for each in below}
+                given[id(node)] = interpret((step,), domain, known)[id(node)]
+        return cls(group, steps_of(*roots, known=given), given)
+
+    def possible(self, observed: Observed, tolerance: Tolerance) -> FloatOrArray:
+        """For which candidates of its roles the group may be satisfiable.
+
+        Args:
+            observed: Values of features, as arrays that broadcast against each other.
+            tolerance: Per feature.
+
+        Returns:
+            A boolean or a boolean array of the broadcast shape; False only where no solution exists.
+        """
+
+        def seen(node: Feature) -> IntervalValue[FloatOrArray]:
+            return _bounds(observed(node.object, node.property))
+
+        with np.errstate(all="ignore"):
+            known = interpret(self.steps, IntervalDomain(ARRAYS, seen, slack=SLACK, boxed=False), self.given)
+            result: FloatOrArray = True
+            for item in self.group.constraints:
+                if isinstance(item, Comparison):
+                    answer = _reachable(item, observed(item.object, item.property), known, tolerance)
+                else:
+                    answer = can_hold(known[id(item.expression)])
+                result = answer if result is True else np.logical_and(result, answer)
+        return result
 
 
 def _bounds(seen: FloatOrArray | tuple[FloatOrArray, FloatOrArray] | None) -> IntervalValue[FloatOrArray]:

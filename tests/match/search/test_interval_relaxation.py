@@ -9,9 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scenicq.compiler.program import compile_scenario
+from scenicq.errors import Source
+from scenicq.forest.interpret import interpret, steps_of
+from scenicq.forest.interval_ends import ARRAYS
 from scenicq.forest.interval_values import Interval, IntervalVector
+from scenicq.forest.intervals import IntervalDomain
+from scenicq.forest.nodes import Constant
 from scenicq.geometry.angles import distance
-from scenicq.match.search.interval_relaxation import within_margin
+from scenicq.geometry.default_street import street
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.constraints import build_groups, relevant_properties
+from scenicq.match.problem.preprocess import ready
+from scenicq.match.search.interval_relaxation import Relaxation, within_margin
 from scenicq.match.tolerance import SLACK, Margin
 
 NUMBERS = st.floats(-8, 8, allow_nan=False)
@@ -47,3 +57,19 @@ def test_a_point_is_near_a_box_where_it_is_within_reach_of_it_along_both_axes(le
     excess = max(left - x, x - left - wide, low - y, y - low - high) - size - SLACK
     if abs(excess) > CLOSE:
         assert bool(within_margin(box, (x, y), Margin("disc", size, size))) == (excess < 0)
+
+
+def test_bounds_that_no_label_changes_are_found_once():
+    """A look-up among many lanes costs a label no step for each of them."""
+    text = "model scenic.domains.driving.model\nego = new Car on road\nnew Car on ego.lane, facing Range(-9, 9) deg\n"
+    scenario = ready(compile_scenario(Source("p.scenic", text), street()))
+    groups = build_groups(scenario, tuple(relevant_properties(scenario, MatchOptions())), MatchOptions())
+    relaxations = [Relaxation.of(group) for group in groups]
+    assert any(len(each.given) > 3 for each in relaxations)
+    for relaxation in relaxations:
+        roots = [item.expression for item in relaxation.group.constraints]
+        plain = interpret(steps_of(*roots), IntervalDomain(ARRAYS, slack=SLACK, boxed=False))
+        for node, _ in relaxation.steps:
+            assert not isinstance(node, Constant)
+        for each, bounds in relaxation.given.items():
+            assert bounds == plain[each]
