@@ -86,14 +86,12 @@ class HiddenRuns:
         scenario: The scenario.
         match: Options of the matcher.
         solver: Decides what is not decided otherwise.
-        every: Whether all matches of a start are wanted, not only the longest.
     """
 
     machine: RunMachine
     scenario: Scenario
     match: MatchOptions
     solver: Solver | None
-    every: bool = False
 
     def follow(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
@@ -165,9 +163,8 @@ class HiddenRuns:
         best[order[firsts]] = True
         for each in cast("list[int]", matches[new].tolist()):
             start, end = int(pieces.of[each]), int(runs.ends[each])
-            if best[each] or self.every:
-                found.details[numbers[start], end] = "", _witness(hidden, pieces, each)
-            if not best[each] and self.every:
+            found.details[numbers[start], end] = "", _witness(hidden, pieces, each)
+            if not best[each]:
                 found.others.append((start, end, int(TRUE)))
         return found
 
@@ -179,14 +176,8 @@ class HiddenRuns:
         with np.errstate(invalid="ignore"):
             narrow: NDArray[np.bool_] = pieces.high - pieces.low <= _THIN * (1 + np.abs(pieces.low))
         thin = np.any(narrow, axis=1)
-        runs, found = pieces.runs, np.zeros(len(stretches.starts), np.int64)
-        # the longest first: what is shorter than one that is sure is not asked for
-        for each in np.lexsort((-runs.ends, pieces.of)).tolist() if (thin & (runs.truth == TRUE)).any() else ():
-            if runs.truth[each] != TRUE or (found[pieces.of[each]] and not self.every):
-                continue
-            found[pieces.of[each]] = 1
-            if not thin[each]:
-                continue
+        runs = pieces.runs
+        for each in np.flatnonzero(thin & (runs.truth == TRUE)).tolist():
             look()
             start = int(pieces.of[each])
             one = stretches.alone(start)
@@ -195,7 +186,6 @@ class HiddenRuns:
             first = int(stretches.starts[start]) - int(one.starts[0])
             if run.truth != TRUE or run.end + first != runs.ends[each]:
                 runs.truth[each] = FALSE
-                found[start] = 0
 
     def _by_examples(
         self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: Remembered, unclear: str
@@ -224,10 +214,9 @@ class HiddenRuns:
         outcomes = [*(outcomes or ()), *(ExampleOutcome(decide(each.truth), each) for each in asked.found)]
         proven = [(each.run, ("", each.example.witness)) for each in outcomes if each.run.truth == TRUE]
         proven.sort(key=lambda each: -each[0].end)
-        told = _one_each(proven, every=self.every)
+        told = _one_each(proven)
         ends = {run.end for run, _ in told}
-        further = [each for each in undecided if each[0].end not in ends] if self.every else []
-        return [*told, *_one_each(further, every=True)] if told else [none]
+        return [*told, *_one_each([each for each in undecided if each[0].end not in ends])] if told else [none]
 
     def _run(self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], known: Mapping[int, Truth]) -> Run:
         """The run of one start, given some conditions at each sample."""
@@ -266,7 +255,7 @@ class HiddenRuns:
         ranked = [(pieces.runs.run(each, place), each) for each in cast("list[int]", group.tolist())]
         for (truth, _), some in groupby(ranked, key=lambda each: (each[0].truth, each[0].end)):
             same = list(some)
-            if truth == FALSE or (found and (truth == UNKNOWN or not self.every)):
+            if truth == FALSE or (found and truth == UNKNOWN):
                 break
             within = _within(hidden, pieces, joint, [each for _, each in same])
             finding = examine_start(self.scenario, self.match, self.solver, start, within)
@@ -283,11 +272,10 @@ class HiddenRuns:
         return found or [undecided or (replace(run, truth=int(FALSE)), ("", _witness(hidden, pieces, last)))]
 
 
-def _one_each(matches: Sequence[tuple[Run, *_Rest]], *, every: bool) -> list[tuple[Run, *_Rest]]:
-    """The matches of one start, the longest first, one for each end, or the first alone."""
+def _one_each(matches: Sequence[tuple[Run, *_Rest]]) -> list[tuple[Run, *_Rest]]:
+    """The matches of one start, the longest first, one for each end."""
     found = {each[0].end: each for each in reversed(matches)}
-    ordered = sorted(found.values(), key=lambda each: -each[0].end)
-    return ordered if every else ordered[:1]
+    return sorted(found.values(), key=lambda each: -each[0].end)
 
 
 def _values(hidden: HiddenConditions, pieces: Pieces, number: int) -> dict[Identity, Value]:

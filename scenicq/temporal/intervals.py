@@ -209,8 +209,7 @@ class IntervalMatcher:
     ) -> _Found:  # fmt: skip
         assert program.machine is not None
         if random_variables(expanded):
-            every = self.options.intervals == "all"
-            hidden = HiddenRuns(program.machine, program.scenario, self.match, self.solver, every)
+            hidden = HiddenRuns(program.machine, program.scenario, self.match, self.solver)
             return _found(stretches, table, columns, hidden.follow(stretches, columns, expanded, remember))
         runs = follow_runs(program.machine, stretches, columns.reader(expanded))
         return _found(stretches, table, columns, HiddenFound(runs))

@@ -87,7 +87,7 @@ def random_condition(draw: random.Random, roles: list[str], hidden: bool) -> Con
         case "distance":
 
             def near(s: Situation, k: int) -> bool | None:
-                p, q = place(s, k, role), place(s, k, other)
+                p, q = (place(s, k, role), place(s, k, other)) if role != other else ((0.0, 0.0), (0.0, 0.0))
                 return None if p is None or q is None else math.dist(p, q) < abs(number) + 2.1
 
             return Condition(f"((distance from {role} to {other}) < {abs(number) + 2.1})", near)
