@@ -32,7 +32,7 @@ from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 from scenicq.geometry.shapes import XY, Bounds
 from scenicq.geometry.terms import overlap, terms
 
-__all__ = ["bounds", "contains", "contains_many", "distance", "nearest_point", "parts_near"]
+__all__ = ["bounds", "contains", "contains_many", "distance", "may_be_within", "nearest_point", "parts_near"]
 
 _FIRST_REACH = 32.0
 _LAST_REACH = 1e8
@@ -101,6 +101,36 @@ def contains_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
             doubtful = doubtful[contains_many(region.removed, xy[doubtful])]
             result[doubtful] = [contains(region, x, y) for x, y in xy[doubtful].tolist()]
             return result
+        case _:
+            assert_never(region)
+
+
+def may_be_within(region: Region, xy: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
+    """Whether a region may come within a distance of points of shape (n, 2); false only where it does not.
+
+    Args:
+        region: The region.
+        xy: The points.
+        reach: Metres, at least 0.
+    """
+    match region:
+        case Everywhere() | Nowhere():
+            return np.full(len(xy), isinstance(region, Everywhere))
+        case Disc() | Sector() | Rectangle():
+            return _to_shape(region, xy) <= reach + SLACK
+        case PolygonSet() | PolylineSet() | PointSet():
+            result = np.zeros(len(xy), dtype=bool)
+            result[shapes.tree_pairs_within(region.tree, shapes.points(xy), reach + SLACK)[0]] = True
+            return result
+        case UnionOf() | IntersectionOf():
+            several = isinstance(region, UnionOf)
+            result = np.full(len(xy), not several)
+            for part in region.parts:
+                open_ = np.flatnonzero(result != several)
+                result[open_] = may_be_within(part, xy[open_], reach)
+            return result
+        case DifferenceOf():
+            return may_be_within(region.base, xy, reach)
         case _:
             assert_never(region)
 

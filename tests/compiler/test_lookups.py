@@ -22,7 +22,8 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import EXACT
+from scenicq.match.search import group_plan
+from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
@@ -140,6 +141,38 @@ def test_every_method_gives_the_same_verdict() -> None:
                     for method in ("auto", "smt", "monolithic")
                 }
                 assert len(verdicts) == 1, (name, place, verdicts)
+
+
+def pushed(name: str, rng: random.Random) -> Label:
+    """A drawn scene whose objects are moved, by centimetres or metres, some of them into the intersection."""
+    scene, far = drawn(name, rng.randrange(40)), rng.choice([0.0, 0.2, 1.0, 5.0])
+
+    def moved(each: LabelObject) -> LabelObject:
+        x, y = each.x + rng.uniform(-far, far), each.y + rng.uniform(-far, far)
+        if rng.random() < 0.15:
+            x, y = rng.uniform(-8, 8), rng.uniform(-8, 8)
+        return replace(each, x=x, y=y, heading=each.heading + rng.choice([0.0, 0.0, rng.uniform(-0.1, 0.1)]))
+
+    return replace(scene, ego=moved(scene.ego), objects=tuple(map(moved, scene.objects)))
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.one_in(4)
+def test_labels_side_by_side_are_decided_as_each_by_itself(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = random.Random(name)
+    labels = [pushed(name, rng) for _ in range(24)]
+    options = MatchOptions(tolerance=parse_tolerance("position=0.25,heading=5deg"))
+    together = Matcher(scenario(name), options)
+    found = list(together.match_all([(each, None) for each in labels]))
+    if name in ("own lane", "same lane", "road", "numbers"):
+        assert together.plans.first_fits([(each, None) for each in labels], {})
+    monkeypatch.setattr(group_plan, "closed_form_of", lambda *_: None)
+    matcher = Matcher(scenario(name), options)
+    for each, verdict in zip(labels, found, strict=True):
+        right = matcher.match(each)
+        assert type(verdict) is type(right), (each, verdict, right)
+        if isinstance(verdict, Match) and isinstance(right, Match):
+            assert verdict.correspondence == right.correspondence
 
 
 CROSSED = (1.75, -1.75)

@@ -52,13 +52,14 @@ class ClosedForm:
     """A group's closed form.
 
     Attributes:
-        constraint: Its one constraint.
+        constraint: Its first constraint, of most groups the only one.
         evaluate: From the observed values, tolerance and radius, and what is known of the map, to what is clear.
             It may raise `UnclearError` or `CannotEvaluate`, of columns where single values would do.
         field: The field that it asks at the position of `index`.
         regions: The regions that it asks for the position of `index`.
         index: The object whose position matters to field or regions.
         detail: What a refutation says.
+        parts: The closed forms of which it is made, if it is of several constraints.
     """
 
     constraint: Comparison | Condition
@@ -67,6 +68,7 @@ class ClosedForm:
     regions: tuple[Region, ...] = ()
     index: int = -1
     detail: Callable[[Get, MapLookups], str] | None = None
+    parts: tuple[ClosedForm, ...] = ()
 
     def decide(self, get: Get, options: MatchOptions, lookups: MapLookups) -> Outcome | None:
         """Decide one assignment.
@@ -83,6 +85,9 @@ class ClosedForm:
         if found.holds:
             return Satisfied(cast("Mapping[Identity, Value]", found.values))
         if found.fails:
+            for part in self.parts:
+                if part.evaluate_one(get, options, lookups).fails:
+                    return part.decide(get, options, lookups)
             try:
                 return Refuted(self.constraint, "" if self.detail is None else self.detail(get, lookups))
             except (UnclearError, CannotEvaluate):

@@ -1,15 +1,30 @@
-"""The closed form of a group, if it has one: of one comparison with independent random variables, or one condition."""
+"""The closed form of a group, if it has one: of comparisons with independent random variables, and of conditions.
+
+Where elements of the map overlap, a random rank says which of them is meant at a place (`geometry/occupancy`), and ties
+together all that looks something up there. At a place with one element the rank does not matter, so that a group which
+only a rank ties together is decided constraint by constraint; at any other place nothing is said.
+"""
 
 from __future__ import annotations
 
-from scenicq.forest.groups import PARAMS, Condition, Group
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.forest.columns import DEFINED, Column, constant_column, truth_of
+from scenicq.forest.groups import PARAMS, Condition, Constraint, Group
+from scenicq.forest.interpret import Steps, interpret, steps_of
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import PointIn
+from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Node, PointIn, Select, Value
+from scenicq.forest.walk import children, leaves, postorder
+from scenicq.match.decide.clear_columns import ClearColumns
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.closed_numbers import heading, number, text
 from scenicq.match.decide.closed_positions import known_vector, offset, point_in
-from scenicq.match.decide.compiled_expressions import VECTORS, truth
-from scenicq.match.decide.range_forms import Get
+from scenicq.match.decide.compiled_expressions import VECTORS, CompiledExpressions, element_field, truth
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, Scalar
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import MapLookups
 
@@ -23,30 +38,118 @@ def closed_form_of(group: Group, ego: int) -> ClosedForm | None:
         group: The group.
         ego: Index of the object around which the radius is.
     """
-    if len(group.constraints) != 1:
+    ranked = _ranked(group)
+    chosen = {index.identity: 0.0 for index, _ in ranked}
+    forms: list[ClosedForm] = []
+    used: set[Identity] = set()
+    for item in group.constraints:
+        form, own = _form_of(item, ego, chosen), {leaf.identity for leaf in leaves(item.expression)} - chosen.keys()
+        if form is None or used & own:
+            return None
+        used |= own
+        forms.append(form)
+    if not forms:
         return None
-    item = group.constraints[0]
+    return _where_alone(forms, ranked) if ranked else forms[0] if len(forms) == 1 else None
+
+
+def _form_of(item: Constraint, ego: int, chosen: Mapping[Identity, float]) -> ClosedForm | None:
     if isinstance(item, Condition):
-        return _condition(item)
+        return _condition(item, chosen)
     if item.object == PARAMS:
         return None
     node = item.expression
     if item.property == "heading":
-        return heading(item)
+        return heading(item, chosen)
     if item.property in VECTORS:
         if isinstance(node, PointIn) and item.property == "position":
-            return point_in(item, node, ego)
+            return point_in(item, node, ego, chosen)
         return known_vector(item) or offset(item)
-    return number(item) if kind_of(node) == "scalar" else text(item)
+    return number(item, chosen) if kind_of(node) == "scalar" else text(item)
 
 
-def _condition(item: Condition) -> ClosedForm | None:
-    holds = truth(item.expression)
+def _condition(item: Condition, chosen: Mapping[Identity, float]) -> ClosedForm | None:
+    holds = truth(item.expression, chosen)
     if holds is None:
         return None
+    known = {
+        id(node): constant_column(node.value) for node in postorder([item.expression]) if isinstance(node, Constant)
+    }
+    steps = steps_of(item.expression, known=known)
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        if isinstance(get, Columns):
+            return _of_columns(item.expression, steps, known, get, chosen)
         found = holds(get)
         return Evaluated(found, not found, {})
 
     return ClosedForm(item, evaluate, detail=lambda get, lookups: "does not hold")
+
+
+def _of_columns(
+    root: Node, steps: Steps, known: Mapping[int, Column], get: Columns, chosen: Mapping[Identity, float]
+) -> Evaluated:  # fmt: skip
+    """A condition of many labels; nothing is said where it has no value, or rounding may decide."""
+
+    def observed(node: Feature) -> Column:
+        return Column(cast("NDArray[np.float64]", get(node.object, node.property)), np.full(1, DEFINED))
+
+    def first(_: DirectionAt, allowed: NDArray[np.intp]) -> NDArray[np.intp]:
+        return np.zeros_like(allowed)
+
+    domain = ClearColumns(observed, lambda leaf, _: constant_column(chosen[leaf.identity]), first)
+    data, status = interpret(steps, domain, known)[id(root)]
+    held, told = (np.broadcast_to(each, get.size) for each in (truth_of(data), np.equal(status, DEFINED)))
+    return Evaluated((held & told).tolist(), (~held & told).tolist(), {})
+
+
+def _ranked(group: Group) -> list[tuple[Index, Select]]:
+    """The choices of a group that only say which of the elements at a place is meant, with the look-ups they are in."""
+    looked_up: list[tuple[Index, Select]] = []
+    others: set[Identity] = set()
+    for node in postorder([item.expression for item in group.constraints]):
+        if isinstance(node, Select) and isinstance(node.index, Index) and all(map(_is_element, node.options)):
+            looked_up.append((node.index, node))
+        else:
+            others |= {each.identity for each in children(node) if isinstance(each, Index)}
+    return [(index, node) for index, node in looked_up if index.identity not in others]
+
+
+def _is_element(node: Node) -> bool:
+    """Whether a number says which element lies at a place."""
+    return any(element_field(each) is not None for each in children(node))
+
+
+def _where_alone(forms: Sequence[ClosedForm], ranked: Sequence[tuple[Index, Select]]) -> ClosedForm | None:
+    """All of some closed forms, where one element alone lies at each place that is looked up."""
+    numbers: list[list[Scalar]] = []
+    for index, node in ranked:
+        made = [CompiledExpressions({index.identity: float(rank)}).exact(node) for rank in range(len(index.weights))]
+        known = [cast(Scalar, each) for each in made if each is not None]
+        if len(known) < len(made):
+            return None
+        numbers.append(known)
+
+    def alone(get: Get) -> NDArray[np.bool_]:
+        found = np.ones(1, np.bool_)
+        for ranks in numbers:
+            first, *others = [np.asarray(each(get)) for each in ranks]
+            for other in others:
+                found = found & (first == other)
+        return found
+
+    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        known, values = alone(get), dict[Identity, Value | FloatColumn | list[Value]]()
+        holds, fails = known, np.zeros(1, np.bool_)
+        for form in forms:
+            found = form.evaluate(get, options, lookups)
+            holds, fails = holds & np.asarray(found.holds), fails | (known & np.asarray(found.fails))
+            values |= found.values
+        values |= {index.identity: 0.0 for index, _ in ranked}
+        if isinstance(get, Columns):
+            truths = [np.broadcast_to(each, get.size).tolist() for each in (holds, fails)]
+            return Evaluated(truths[0], truths[1], values)
+        return Evaluated(bool(holds[0]), bool(fails[0]), values)
+
+    asking = next((form for form in forms if form.index >= 0), forms[0])
+    return ClosedForm(forms[0].constraint, evaluate, asking.field, asking.regions, asking.index, parts=tuple(forms))

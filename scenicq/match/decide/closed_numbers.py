@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import postorder
+from scenicq.geometry.fields import VectorField
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
@@ -40,24 +41,29 @@ class _Case(NamedTuple):
     form: Form
 
 
-def _cases(root: Node) -> list[_Case]:
-    """The ways in which the choices of an expression come out; none where there are many, or one has no form."""
-    indices = [node for node in postorder((root,)) if isinstance(node, Index)]
+def _cases(root: Node, known: Mapping[Identity, float]) -> list[_Case]:
+    """The ways in which the choices of an expression come out; none where there are many, or one has no form.
+
+    Args:
+        root: The expression.
+        known: The number of the option of choices that are no cases.
+    """
+    indices = [node for node in postorder((root,)) if isinstance(node, Index) and node.identity not in known]
     if math.prod(len(node.weights) for node in indices) > LIMITS.closed_form_choices:
         return []
     cases: list[_Case] = []
     for picked in itertools.product(*(range(len(node.weights)) for node in indices)):
         chosen = {node.identity: float(option) for node, option in zip(indices, picked, strict=True)}
-        form = CompiledExpressions(chosen).form(root)
+        form = CompiledExpressions({**known, **chosen}).form(root)
         if form is None:
             return []
         cases.append(_Case(cast("dict[Identity, Value]", chosen), form))
     return cases
 
 
-def number(item: Comparison) -> ClosedForm | None:
-    """A number that is no heading."""
-    cases, index, name = _cases(item.expression), item.object, item.property
+def number(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | None:
+    """A number that is no heading, given the number of the option of some choices."""
+    cases, index, name = _cases(item.expression, known), item.object, item.property
     if not cases or any(case.form.fields for case in cases):
         return None
 
@@ -116,31 +122,34 @@ def text(item: Comparison) -> ClosedForm | None:
     return ClosedForm(item, evaluate, detail=lambda get, _: unlike(name, options[0][1], get(index, name)))
 
 
-def heading(item: Comparison) -> ClosedForm | None:
-    """A heading, possibly along the roads where something observed is."""
+def heading(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | None:
+    """A heading, possibly along the lanes or roads where something observed is.
+
+    Args:
+        item: The comparison.
+        known: The number of the option of choices that are no choices here.
+    """
     choices: list[tuple[dict[Identity, Value], Form, float, float]] = []
-    for chosen, form in _cases(item.expression):
+    for chosen, form in _cases(item.expression, known):
         middle = 0.0 if form.unbounded else (form.low + form.high) / 2
         choices.append((chosen, form, middle, (form.high - form.low) / 2))
     fields = {id(node): node for _, form, *_ in choices for node in form.fields}
     if not choices or len(fields) > 1 or any(len(form.fields) != len(fields) for _, form, *_ in choices):
         return None
     along = next(iter(fields.values()), None)
-    if along is not None and not _asks_for_roads(along):
+    directions = None if along is None else _directions(along, known)
+    if along is not None and directions is None:
         return None
     index, first = item.object, choices[0][1]
-    flow = cast(RoadDirection, cast(Constant, along.field).value) if along is not None else None
-    where = cast(Feature, along.point).object if along is not None else -1
-
-    def directions(get: Get, lookups: MapLookups) -> list[tuple[float, ...]]:
-        return lookups.allowed(cast(RoadDirection, flow), each_position(get(where, "position")))
+    flow = along.field.value if along is not None and isinstance(along.field, Constant) else None
+    where = cast(Feature, along.point).object if flow is not None and along is not None else -1
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         margin, seen = options.tolerance.of(index, "heading"), cast(float, get(index, "heading"))
         many, fails = isinstance(get, Columns), True
         if many and len(choices) > 1:
             raise UnclearError
-        allowed = None if flow is None else directions(get, lookups)
+        allowed = None if directions is None else directions(get, lookups)
         for chosen, form, middle, half in choices:
             rest = seen - form.known(get) - middle
             if isinstance(rest, np.ndarray) and allowed is None:
@@ -166,11 +175,11 @@ def heading(item: Comparison) -> ClosedForm | None:
         # what the cascade tries first is what it words
         if first.terms:
             return ""
-        direction = 0.0 if flow is None else directions(get, lookups)[0][0]
+        direction = 0.0 if directions is None else directions(get, lookups)[0][0]
         seen = cast(float, get(index, "heading"))
         return unlike("heading", first.known(get) + direction, seen)
 
-    return ClosedForm(item, evaluate, field=flow, index=where, detail=detail)
+    return ClosedForm(item, evaluate, field=cast("RoadDirection | None", flow), index=where, detail=detail)
 
 
 def _turn(angle: float, allowed: Sequence[float], half: float, sure: float) -> float:
@@ -194,11 +203,33 @@ def _turn(angle: float, allowed: Sequence[float], half: float, sure: float) -> f
     return nearest
 
 
-def _asks_for_roads(node: DirectionAt) -> bool:
-    """Whether a field is asked for the direction of roads at an observed position."""
-    return (
-        isinstance(node.field, Constant)
-        and isinstance(node.field.value, RoadDirection)
-        and isinstance(node.point, Feature)
-        and node.point.property == "position"
-    )
+def _directions(
+    node: DirectionAt, known: Mapping[Identity, float]
+) -> Callable[[Get, MapLookups], list[tuple[float, ...]]] | None:
+    """The directions of roads, or of the lane that is meant, at an observed position; None for other fields."""
+    if not isinstance(node.point, Feature) or node.point.property != "position":
+        return None
+    where = node.point.object
+    if isinstance(node.field, Constant) and isinstance(node.field.value, RoadDirection):
+        flow = node.field.value
+        return lambda get, lookups: lookups.allowed(flow, each_position(get(where, "position")))
+    number_ = CompiledExpressions(known).exact(node.field.index) if isinstance(node.field, Select) else None
+    if not isinstance(node.field, Select) or number_ is None:
+        return None
+    fields = [each.value for each in node.field.options if isinstance(each, Constant)]
+    if len(fields) < len(node.field.options):
+        return None
+
+    def directions(get: Get, lookups: MapLookups) -> list[tuple[float, ...]]:
+        places = each_position(get(where, "position"))
+        meant = np.rint(np.broadcast_to(np.asarray(number_(get)), len(places))).astype(np.intp)
+        found: list[tuple[float, ...]] = [()] * len(places)
+        for each in cast("list[int]", np.unique(meant).tolist()):
+            field, mine = fields[each], np.flatnonzero(meant == each).tolist()
+            if isinstance(field, VectorField):
+                values = field.values_many(np.array([places[place] for place in mine]))
+                for place, value in zip(mine, values, strict=True):
+                    found[place] = value
+        return found
+
+    return directions

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.groups import Comparison
-from scenicq.forest.nodes import PointIn, Rotate, Value, VectorOf, VectorSum
+from scenicq.forest.nodes import Identity, PointIn, Rotate, Value, VectorOf, VectorSum
 from scenicq.match.decide.closed_form import FAILS, ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
 from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Get, Scalar, clipped, spread, turned
@@ -23,15 +23,16 @@ from scenicq.match.tolerance import SLACK, Margin
 __all__ = ["known_vector", "offset", "point_in"]
 
 
-def point_in(item: Comparison, node: PointIn, ego: int) -> ClosedForm | None:
+def point_in(item: Comparison, node: PointIn, ego: int, chosen: Mapping[Identity, float]) -> ClosedForm | None:
     """A point of a region that is known once the label is.
 
     Args:
         item: The comparison of a position.
         node: Its expression.
         ego: Index of the object around which the radius is.
+        chosen: The number of the option of each choice.
     """
-    test, index = region_test(node.region), item.object
+    test, index = region_test(node.region, chosen), item.object
     if test is None:
         return None
 

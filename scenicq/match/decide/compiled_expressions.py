@@ -8,6 +8,8 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
+import numpy as np
+
 from scenicq.forest.compute import compute
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.kinds import as_kind
@@ -35,6 +37,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.limits import LIMITS
 from scenicq.match.decide.range_forms import (
     Columns,
@@ -48,25 +51,37 @@ from scenicq.match.decide.range_forms import (
 )
 from scenicq.match.linear.affine_reach import ends
 
-__all__ = ["VECTORS", "CompiledExpressions", "truth"]
+__all__ = ["VECTORS", "CompiledExpressions", "element_field", "truth"]
 
 _NUMBERS = frozenset({"heading", "width", "length", "height", "speed"})
 VECTORS = frozenset({"position", "velocity"})
 """Properties that are numbers and pairs wherever they are observed."""
 
 
-def truth(root: Node) -> Callable[[Get], bool] | None:
+def truth(root: Node, chosen: Mapping[Identity, float]) -> Callable[[Get], bool] | None:
     """A condition on what is observed alone as a function of it, which raises `UnclearError` where it has no value.
 
-    None if anything about it is random or it takes too many steps.
+    None if anything else about it is random or it takes too many steps.
+
+    Args:
+        root: The condition.
+        chosen: The number of the option of each choice.
     """
     made: dict[int, Callable[[Get], Value]] = {}
     steps: dict[int, int] = {}
     for node in postorder((root,)):
         below = children(node)
-        steps[id(node)] = 1 + sum([steps[id(child)] for child in below])
-        if is_leaf(node) or isinstance(node, DirectionAt) or steps[id(node)] > LIMITS.closed_form_terms:
+        # one option is read, whichever it is
+        counted = [steps[id(child)] for child in below]
+        steps[id(node)] = 1 + (counted[0] + max(counted[1:]) if isinstance(node, Select) else sum(counted))
+        known = isinstance(node, Index) and node.identity in chosen
+        if (is_leaf(node) and not known) or (isinstance(node, DirectionAt) and element_field(node) is None):
             return None
+        if steps[id(node)] > LIMITS.closed_form_terms:
+            return None
+        if isinstance(node, Index):
+            made[id(node)] = _constant(chosen[node.identity])
+            continue
         if isinstance(node, Feature) and node.object == PARAMS:
             return None
         made[id(node)] = _computed(node, [made[id(child)] for child in below])
@@ -74,12 +89,40 @@ def truth(root: Node) -> Callable[[Get], bool] | None:
     return lambda get: bool(whole(get))
 
 
+def element_field(node: Node) -> ElementAtPoint | None:
+    """The field that a node asks which element lies at a point, if it does."""
+    if isinstance(node, DirectionAt) and isinstance(node.field, Constant):
+        return node.field.value if isinstance(node.field.value, ElementAtPoint) else None
+    return None
+
+
+def _constant(value: Value) -> Callable[[Get], Value]:
+    return lambda _: value
+
+
+def _element_at(field: ElementAtPoint, point: CompiledVector) -> Scalar:
+    """The number, as an angle, of the element that lies at a point; of columns, a column."""
+
+    def angle(get: Get) -> float:
+        x, y = point(get)
+        if isinstance(get, Columns):
+            xy = np.column_stack([np.broadcast_to(np.asarray(each), get.size) for each in (x, y)])
+            return cast(float, np.array([each for (each,) in field.values_many(xy)]))
+        return field.values(x, y)[0]
+
+    return angle
+
+
 def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[Get], Value]:
     """A node's own meaning as a function of what is observed."""
     match node:
         case Constant():
-            value = node.value
-            return lambda _: value
+            return _constant(node.value)
+        case DirectionAt() if (field := element_field(node)) is not None:
+            return cast("Callable[[Get], Value]", _element_at(field, cast(CompiledVector, args[1])))
+        case Select():
+            which, *options = args
+            return lambda get: options[int(cast(float, which(get)))](get)
         case Feature(object=index, property=name) if name in VECTORS | _NUMBERS:
             return lambda get: get(index, name)
         case Feature(object=index, property=name):
@@ -121,8 +164,17 @@ class CompiledExpressions:
                 below = children(node)
                 steps = self._steps[id(node)] = 1 + sum([self._steps[id(child)] for child in below])
                 args = [self._exact[id(child)] for child in below]
-                self._exact[id(node)] = _exact(node, args) if steps <= LIMITS.closed_form_terms else None
+                self._exact[id(node)] = self._exactly(node, args) if steps <= LIMITS.closed_form_terms else None
         return self._exact[id(root)]
+
+    def _exactly(self, node: Node, args: list[Exact | None]) -> Exact | None:
+        match node:
+            case Index():
+                return cast(Exact, _constant(self._chosen[node.identity])) if node.identity in self._chosen else None
+            case Select(index=Index() as index):
+                return args[1 + int(self._chosen[index.identity])] if index.identity in self._chosen else None
+            case _:
+                return _exact(node, args)
 
     def form(self, root: Node) -> Form | None:
         """A scalar as a form; None if it is none."""
@@ -150,7 +202,7 @@ class CompiledExpressions:
             case Normal():
                 fixed = isinstance(node.mean, Constant) and isinstance(node.deviation, Constant)
                 return Form(terms={node.identity: (1.0, -math.inf, math.inf)}) if fixed else None
-            case DirectionAt():
+            case DirectionAt() if element_field(node) is None:
                 return Form(fields=(node,))
             case Arithmetic() if all(arg is not None for arg in args):
                 found = _combined(node.op, cast("list[Form]", args))
@@ -159,7 +211,7 @@ class CompiledExpressions:
             case _:
                 pass
         exact = self._exact[id(node)]
-        is_scalar = isinstance(node, Arithmetic | Coordinate | Norm | Bearing) or (
+        is_scalar = isinstance(node, Arithmetic | Coordinate | Norm | Bearing | DirectionAt) or (
             isinstance(node, Feature) and node.kind == "scalar"
         )
         return Form(parts=((1.0, cast(Scalar, exact)),)) if exact is not None and is_scalar else None
@@ -201,6 +253,8 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
                 return get(index, name)
 
             return cast(Exact, observed) if fits else None
+        case DirectionAt() if (field := element_field(node)) is not None and args[1] is not None:
+            return cast(Exact, _element_at(field, cast(CompiledVector, args[1])))
         case _ if any(arg is None for arg in args):
             return None
         case Arithmetic():

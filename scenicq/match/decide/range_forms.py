@@ -62,6 +62,15 @@ class Columns:
         """The column, passed off as a value."""
         return cast(Value, self._column(index, name))
 
+    def some(self, which: NDArray[np.intp]) -> Columns:
+        """The same of some of the labels, by their numbers."""
+
+        def column(index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
+            found = self._column(index, name)
+            return (found[0][which], found[1][which]) if isinstance(found, tuple) else found[which]
+
+        return Columns(len(which), column)
+
 
 def turned(angle: float) -> tuple[float, float]:
     """Cosine and sine; of a column, columns."""

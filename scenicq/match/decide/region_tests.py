@@ -5,7 +5,7 @@ A position that surely lies in a region is a point of it. Within tolerance of th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias, cast
 
@@ -15,22 +15,24 @@ from numpy.typing import NDArray
 from scenicq.forest.nodes import (
     Constant,
     DiscAt,
+    Identity,
     Node,
     RectangleAt,
     RegionDifference,
     RegionIntersection,
     RegionUnion,
     SectorAt,
+    Select,
     Value,
 )
 from scenicq.forest.walk import children, postorder
-from scenicq.geometry.membership import distance
+from scenicq.geometry.membership import distance, may_be_within
 from scenicq.geometry.regions import Disc, Rectangle, Region, Sector
 from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, Exact, Get
+from scenicq.match.decide.range_forms import Columns, Exact, Get, Scalar
 from scenicq.match.problem.map_lookups import XY, MapLookups
 
 __all__ = ["RegionTest", "region_test"]
@@ -55,17 +57,26 @@ class RegionTest:
     regions: tuple[Region, ...]
 
 
-def region_test(root: Node) -> RegionTest | None:
-    """The test of a region; None if something about it is random, or it is made of too many."""
-    formulas = CompiledExpressions({})
+def region_test(root: Node, chosen: Mapping[Identity, float]) -> RegionTest | None:
+    """The test of a region; None if something else about it is random, or it is made of too many.
+
+    Args:
+        root: The region.
+        chosen: The number of the option of each choice.
+    """
+    formulas = CompiledExpressions(chosen)
     made: dict[int, _Test | None] = {}
     regions: dict[int, Region] = {}
     parts = 0
+    options = {id(option) for node in postorder((root,)) if isinstance(node, Select) for option in node.options}
     for node in postorder((root,)):
         match node:
             case Constant() if isinstance(node.value, Region):
-                regions[id(node.value)] = node.value
+                if id(node) not in options:
+                    regions[id(node.value)] = node.value
                 made[id(node)] = _constant(node.value)
+            case Select() if (number := formulas.exact(node.index)) is not None:
+                made[id(node)] = _selected(cast(Scalar, number), [made.get(id(option)) for option in node.options])
             case DiscAt() | SectorAt() | RectangleAt():
                 made[id(node)] = _placed(node, [formulas.exact(child) for child in children(node)])
             case RegionUnion() | RegionIntersection() | RegionDifference():
@@ -81,12 +92,31 @@ def region_test(root: Node) -> RegionTest | None:
 
 def _constant(region: Region) -> _Test:
     def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
-        # how far off a place is, is not looked up
-        if isinstance(get, Columns):
-            held = np.array(lookups.within(region, each_position(position)), dtype=np.bool_)
-            return held, ~held if reach <= 0 else np.zeros(get.size, dtype=np.bool_)
-        (within,) = lookups.within(region, [cast(XY, position)])
-        return within, not within and reach <= 0
+        places = each_position(position)
+        held = np.array(lookups.within(region, places), dtype=np.bool_)
+        missed = np.zeros(len(places), dtype=np.bool_)
+        missed[~held] = ~may_be_within(region, np.array(places)[~held], reach)
+        return (held, missed) if isinstance(get, Columns) else (bool(held[0]), bool(missed[0]))
+
+    return test
+
+
+def _selected(number: Scalar, tests: list[_Test | None]) -> _Test:
+    """Each place in the region that is meant there; nothing is said where that is none or has no test."""
+
+    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+        if not isinstance(get, Columns):
+            one = tests[round(number(get))]
+            return (False, False) if one is None else one(get, position, lookups, reach)
+        meant = np.rint(np.broadcast_to(np.asarray(number(get)), get.size)).astype(np.intp)
+        held, missed = np.zeros((2, get.size), dtype=np.bool_)
+        for option in cast("list[int]", np.unique(meant).tolist()):
+            one, mine = tests[option], np.flatnonzero(meant == option)
+            if one is not None:
+                x, y = cast("tuple[NDArray[np.float64], NDArray[np.float64]]", position)
+                some = get.some(mine)
+                held[mine], missed[mine] = one(some, cast(Value, (x[mine], y[mine])), lookups, reach)
+        return held, missed
 
     return test
 

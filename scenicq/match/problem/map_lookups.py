@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenicq.geometry.membership import contains, contains_many
+from scenicq.geometry.membership import contains_many
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
 
@@ -48,15 +48,11 @@ class MapLookups:
     def allowed(self, one: RoadDirection, places: Sequence[XY]) -> list[tuple[float, ...]]:
         """The headings that a field allows at places."""
         known = self.directions.setdefault(one, {})
-        for place in places:
-            if place not in known:
-                known[place] = one.values(*place)
+        self.look_up((one,), (), [place for place in places if place not in known])
         return [known[place] for place in places]
 
     def within(self, region: Region, places: Sequence[XY]) -> list[bool]:
         """Which places lie in a region."""
         known = self.inside.setdefault(id(region), (region, {}))[1]
-        for place in places:
-            if place not in known:
-                known[place] = contains(region, *place)
+        self.look_up((), (region,), [place for place in places if place not in known])
         return [known[place] for place in places]

@@ -23,7 +23,7 @@ EGO = Feature(0, "heading", "scalar")
 
 
 def closed(node):
-    found = heading(Comparison(1, "heading", node, None))
+    found = heading(Comparison(1, "heading", node, None), {})
     assert found is not None
     return found
 
