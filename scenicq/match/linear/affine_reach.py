@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -21,6 +21,7 @@ import shapely
 from scenicq.forest.nodes import Constant, Identity, Leaf, Normal, PointIn, Range, TruncatedNormal, Value
 from scenicq.geometry.proximity import meets, witness_point
 from scenicq.geometry.regions import Region
+from scenicq.geometry.shapes import XY, Coordinates
 from scenicq.limits import LIMITS
 from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis
 from scenicq.match.tolerance import ROUNDING, Margin
@@ -29,6 +30,8 @@ __all__ = ["Reach", "ends", "reach_heading", "reach_number", "reach_position"]
 
 _SIMILAR = 1e-12
 """How far a matrix may be from a similarity, relative to its scale."""
+_FLAT = 1e-9
+"""How thin places may lie along a line, relative to its length, to count as on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +158,7 @@ def reach_position(
     if shapely.distance(hull, shape) > radius + ROUNDING:
         return _NO
     target = shapely.shortest_line(hull, shape).coords[0]
-    return Reach(True, _solve(form, scalars, bounded, target))
+    return Reach(True, _between_corners(scalars, corners, places, (target[0], target[1])))
 
 
 def _offset(form: AffineVector, variables: list[VariableAxis], values: tuple[float, ...]) -> tuple[float, float]:
@@ -202,36 +205,41 @@ def _from_region(
     reached = [(float(px + moved[0]), float(py + moved[1])) for px, py in offsets]
     hull = shapely.MultiPoint(reached).convex_hull
     target = shapely.shortest_line(hull, shape).coords[0]
-    limits = [(min(c[i] for c in corners), max(c[i] for c in corners)) for i in range(len(scalars))]
-    values = _solve(form, scalars, limits, target, (leaf.identity, point))
-    return Reach(True, values)
+    values = _between_corners(scalars, corners, np.array(reached), (target[0], target[1]))
+    return Reach(True, {leaf.identity: point, **values})
 
 
-def _solve(
-    form: AffineVector,
-    scalars: list[VariableAxis],
-    limits: list[tuple[float, float]],
-    target: tuple[float, ...],
-    point: tuple[Identity, tuple[float, float]] | None = None,
+def _between_corners(
+    scalars: Sequence[VariableAxis], corners: Sequence[tuple[float, ...]], places: Coordinates, target: XY
 ) -> dict[Identity, Value]:
-    """Values of the offsets that lead to a target inside the hull of the places of their corners."""
-    fixed: dict[Identity, Value] = {} if point is None else {point[0]: point[1]}
-    base = np.array([part.constant for part in form])
-    if point is not None:
-        for axis in (0, 1):
-            base += np.array([part.terms.get((point[0], axis), 0.0) for part in form]) * point[1][axis]
-    columns = np.array([[part.terms.get(v, 0.0) for v in scalars] for part in form])
-    low, high = (np.array([pair[i] for pair in limits]) for i in (0, 1))
-    values = (low + high) / 2
-    wanted = np.array(target[:2]) - base
-    # Bounded least squares by coordinate descent: few variables, and the target is reachable.
-    for _ in range(200):
-        for i in range(len(scalars)):
-            column = columns[:, i]
-            weight = float(column @ column)
-            if weight:
-                rest = wanted - columns @ values + column * values[i]
-                values[i] = min(max(float(column @ rest) / weight, low[i]), high[i])
-        if (abs(columns @ values - wanted) <= 1e-10 + 1e-5 * abs(wanted)).all():
-            break
-    return fixed | {identity: float(value) for (identity, _), value in zip(scalars, values, strict=True)}
+    """Values of the offsets that lead to a target inside the hull of the places of their corners.
+
+    What lies between two or three places is reached by the values between their corners.
+    """
+    away, goal = places - places[0], np.array(target) - places[0]
+    along = np.linalg.svd(away)[2][0]
+    ahead, aside = away @ along, away @ np.array([-along[1], along[0]])
+    if np.ptp(aside) <= _FLAT * (1.0 + np.ptp(ahead)):
+        least, most = int(ahead.argmin()), int(ahead.argmax())
+        part = float(goal @ along - ahead[least]) / (float(np.ptp(ahead)) or 1.0)
+        chosen, shares = [least, most], np.array([1.0 - part, part])
+    else:
+        outline = shapely.get_coordinates(shapely.MultiPoint(away).convex_hull)[:-1]
+        hull = [int(np.hypot(*(away - each).T).argmin()) for each in outline]
+        found = [([hull[0], *ends], _shares(away[[hull[0], *ends]], goal)) for ends in itertools.pairwise(hull[1:])]
+        chosen, shares = max(found, key=lambda each: float(each[1].min()))
+    shares = np.clip(shares, 0.0, 1.0)
+    values = shares / shares.sum() @ np.array([corners[number] for number in chosen])
+    return {identity: float(value) for (identity, _), value in zip(scalars, values.tolist(), strict=True)}
+
+
+def _shares(triangle: Coordinates, point: Coordinates) -> Coordinates:
+    """The parts of three places of which a point is made: negative where it lies outside of their triangle."""
+    one, other = triangle[1:] - triangle[0]
+    away, area = point - triangle[0], float(one[0] * other[1] - one[1] * other[0])
+    if abs(area) <= _FLAT * float(np.hypot(*one) * np.hypot(*other)):
+        # what lies in it lies beside one that is wider
+        return np.array([-math.inf, 0.0, 0.0])
+    first = float(away[0] * other[1] - away[1] * other[0]) / area
+    second = float(one[0] * away[1] - one[1] * away[0]) / area
+    return np.array([1.0 - first - second, first, second])

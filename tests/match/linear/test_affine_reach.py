@@ -184,3 +184,16 @@ def test_what_is_no_similarity_is_not_decided():
     mirrored = (Affine(0.0, {(leaf.identity, 0): 1.0}), Affine(0.0, {(leaf.identity, 1): -1.0}))
     assert reach_position(mirrored, {leaf.identity: leaf}, (1.0, -1.0), Margin("disc", 0.1, 0.1)).possible
     assert reach_position(mirrored, {leaf.identity: leaf}, (1.0, 1.0), Margin("disc", 0.1, 0.1)).possible is False
+
+
+@pytest.mark.parametrize("slant", [1.0, 0.2, 0.05, 0.01])
+def test_offsets_that_are_said_lead_to_the_place_however_parallel_they_are(slant):
+    """`(slant * b, a + b)` in a disc: the closer to parallel, the slower they are found."""
+    a, b = (Range(build.constant(-20.0), build.constant(20.0)) for _ in range(2))
+    x, y = Affine(0.0, {(b.identity, 0): slant}), Affine(0.0, {(a.identity, 0): 1.0, (b.identity, 0): 1.0})
+    known = {leaf.identity: leaf for leaf in (a, b)}
+    for share in (-0.9, -0.3, 0.5, 1.0):
+        place = (20 * slant * share, 0.0)
+        found = reach_position((x, y), known, place, Margin("disc", 0.1 * slant, 0.1 * slant))
+        assert found.possible
+        assert math.dist((value_of(x, found.values), value_of(y, found.values)), place) <= 0.101 * slant
