@@ -9,6 +9,8 @@ from scenicq.compiler.unavailable import unavailable_name
 from scenicq.compiler.values import ModelValue, fail
 from scenicq.errors import Span, similar
 from scenicq.forest.nodes import Node
+from scenicq.geometry.features import region_name
+from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
 from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS, TURNS
 
@@ -179,9 +181,19 @@ class Environment:
             hints = (f"`{_SYNONYMS[name]}` is what Scenic calls it",)
         elif name in _SAID:
             hints = (_SAID[name],)
+        elif (region := self._region_of_kind(name)) is not None:
+            hints = (f"`network.{region}` is what the map has of this kind",)
         elif not close and "roadDirection" not in known:
             hints = ("names such as `road` and `Car` come with `model scenic.domains.driving.model`",)
         raise fail("unknown-name", f"`{name}` is not defined", span, "not found", hints)
+
+    def _region_of_kind(self, name: str) -> str | None:
+        """What the network calls elements of a kind that Scenic does not know, by the kind's name or its region's."""
+        found = self.find("network")
+        network = None if found is None else found.names["network"]
+        if not isinstance(network, Network):
+            return None
+        return next((each for each in (name, region_name(name)) if each in network.otherRegions), None)
 
     def set(self, name: str, value: ModelValue) -> None:
         """Give a name a value."""

@@ -63,6 +63,15 @@ def test_each_kind_is_named_or_counted(tmp_path: Path) -> None:
             assert [match.frame for match in dataset.match(program)] == [f"f{number}"], kind
 
 
+@pytest.mark.parametrize("name", ["carpark_area", "carparkAreaRegion"])
+def test_whoever_writes_the_kind_is_told_what_it_is_called(tmp_path: Path, name: str) -> None:
+    ingest(folder(tmp_path / "s", ["carpark_area", "parking"]), tmp_path / "d")
+    with pytest.raises(scenicq.ScenicqError, match=f"`{name}` is not defined") as error:
+        list(scenicq.open(tmp_path / "d").match(f"ego = new Car in {name}\n"))
+    (hint,) = error.value.diagnostics[0].hints
+    assert hint == "`network.carparkAreaRegion` is what the map has of this kind"
+
+
 def test_what_scenic_knows_has_its_own_name() -> None:
     assert {region_name(kind) for kind in KNOWN_KINDS} == {None}
 
