@@ -9,7 +9,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,6 +25,7 @@ __all__ = [
     "Manifest",
     "Part",
     "check_path",
+    "fields_of",
     "find_links",
     "is_dataset",
     "read_manifest",
@@ -126,8 +127,13 @@ class Manifest:
 
     def to_json(self) -> str:
         """The text of `dataset.json`."""
-        fields = {"format": _FORMAT, "schema": self.schema} | asdict(self)
-        return json.dumps(fields, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        content = {"format": _FORMAT, "schema": self.schema} | fields_of(self)
+        return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False, default=fields_of) + "\n"
+
+
+def fields_of(value: Any) -> dict[str, Any]:
+    """The fields of a dataclass by name, not copied: what `json.dumps` is to write for one."""
+    return {each.name: getattr(value, each.name) for each in fields(value)}
 
 
 def is_dataset(folder: Path) -> bool:

@@ -18,7 +18,7 @@ import shutil
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,7 +26,7 @@ import pyarrow as pa
 
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns
-from scenicq.store.manifest import SEGMENTS, Counts, Part
+from scenicq.store.manifest import SEGMENTS, Counts, Part, fields_of
 from scenicq.store.parquet import TableWriter, part_path
 from scenicq.store.rows import recording_rows
 from scenicq.store.schema import SEGMENT_TABLES, ArrowTable
@@ -358,11 +358,11 @@ def _description(folder: Path, number: int) -> Path:
 
 
 def _to_json(segment: Segment) -> str:
-    fields = asdict(segment)
+    fields = fields_of(segment)
     fields["files"] = {name: [part.bytes, part.sha256, part.rows] for name, part in segment.files.items()}
     for key in ("recordings", "by_map"):
-        fields[key] = {name: [counts["frames"], counts["objects"]] for name, counts in fields[key].items()}
-    return json.dumps(fields, ensure_ascii=False, separators=(",", ":")) + "\n"
+        fields[key] = {name: [counts.frames, counts.objects] for name, counts in fields[key].items()}
+    return json.dumps(fields, ensure_ascii=False, separators=(",", ":"), default=fields_of) + "\n"
 
 
 def _from_json(fields: dict[str, Any]) -> Segment:
