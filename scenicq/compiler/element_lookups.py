@@ -96,7 +96,10 @@ class LookupTable:
                 for part in shapes.simple_parts([area.polygon])
             )
 
-        self.occupancy = Occupancy(tuple(places(layer) for layer in layers), nothing, name)
+        ids = tuple(
+            tuple(area.id for area, _, _ in layer for _ in shapes.simple_parts([area.polygon])) for layer in layers
+        )
+        self.occupancy = Occupancy(tuple(places(layer) for layer in layers), nothing, name, ids)
 
 
 class Lookups:

@@ -65,11 +65,13 @@ class Occupancy:
         layers: Areas in the order in which they count: those of a later layer only where the earlier ones have none.
         nothing: The number that stands for no option at all.
         name: What messages call it.
+        elements: The id of the map element that each area of each layer is, or a part of.
     """
 
     layers: tuple[Layer, ...] = field(repr=False)
     nothing: int
     name: str
+    elements: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
 
     @cached_property
     def scale(self) -> int:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from fleet import NEEDLE, fleet_map
 
+from scenicq.geometry.elements import Lane, NetworkElement
+from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, Tolerance
 
@@ -74,6 +78,36 @@ def _sample(name: str, sql: str) -> Question:
 def _driving(program: str, rest: str, options: MatchOptions = WIDE) -> Question:
     """A program of the driving world, with an ego as that has it."""
     return Question(f"model scenic.domains.driving.model\nego = new Car\n{program}\n", options, f"WITH {DRIVER}{rest}")
+
+
+@functools.cache
+def _fleet() -> Network:
+    return Network("fleet", fleet_map())
+
+
+def _meant(of: Callable[[Lane], Iterable[NetworkElement | None]]) -> str:
+    """Pairs of a lane and what is meant by it, as rows of SQL."""
+    pairs = {(lane.id, each.id) for lane in _fleet().lanes for each in of(lane) if each is not None}
+    return ", ".join(f"('{lane}', '{each}')" for lane, each in sorted(pairs))
+
+
+def _through(
+    place: str, of: Callable[[Lane], Iterable[NetworkElement | None]], middle: int = 0, sort: str = "Car"
+) -> Question:
+    """Somebody in what the map says of the ego's lane, 5 to 20 m from it."""
+    program = (
+        f"other = new {sort} in {place}, facing Range({middle - 20}, {middle + 20}) deg relative to ego.heading\n"
+        "require 5 < (distance to other) < 20"
+    )
+    sql = f""",
+meant(lane, region) AS (VALUES {_meant(of)}),
+here AS (SELECT m.frame, r.region FROM memberships m JOIN meant r ON r.lane = m.region
+         WHERE m.object = 'ego' AND m.kind = 'lane' AND m.distance <= 0.05)
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+JOIN memberships m ON m.frame = a.frame AND m.object = a.id JOIN here h ON h.frame = a.frame AND h.region = m.region
+WHERE a.class = '{sort}' AND m.distance <= 0.25 AND a.ego_distance > 5 AND a.ego_distance < 20
+AND turned(a.relative_heading, radians({middle})) <= radians(25)"""
+    return _driving(program, sql)
 
 
 QUESTIONS = {
@@ -231,4 +265,35 @@ WHERE a.class = 'Adult' AND a.ego_distance <= 40.001 AND {_near("a.frame", "a.id
 AND abs(a.ego_right) * cos(radians(45)) - a.ego_ahead * sin(radians(45)) <= 0.001""",
     ),
     "any car on a road": _driving("", "\nSELECT frame FROM ego"),
+    "a car in my lane": _through("ego.lane", lambda lane: [lane]),
+    "oncoming beside me": _through("ego.oppositeLaneGroup", lambda lane: [lane.group._opposite], 180),
+    "in the lane to my left": _through(
+        "ego.laneSection.laneToLeft", lambda lane: [each.lane for each in [lane.sections[0]._laneToLeft] if each]
+    ),
+    "in my lane group": _through("ego.laneGroup", lambda lane: [lane.group]),
+    "on my road, either way": _through("ego.road", lambda lane: [lane.road], 180),
+    "a cyclist in my lane": _through("ego.lane", lambda lane: [lane], 0, "Bicycle"),
+    "the other is in my lane": _driving(
+        "other = new Car in everywhere, facing Range(-20, 20) deg relative to ego.heading\n"
+        "require other.lane is ego.lane\nrequire 5 < (distance to other) < 20",
+        """,
+here AS (SELECT m.frame, m.region FROM memberships m
+         WHERE m.object = 'ego' AND m.kind = 'lane' AND m.distance <= 0.05)
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+JOIN memberships m ON m.frame = a.frame AND m.object = a.id JOIN here h ON h.frame = a.frame AND h.region = m.region
+WHERE a.class = 'Car' AND m.distance <= 0.05 AND a.ego_distance > 5 AND a.ego_distance < 20
+AND abs(a.relative_heading) <= radians(25)""",
+    ),
+    "in a lane that branches": _driving(
+        "require len(ego.lane.maneuvers) > 1\n"
+        "other = new Truck in everywhere, facing Range(-20, 20) deg relative to ego.heading\n"
+        "require 5 < (distance to other) < 20",
+        f""",
+branches(lane, region) AS (VALUES {_meant(lambda lane: [lane] if len(lane.maneuvers) > 1 else [])}),
+here AS (SELECT DISTINCT m.frame FROM memberships m JOIN branches t ON t.lane = m.region
+         WHERE m.object = 'ego' AND m.kind = 'lane' AND m.distance <= 0.05)
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame) JOIN here USING (frame)
+WHERE a.class = 'Truck' AND a.ego_distance > 5 AND a.ego_distance < 20
+AND abs(a.relative_heading) <= radians(25)""",
+    ),
 }

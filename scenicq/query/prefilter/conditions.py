@@ -26,6 +26,7 @@ from scenicq.forest.nodes import (
     RegionIntersection,
     Rotate,
     SectorAt,
+    Select,
     VectorSum,
 )
 from scenicq.forest.scenario import Scenario
@@ -37,6 +38,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.ego_frame import DISTANCE, PLACE, in_ego_frame
+from scenicq.query.prefilter.map_relations import MapRelations
 from scenicq.query.prefilter.regions import RegionNames, near_region
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
@@ -103,6 +105,7 @@ class ConditionReader:
     scenario: Scenario
     tolerance: Tolerance
     names: RegionNames
+    relations: MapRelations
     road: RoadDirection
     bounds: dict[tuple[int, ...], SqlBounds] = field(default_factory=dict["tuple[int, ...]", "SqlBounds"])
 
@@ -216,6 +219,10 @@ class ConditionReader:
                             yield near, ""
                 case RegionIntersection(parts=parts):
                     todo += reversed(parts)
+                case Select() as looked_up if names is not None:
+                    near = self.relations.in_region_of(looked_up, reach, surely=False)
+                    if near is not None:
+                        yield near, ""
                 case DiscAt() | SectorAt() as seen:
                     yield "", _sql(self._in_view(seen, place, bounds, reach))
                 case _:
@@ -286,6 +293,9 @@ class ConditionReader:
         """The same for a requirement."""
         for part in conjuncts(in_ego_frame(root, self.scenario.ego)):
             objects = self.involved(part)
+            if (looked_up := self.relations.holds(part, surely=False)) is not None:
+                yield objects, "", looked_up[1]
+                continue
             if len(objects) > 2:
                 continue
             if isinstance(part, Contains) and isinstance(part.point, Feature) and part.point.property == "position":
@@ -355,19 +365,21 @@ def _summands(node: Node) -> list[Node]:
     return found
 
 
-def conditions(scenario: Scenario, network: Network, options: MatchOptions) -> Iterator[NecessaryCondition]:
+def conditions(
+    scenario: Scenario, network: Network, options: MatchOptions, relations: MapRelations
+) -> Iterator[NecessaryCondition]:
     """The necessary conditions of a scenario whose ego is the label's own, in the order of the program.
 
     Args:
         scenario: The scenario.
         network: The map it was compiled for.
         options: Tolerances.
+        relations: Those of the map, which gets the tables that conditions ask for.
     """
     if any(owner.mutated for owner in scenario.objects):
         return  # noise of any size hides where things are
-    reader = ConditionReader(
-        scenario, options.tolerance.for_scenario(scenario), RegionNames(network), network.roadDirection
-    )
+    tolerance = options.tolerance.for_scenario(scenario)
+    reader = ConditionReader(scenario, tolerance, relations.names, relations, network.roadDirection)
     for owner in scenario.objects:
         named: Mapping[str, Node] = {name: given.value for name, given in owner.properties.items()}
         compared = [name for name in ("position", "heading") if name in named]

@@ -19,8 +19,10 @@ from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO, NecessaryCondition, conditions
 from scenicq.query.prefilter.decision import columns_of, decision, new_table
+from scenicq.query.prefilter.map_relations import MapRelations
 from scenicq.query.prefilter.params import param_conditions
 from scenicq.query.prefilter.plan_draft import Draft, Stage, Step, blamed_step
+from scenicq.query.prefilter.regions import RegionNames
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.query.prefilter.sufficient import sufficient_conditions
 from scenicq.store.classes import ROOT, class_matches, subclasses
@@ -122,7 +124,8 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
         deciding: Whether SQL is to say, too, which frames surely match.
     """
     scenario, own_ego = ready(scenario), options.ego == "label"
-    found = list(conditions(scenario, network, options)) if own_ego else []
+    relations = MapRelations(RegionNames(network), scenario.ego)
+    found = list(conditions(scenario, network, options, relations)) if own_ego else []
     columns: dict[tuple[str, ...], str] = {}
     roles: list[_Role] = []
     for owner in scenario.objects:
@@ -137,10 +140,12 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
     _frames(draft, [each for each in found if not each.objects], param_conditions(scenario, options), roles, pairs)
     if roles:
         _objects(draft, roles, pairs, options)
-    proofs = sufficient_conditions(scenario, network, options) if deciding else None
+    proofs = sufficient_conditions(scenario, network, options, relations) if deciding else None
     wanted = list(dict.fromkeys(near for each in proofs or () for _, near in each.places))
     flags = {near: f"s{place}" for place, near in enumerate(wanted) if any(each.region for each in found)}
-    placed_table = _regions(draft, [each for each in found if not each.objects and each.region], roles, flags)
+    placed_table = _regions(
+        draft, [each for each in found if not each.objects and each.region], roles, flags, relations
+    )
     if roles and own_ego:
         _distinct(draft, roles, placed_table, pairs)
         for objects, tied in list(pairs.items())[: LIMITS.joined_pairs]:
@@ -234,11 +239,12 @@ def _objects(
 
 
 def _regions(
-    draft: Draft, own: Sequence[NecessaryCondition], roles: Sequence[_Role], wanted: Mapping[str, str]
+    draft: Draft, own: Sequence[NecessaryCondition], roles: Sequence[_Role], wanted: Mapping[str, str],
+    relations: MapRelations,
 ) -> str:  # fmt: skip
     """What memberships of regions decide; returns the table of objects and how far they come.
 
-    The table `flags` has a column for each condition that is wanted besides.
+    The table `flags` has a column for each condition that is wanted besides, over tables of `relations`.
     """
     mine = {each.region: f"e{place}" for place, each in enumerate(own)}
     distinct = {role.column: role for role in roles if role.placed}
@@ -258,12 +264,13 @@ def _regions(
             f"WHERE ({placed}) AND n.{left}"
         )
     statements = [
+        *(new_table(*each) for each in relations.queries(MEMBERSHIPS, f"SELECT f, frame FROM stage0 WHERE {left}")),
         new_table(
             "flags",
             f"SELECT q.f, m.object, {', '.join(flags)} FROM {MEMBERSHIPS} m JOIN ({' UNION ALL '.join(asked)}) q "
             f"ON m.frame = q.frame AND m.object = q.object WHERE {' OR '.join(dict.fromkeys((*mine, *others)))} "
             "GROUP BY q.f, m.object",
-        )
+        ),
     ]
     joined = "LEFT JOIN flags e ON e.f = s.f AND e.object = 'ego'" if mine else ""
     blamed = [

@@ -11,7 +11,7 @@ from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.sql import sql_text
 
-__all__ = ["RegionNames", "near_region"]
+__all__ = ["RegionNames", "near_region", "region_ids"]
 
 
 class RegionNames:
@@ -75,13 +75,35 @@ def near_region(region: Region, names: RegionNames, reach: float) -> str | None:
     return conditions[0] if len(found) == 1 else f"({' OR '.join(conditions)})"
 
 
+def region_ids(region: Region, names: RegionNames) -> tuple[str, ...] | None:
+    """The regions of `memberships` that a region is made of; None if it is not made of elements of the map."""
+    found: list[str] = []
+    todo = [region]
+    while todo:
+        match todo.pop():
+            case PolygonSet() as area if id(area) not in names.kinds:
+                ids = _ids(area, names)
+                if ids is None:
+                    return None
+                found += ids
+            case UnionOf(parts=parts) if not any(id(part) in names.kinds for part in parts):
+                todo += reversed(parts)
+            case _:
+                return None
+    return tuple(found)
+
+
+def _ids(area: PolygonSet, names: RegionNames) -> list[str] | None:
+    known = area.ids and all(name in names.elements for name in area.ids)
+    if not known or len(area.ids) > LIMITS.named_regions or len(area.ids) != len(area.polygons):
+        return None
+    return [names.elements[name] for name in area.ids]
+
+
 def _chosen(area: PolygonSet, names: RegionNames) -> str | None:
     """The rows of `memberships` that are about an area of the map; None if it is not made of the map's elements."""
     if id(area) in names.kinds:
         return f"kind IN ({', '.join(map(sql_text, names.kinds[id(area)]))})"
-    known = area.ids and all(name in names.elements for name in area.ids)
-    if not known or len(area.ids) > LIMITS.named_regions or len(area.ids) != len(area.polygons):
-        return None
-    ids = ", ".join(sql_text(names.elements[name]) for name in area.ids)
+    ids = _ids(area, names)
     # a subquery is hashed, a list is gone through for every row
-    return f"region IN (SELECT unnest([{ids}]))"
+    return None if ids is None else f"region IN (SELECT unnest([{', '.join(map(sql_text, ids))}]))"

@@ -45,7 +45,8 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, relevant_properties
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO, ConditionReader, difference, object_columns, turned_within
-from scenicq.query.prefilter.regions import RegionNames, near_region
+from scenicq.query.prefilter.map_relations import MapRelations
+from scenicq.query.prefilter.regions import near_region
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, number
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
@@ -81,7 +82,7 @@ class _OpenError(Exception):
 
 
 def sufficient_conditions(
-    scenario: Scenario, network: Network, options: MatchOptions
+    scenario: Scenario, network: Network, options: MatchOptions, relations: MapRelations
 ) -> tuple[SufficientCondition, ...] | None:
     """Conditions that together prove that a label matches, for distinct label objects within the radius.
 
@@ -89,6 +90,7 @@ def sufficient_conditions(
         scenario: The scenario, ready to be matched.
         network: The map it was compiled for.
         options: Tolerances and what is in force.
+        relations: Those of the map, which gets the tables that conditions ask for.
 
     Returns:
         None if the columns cannot prove it.
@@ -97,17 +99,17 @@ def sufficient_conditions(
     if noisy or options.method != "auto" or options.ego != "label" or options.exact or scenario.dynamics is not None:
         return None
     try:
-        return tuple(_Prover(scenario, network, options).all())
+        return tuple(_Prover(scenario, network, options, relations).all())
     except _OpenError:
         return None
 
 
 class _Prover:
-    def __init__(self, scenario: Scenario, network: Network, options: MatchOptions) -> None:
+    def __init__(self, scenario: Scenario, network: Network, options: MatchOptions, relations: MapRelations) -> None:
         tolerance = options.tolerance.for_scenario(scenario)
         self.scenario, self.options, self.tolerance = scenario, options, tolerance
-        self.names = RegionNames(network)
-        self.reader = ConditionReader(scenario, tolerance, self.names, network.roadDirection)
+        self.names, self.relations = relations.names, relations
+        self.reader = ConditionReader(scenario, tolerance, self.names, relations, network.roadDirection)
 
     def all(self) -> list[SufficientCondition]:
         """Conditions of all groups, where a label has columns for all that is compared and nothing else."""
@@ -134,6 +136,10 @@ class _Prover:
         for constraint in group.constraints:
             _check_columns(constraint, bounds)
             if isinstance(constraint, Condition):
+                looked_up = self.relations.holds(constraint.expression, surely=True)
+                if looked_up is not None:
+                    places.append(looked_up)
+                    continue
                 texts.append(_told(SQL.negation(bounds.can_fail(constraint.expression))))
                 continue
             chosen += 1
@@ -199,6 +205,11 @@ class _Prover:
         self, index: int, region: Node, place: tuple[str, str], bounds: SqlBounds, sure: float
     ) -> tuple[str, list[tuple[int, str]]]:
         """That the place, or one within tolerance of it, lies in a region."""
+        if isinstance(region, Select) and self.options.radius is None:
+            near = self.relations.in_region_of(region, min(sure, MEMBERSHIP_RADIUS_M) - SLACK, surely=True)
+            if near is None:
+                raise _OpenError
+            return "", [(index, near)]
         views, regions = _parts(region)
         # of several parts each may have a place of its own nearby: the place itself is asked for
         reach = min(sure, MEMBERSHIP_RADIUS_M) if len(views) + len(regions) == 1 else 0.0

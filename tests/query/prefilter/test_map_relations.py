@@ -1,0 +1,140 @@
+"""Look-ups as relations in SQL: what is left out does not match, and what is decided does, on overlapping lanes."""
+
+from __future__ import annotations
+
+import math
+import random
+import sys
+from pathlib import Path
+
+import pytest
+
+from scenicq.compiler.program import compile_scenario
+from scenicq.errors import ScenarioError, Source
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.problem.preprocess import ready
+from scenicq.match.tolerance import EXACT, parse_tolerance
+from scenicq.match.verdict import Match, NoMatch
+from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.labels import Label, LabelObject, Recording
+from scenicq.store.writer import write_dataset
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from nudged_scenes import STREET
+
+HEAD = "model scenic.domains.driving.model\nego = new Car in everywhere, facing Range(-180, 180) deg\n"
+ANY = "in everywhere, facing Range(-180, 180) deg"
+TOLERANCES = (EXACT, parse_tolerance("position=0.25,heading=5deg"), parse_tolerance("position=1.5,heading=20deg"))
+OWNERS = ("ego.lane", "ego.laneGroup", "ego.road", "ego.laneSection", "network.laneAt(ego)", "ego.oppositeLaneGroup")
+PLACES = (
+    *OWNERS, "ego.intersection", "ego.crossing", "ego.laneSection.laneToLeft", "ego.laneSection.laneToRight",
+    "ego.laneGroup.sidewalk", "ego.lane.group", "ego.lane.road", "ego.lane.lanesAhead(30)", "ego.element",
+    "ego.lane.union(ego.road)",
+)  # fmt: skip
+NAMES = (
+    "ego._lane",
+    "ego._road",
+    "ego._laneGroup",
+    "ego._intersection",
+    "other._lane",
+    "other._crossing",
+    "other._road",
+)
+
+
+def question(draw: random.Random) -> str:
+    """A program that asks for elements of the map."""
+    place = draw.choice(PLACES)
+    sort = draw.choice(["Car", "Car", "Pedestrian"])
+    facing = draw.choice(["", ", facing Range(-180, 180) deg", ", facing Range(-30, 30) deg relative to ego.heading"])
+    placed = draw.choice([f"new {sort} {draw.choice(['on', 'in'])} {place}{facing}", f"new {sort} {ANY}"])
+    lines = [f"other = {placed}"]
+    for _ in range(draw.choice([0, 1, 1, 2])):
+        one, two = draw.sample(NAMES, 2)
+        lane = draw.choice(STREET.lanes).id
+        lines.append(
+            "require "
+            + draw.choice([
+                f"{one} is {two}", f"{one} is not {two}", f"{one} is None", f"not ({one} is None)",
+                f"{one} is not None",
+                "ego.lane is other.lane", "ego.road is other.road", f"ego._lane is network.elements['{lane}']",
+                f"not (other._lane is network.elements['{lane}'])", "ego.laneGroup is other._laneGroup",
+                "5 < (distance to other) < 20", f"other.position in {place}", "ego.lane is not other._lane",
+            ])
+        )  # fmt: skip
+    return HEAD + "\n".join(lines) + "\n"
+
+
+def labels(draw: random.Random, count: int) -> list[Label]:
+    """Cars and people on lanes and crossings, near their edges, where lanes overlap, and elsewhere."""
+
+    def place() -> tuple[float, float, float]:
+        lane = draw.choice(STREET.lanes)
+        spot = lane.centerline.lines[0].interpolate(draw.random(), normalized=True) if draw.random() < 0.7 else None
+        x, y = (spot.x, spot.y) if spot is not None else (draw.uniform(-9, 9), draw.uniform(-9, 9))
+        if draw.random() < 0.4:
+            # upon an edge, or within centimetres of it
+            ring = lane.polygon.exterior
+            spot = ring.interpolate(draw.random() * ring.length)
+            x, y = spot.x, spot.y
+        off = draw.choice([0.0, 0.0, 1e-7, 0.03, 0.06, 0.24, 0.26, 1.0])
+        turn = draw.uniform(0, math.tau)
+        flow = STREET.roadDirection.values(x, y)
+        heading = draw.choice([*flow, draw.uniform(-3, 3)]) + draw.choice([0.0, draw.uniform(-0.4, 0.4)])
+        return x + off * math.cos(turn), y + off * math.sin(turn), math.remainder(heading, math.tau)
+
+    def thing(name: str, sort: str) -> LabelObject:
+        return LabelObject(name, sort, sort, *place(), 2.0, 4.5)
+
+    return [
+        Label(
+            f"{number:04}", "r", number * 500_000, STREET.name, thing("ego", "Car"),
+            tuple(thing(f"{k}", draw.choice(["Car", "Car", "Pedestrian"])) for k in range(draw.randint(1, 3))),
+        )
+        for number in range(count)
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    folder = tmp_path_factory.mktemp("relations") / "d"
+    made = labels(random.Random(3), 150)
+    write_dataset(folder, iter([Recording("r", STREET.name, tuple(made))]), {STREET.name: STREET.features}, name="d")
+    return open_dataset(folder)
+
+
+def verdicts(dataset: Dataset, text: str, options: MatchOptions, **how: bool) -> dict[str, str]:
+    query = Query(dataset, Source("p.scenic", text), QueryOptions(options, **how))
+    return {each.frame: type(each.verdict).__name__ for each in query.results()}
+
+
+def check(dataset: Dataset, seed: int) -> int:
+    """How many frames match; each way of asking says the same."""
+    draw = random.Random(seed)
+    text, options = question(draw), MatchOptions(tolerance=draw.choice(TOLERANCES), timeout_s=5.0)
+    try:
+        scenario = ready(compile_scenario(Source("p.scenic", text), STREET))
+    except ScenarioError:
+        return 0
+    matcher = Matcher(scenario, options)
+    asked = draw.sample([label.frame for label in dataset.labels()], 40) if seed % 4 else None
+    right = {label.frame: matcher.match(label) for label in dataset.labels(asked)}
+    for proofs in (False, True):
+        found = verdicts(dataset, text, options, proofs=proofs)
+        for frame, verdict in right.items():
+            if isinstance(verdict, Match):
+                assert found.get(frame) == "Match", (text, options.tolerance, frame, proofs)
+            elif isinstance(verdict, NoMatch):
+                assert frame not in found, (text, options.tolerance, frame, proofs, verdict)
+    return sum(isinstance(each, Match) for each in right.values())
+
+
+def test_sql_says_what_the_matcher_says(dataset: Dataset, rounds):
+    assert sum(check(dataset, seed) for seed in range(rounds(120))) > 50
+
+
+@pytest.mark.slow
+def test_sql_says_of_many_what_the_matcher_says(dataset: Dataset):
+    assert sum(check(dataset, seed) for seed in range(1000, 1600)) > 500
