@@ -28,7 +28,7 @@ from scenicq.limits import LIMITS
 from scenicq.temporal.samples import FIXED, MOVING, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["AtomColumns", "HiddenVariable", "reads_start"]
+__all__ = ["AtomColumns", "UnclearVariable", "reads_start"]
 
 
 Numbers: TypeAlias = NDArray[np.float64]
@@ -44,13 +44,8 @@ def _is_speed(node: Node) -> bool:
     return isinstance(node, Feature) and node.property == "speed"
 
 
-class HiddenVariable(Exception):
-    """An atom hangs on a random variable that has no value here."""
-
-    def __init__(self, leaf: Leaf) -> None:
-        """Take the variable."""
-        super().__init__()
-        self.leaf = leaf
+class UnclearVariable(Exception):
+    """What a condition over time hangs on a random variable for is not known by arrays; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +111,7 @@ class AtomColumns:
         """The value of a condition at each sample, shape (n,).
 
         Raises:
-            HiddenVariable: It hangs on a random variable without a value.
+            UnclearVariable: It hangs on a random variable without a value.
         """
         return self.truth_of(self.expanded(condition))
 
@@ -193,7 +188,7 @@ class AtomColumns:
         """The values of an expanded expression; None where a field allows several directions.
 
         Raises:
-            HiddenVariable: It hangs on a random variable without a value.
+            UnclearVariable: It hangs on a random variable without a value.
         """
         counts: dict[int, NDArray[np.intp]] = {}
         found = self._evaluate(node, {}, counts)
@@ -275,7 +270,7 @@ class AtomColumns:
 
     def _assigned(self, leaf: Leaf, _args: Sequence[Column]) -> Column:
         if leaf.identity not in self.assignment:
-            raise HiddenVariable(leaf)
+            raise UnclearVariable("a hidden random variable over time")
         return constant_column(self.assignment[leaf.identity])
 
     def _observed(self, node: Feature) -> Column:

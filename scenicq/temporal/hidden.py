@@ -33,13 +33,9 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import children, leaves, postorder
-from scenicq.temporal.atoms import AtomColumns
+from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 
-__all__ = ["UnclearVariable", "affine_sides", "comparisons_of", "has_cuts", "inside", "random_variables", "support"]
-
-
-class UnclearVariable(Exception):
-    """Conditions on a random variable have no cuts; the message says why."""
+__all__ = ["affine_sides", "comparisons_of", "has_cuts", "inside", "random_variables", "support"]
 
 
 def random_variables(conditions: Iterable[Node]) -> list[Leaf]:

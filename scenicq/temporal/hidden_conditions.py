@@ -17,8 +17,8 @@ from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.nodes import Compare, CompareOp, Leaf, Logic, Node
 from scenicq.forest.walk import children, leaves
 from scenicq.limits import LIMITS
-from scenicq.temporal.atoms import AtomColumns
-from scenicq.temporal.hidden import UnclearVariable, affine_sides, comparisons_of, random_variables, support
+from scenicq.temporal.atoms import AtomColumns, UnclearVariable
+from scenicq.temporal.hidden import affine_sides, comparisons_of, random_variables, support
 from scenicq.temporal.truth import FALSE, Truth
 
 __all__ = ["Cut", "HiddenConditions"]

@@ -20,8 +20,8 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.smt.answer import Solver
-from scenicq.temporal.atoms import AtomColumns, HiddenVariable
-from scenicq.temporal.hidden import UnclearVariable, inside
+from scenicq.temporal.atoms import AtomColumns, UnclearVariable
+from scenicq.temporal.hidden import inside
 from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.hidden_examples import ExampleOutcome, Examples, Remembered, examine_start
 from scenicq.temporal.outcomes import place_of
@@ -108,7 +108,7 @@ class HiddenRuns:
         try:
             with limited(self.match.timeout_s * (len(stretches.bounds) - 1)):
                 return self._by_values(stretches, columns, expanded, remember)
-        except (UnclearVariable, HiddenVariable, Exhausted):
+        except (UnclearVariable, Exhausted):
             pass
         # what is unclear of one stretch is not so of all
         found = HiddenFound(Runs.unknown(stretches.ends()))
@@ -126,9 +126,9 @@ class HiddenRuns:
         try:
             with limited(self.match.timeout_s):
                 return self._by_values(stretch, columns, expanded, remember)
-        except (UnclearVariable, HiddenVariable, Exhausted) as error:
+        except (UnclearVariable, Exhausted) as error:
             unclear = error
-        reason = str(unclear) or "a hidden random variable over time"
+        reason = str(unclear)
         found = HiddenFound(Runs.unknown(stretch.ends()))
         for start, number in enumerate(cast("list[int]", stretch.numbers.tolist())):
             if isinstance(unclear, UnclearVariable):
@@ -202,7 +202,7 @@ class HiddenRuns:
         try:
             with limited(self.match.timeout_s):
                 outcomes = asked.outcomes()
-        except (HiddenVariable, Exhausted):
+        except (UnclearVariable, Exhausted):
             pass
         if outcomes and all(each.run.truth == FALSE for each in outcomes):
             return [(max((each.run for each in outcomes), key=lambda run: (run.cut_off, run.end)), ("", {}))]

@@ -13,7 +13,7 @@ from scenicq.forest.nodes import Compare, Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom, Formula, Test, operands
 from scenicq.store.tracks import RecordingTracks
-from scenicq.temporal.atoms import AtomColumns, HiddenVariable
+from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.intervals import IntervalVerdict
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
@@ -60,7 +60,7 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
     for number, condition in enumerate(dynamics.conditions):
         try:
             known[number] = columns.truth(condition)
-        except HiddenVariable:
+        except UnclearVariable:
             continue
     found: list[Band] = []
 

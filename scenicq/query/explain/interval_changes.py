@@ -18,7 +18,7 @@ from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Compare, CompareOp, N
 from scenicq.forest.temporal import Atom, Eventually, Formula, operands
 from scenicq.forest.walk import features, leaves, postorder, transform
 from scenicq.limits import LIMITS
-from scenicq.temporal.atoms import AtomColumns, HiddenVariable
+from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -79,7 +79,7 @@ def least_changes(
     numbers = sorted({node.number for node in _atoms(formula)})
     try:
         known = {number: columns.truth(conditions[number]) for number in numbers}
-    except HiddenVariable:
+    except UnclearVariable:
         return
     told: set[str] = set()
     for number in numbers:
