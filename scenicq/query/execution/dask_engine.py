@@ -20,6 +20,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from importlib.util import find_spec
 from itertools import islice
@@ -156,7 +157,7 @@ def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tup
     pending: deque[tuple[Partition, Any]] = deque()
     try:
         while True:
-            room = 3 * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) - len(pending)
+            room = 3 * max(1, _workers(client)) - len(pending)
             for piece in islice(waiting, max(0, room)):
                 work = client.submit(
                     _work,
@@ -197,12 +198,34 @@ def _taken(client: Any, future: Any) -> Done:
         try:
             return future.result(timeout=_LOOK_S)
         except TimeoutError:
-            if client.scheduler_info(n_workers=-1)["workers"]:
+            if _workers(client):
                 since = time.monotonic()
             elif time.monotonic() - since > _NOBODY_S:
                 message = f"the Dask cluster has had no worker for {_NOBODY_S} s"
                 hints = ("start workers of this scheduler, such as `dask worker ADDRESS`", *_LATER)
                 raise DataError(Diagnostic("engine-failed", message, hints=hints)) from None
+
+
+def _workers(client: Any) -> int:
+    """How many workers the scheduler has.
+
+    Raises:
+        DataError: engine-failed: it does not answer, for which the client would wait for ever.
+    """
+    answer = Future[int]()
+
+    def ask() -> None:
+        try:
+            answer.set_result(len(client.scheduler_info(n_workers=-1)["workers"]))
+        except BaseException as error:  # noqa: BLE001 - whoever waits is told
+            answer.set_exception(error)
+
+    threading.Thread(target=ask, daemon=True).start()
+    try:
+        return answer.result(timeout=_NOBODY_S)
+    except TimeoutError:
+        message = f"the Dask scheduler has not answered for {_NOBODY_S} s"
+        raise DataError(Diagnostic("engine-failed", message, hints=_LATER)) from None
 
 
 _known = threading.local()

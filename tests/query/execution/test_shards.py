@@ -217,6 +217,32 @@ def test_no_scheduler_where_one_should_be(dataset: Dataset, monkeypatch: pytest.
     assert error.value.diagnostics[0].code == "engine-failed"
 
 
+@pytest.mark.usefixtures("needs_dask")
+def test_a_scheduler_without_workers_ends_in_a_bounded_time(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    from distributed import LocalCluster
+
+    monkeypatch.setattr(dask, "_NOBODY_S", 1)
+    monkeypatch.setattr(dask, "_LOOK_S", 0.2)
+    found = query(dataset)
+    with LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
+        began = time.monotonic()
+        with pytest.raises(DataError, match="no worker for 1 s") as error:
+            list(dask.dask_engine(cluster.scheduler_address)(found, partitions(dataset, 6), lambda _: None))
+        assert time.monotonic() - began < 60
+    assert error.value.diagnostics[0].code == "engine-failed"
+
+
+def test_a_scheduler_that_does_not_answer_ends_in_a_bounded_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stuck:
+        def scheduler_info(self, n_workers: int) -> None:
+            time.sleep(5)
+
+    monkeypatch.setattr(dask, "_NOBODY_S", 0.1)
+    with pytest.raises(DataError, match="has not answered") as error:
+        dask._workers(Stuck())
+    assert error.value.diagnostics[0].code == "engine-failed"
+
+
 def test_without_the_extra_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask, "find_spec", lambda _: None)
     with pytest.raises(DataError, match=r"pip install 'scenicq\[dask\]'"):
