@@ -1,127 +1,212 @@
 """Every limit at its least: what it gives up on is unknown or refused with a reason, never another answer.
 
-Limits are found by their names in the modules that take part in matching, so that a new one is tried as it comes.
+Each limit of the table (`scenicq.limits`) is reached by an input that is named here: at its least, what is told or the
+way there is another one. The slow part tries all limits on all inputs, and sizes of batches, which are found by name.
 """
 
 from __future__ import annotations
 
 import ast
-import functools
+import importlib
 import importlib.util
 import math
 import pkgutil
-import random
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "temporal"))
-from choices_definition import alike, random_program, random_trace
-from choices_definition import recording_of as recording_of_trace
-from nudged_scenes import dataset_of
-from programs import HEADER, PROGRAMS
+from limit_inputs import INPUTS, Facts, Stores, stores_of
 
-from scenicq.errors import ScenicqError, Source
-from scenicq.limits import limits
-from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import parse_tolerance
-from scenicq.match.verdict import Match, Unknown
+from scenicq.errors import ScenicqError
+from scenicq.limits import LIMITS, limits
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.smt import portable
-from scenicq.store.dataset import Dataset, open_dataset
-from scenicq.store.writer import write_dataset
-from scenicq.temporal.interval_options import IntervalOptions
 
-LAYERS = ("compiler", "forest", "geometry", "match", "query", "smt", "store", "temporal")
-LIMIT = re.compile(r"_?(MOST|FEW|FEWEST|DEEPEST|LONGEST|LARGEST|MAX)(_[A-Z]+)*$")
-AT_ONCE = re.compile(r"_?([A-Z]+_)*(AT_ONCE|BATCH|CHUNK|HALVES|RETRIES|STEPS|TRIES)$")
-FACTS = {
-    "scenicq.forest.step_counts.FEWEST": "how many steps Scenic takes",
-    "scenicq.forest.step_counts.LONGEST": "how long Scenic's steps are",
-    "scenicq.query.explain.nearest_miss.MOST_M": "how far `--near` looks",
-    "scenicq.store.camera_rows.LARGEST_IMAGE": "what an image may be",
-    "scenicq.store.manifest._LARGEST": "what the file may say",
-    "scenicq.store.motion.LONGEST_GAP_US": "what motion means",
-    "scenicq.store.value_rules._LONGEST_NUMBER": "what a number may be",
-    "scenicq.store.validation._MOST_BYTES": "what a file may be",
-    "scenicq.store.map_validation._DEEPEST": "what a map may be",
-    "scenicq.temporal.definedness._LARGEST_EXPONENT": "where floats end",
-}
-LEAST = {"heading_width": math.inf, "shared_width": math.inf}
-"""Where less is allowed by a greater number."""
-FRAMES = (
-    "figure 3", "not visible", "picked lane", "requirement", "figure 6", "shared", "hidden requirement", "nonlinear",
-    "discrete", "crowd", "follow", "badly parked", "random discs",
-)  # fmt: skip
-BY_SOLVER = ("requirement", "shared", "hidden requirement", "discrete")
-SAMPLE = {
-    "frames: requirement", "frames: discrete", "frames: smt: shared", "time: 0", "time: 5", "time: 8",
+LEAST = {
+    "heading_width": math.inf, "shared_width": math.inf, "solver_sweeps": 1, "advice_runs": 1, "brief_runs": 1,
+    "advice_maps": 1, "brief_maps": 1,
 }  # fmt: skip
-STRICT = (
-    "observation_ways", "run_modes", "direction_choices", "closed_form_choices", "signatures", "choice_tries",
-    "recording_starts", "heading_cases", "field_ways", "split_cases",
-)  # fmt: skip
-TOLERANCE = parse_tolerance("position=0.25,heading=5deg")
-Key = tuple[object, ...]
-Answers = dict[Key, str]
+"""What a limit is set to, where it is not 0."""
+REACHED: dict[str, str] = {
+    "program_characters": "frames: figure 3",
+    "bracket_nesting": "frames: figure 3",
+    "expression_nesting": "frames: figure 3",
+    "tree_height": "frames: figure 3",
+    "reading_retries": "language: read twice",
+    "number_digits": "frames: figure 3",
+    "string_parts": "language: strings",
+    "program_seconds": "frames: figure 3",
+    "program_steps": "frames: figure 3",
+    "call_nesting": "language: calls",
+    "value_items": "frames: crowd",
+    "value_nesting": "language: lists",
+    "integer_bits": "language: whole numbers",
+    "choice_options": "frames: figure 3",
+    "condition_courses": "frames: figure 3",
+    "region_parts": "frames: not visible",
+    "random_way_steps": "frames: follow",
+    "known_way_steps": "language: known way",
+    "monitor_steps": "time: 1",
+    "rounded_nodes": "language: rounded",
+    "unobserved_choices": "frames: who is fast",
+    "difference_terms": "frames: not visible",
+    "off_road_tiles": "frames: follow",
+    "whole_draws": "draws",
+    "cut_draws": "draws",
+    "part_draws": "draws",
+    "signatures": "frames: not visible",
+    "replayed_directions": "replayed",
+    "part_roles": "frames: figure 3",
+    "group_parts": "frames: one gap for three",
+    "fit_decisions": "frames: ego alone",
+    "fit_decisions_a_role": "many",
+    "ordered_slots": "frames: picked lane",
+    "ordered_steps": "frames: picked lane",
+    "arc_roles": "frames: not visible",
+    "nested_outcomes": "frames: picked lane",
+    "choice_tries": "frames: picked lane",
+    "choice_nesting": "frames: alternatives",
+    "witness_trials": "frames: figure 6",
+    "closed_form_choices": "frames: figure 3",
+    "closed_form_terms": "frames: figure 3",
+    "closed_form_regions": "frames: not visible",
+    "cascade_outcomes": "frames: whole numbers",
+    "cascade_nesting": "frames: whole numbers",
+    "cascade_programs": "frames: shared",
+    "outlined_box_m": "frames: near the curb",
+    "asked_outcomes": "solver: discrete",
+    "solver_attempts": "frames: nonlinear",
+    "heading_cases": "frames: follow",
+    "heading_passes": "frames: figure 6",
+    "heading_width": "fields",
+    "field_ways": "frames: badly parked",
+    "field_halvings": "frames: follow",
+    "shared_values": "fields",
+    "shared_width": "fields",
+    "narrowing_passes": "frames: nonlinear",
+    "witness_replays": "frames: figure 6",
+    "witness_places": "frames: figure 6",
+    "linear_cells": "frames: near the curb",
+    "extent_combinations": "fields",
+    "inverted_offsets": "frames: discrete",
+    "distance_edges": "solver: near the curb",
+    "enclosing_edges": "question: box",
+    "rounded_values": "solver: rounded",
+    "integer_values": "solver: many whole numbers",
+    "formula_nesting": "solver: requirement",
+    "split_cases": "question: cases",
+    "solver_boxes": "frames: nonlinear",
+    "solver_patience": "question: circle",
+    "solver_sweeps": "solver: shared",
+    "solver_reach": "question: far",
+    "worker_starts": "worker",
+    "worker_start_s": "worker",
+    "worker_answer_bytes": "worker",
+    "command_reply_bytes": "command",
+    "start_tuples": "time: 47",
+    "outcomes_over_time": "time: 47",
+    "direction_choices": "time: 1",
+    "observation_ways": "time: 1",
+    "run_modes": "time: 2",
+    "run_situations": "time: 1",
+    "formula_clauses": "time: 1",
+    "run_pieces": "time: 26",
+    "jump_cuts": "time: 26",
+    "condition_cuts": "time: 26",
+    "joint_starts": "time: 26",
+    "start_questions": "time: 47",
+    "joined_pairs": "frames: row",
+    "named_regions": "frames: one lane",
+    "related_regions": "frames: looked up",
+    "heading_terms": "frames: figure 3",
+    "sql_alternatives": "frames: figure 3",
+    "sql_characters": "frames: figure 3",
+    "proof_alternatives": "ids: figure 3",
+    "counted_roles": "ids: crowd",
+    "tied_roles": "ids: row",
+    "recording_starts": "time: 1",
+    "ranked_frames": "near: frames",
+    "ranked_recordings": "near: duration",
+    "ranked_bindings": "near: number",
+    "ranked_numbers": "near: number",
+    "tried_amounts": "why: interval",
+    "cut_off_rounds": "why: interval",
+    "told_margins": "why: frame",
+    "told_choices": "why: frame",
+    "told_intervals": "why: frame",
+    "advice_frames": "advice",
+    "advice_changes": "advice",
+    "advice_pairs": "advice: pairs",
+    "advice_decisions": "advice",
+    "advice_runs": "advice: sampled",
+    "brief_changes": "advice: brief",
+    "brief_pairs": "advice: brief pairs",
+    "brief_decisions": "advice: brief",
+    "brief_runs": "advice: brief, sampled",
+}
+"""An input that reaches each limit."""
+UNREACHED = {
+    "dreal_conjunctions": "dReal is installed nowhere (`tests/smt/test_contract.py` where it is)",
+    "solver_memory_mb": "told to a process when it starts (`tests/smt/test_smtlib.py`)",
+    "advice_maps": "of datasets with several maps",
+    "brief_maps": "of datasets with several maps",
+    "block_tries": "of processes that die (`tests/query/execution/test_block_executor.py`)",
+    "piece_retries": "of a cluster whose disks fail (`tests/query/execution/test_shards.py`)",
+}
+"""Limits that no input reaches, and why."""
+FAST = {
+    "frames: figure 3", "frames: picked lane", "frames: not visible", "frames: ego alone", "frames: whole numbers",
+    "frames: alternatives", "language: calls", "language: lists", "language: read twice", "language: strings",
+    "language: whole numbers", "question: box", "question: cases", "question: circle", "question: far", "replayed",
+    "solver: rounded", "time: 2", "time: 26", "ids: figure 3", "many",
+}  # fmt: skip
+"""Inputs that are asked in the fast part."""
+AT_ONCE = re.compile(r"_?([A-Z]+_)*(AT_ONCE|BATCH|CHUNK)$")
 
 
-def every_limit() -> Iterator[tuple[str, str, float]]:
-    """The module, name and least value of each limit; one of a class has its name before."""
-    for limit in limits():
-        yield "scenicq.limits", f"LIMITS.{limit.name}", LEAST.get(limit.name, 0)
-    for layer in LAYERS:
-        package = importlib.import_module(f"scenicq.{layer}")
-        for found in pkgutil.walk_packages(package.__path__, f"scenicq.{layer}."):
-            spec = importlib.util.find_spec(found.name)
-            assert spec is not None
-            assert spec.origin is not None
-            for name in constants(ast.parse(Path(spec.origin).read_text())):
-                if f"{found.name}.{name}" not in FACTS:
-                    last = name.rpartition(".")[2]
-                    if LIMIT.match(last):
-                        yield found.name, name, 0
-                    elif AT_ONCE.match(last):
-                        yield found.name, name, 1
+@dataclass
+class Asked:
+    """What comes of an input.
+
+    Attributes:
+        facts: What is found.
+        codes: The codes of what is said instead.
+        calls: How often each function of the library was called.
+    """
+
+    facts: Facts
+    codes: frozenset[str]
+    calls: Counter[tuple[str, str]] = field(default_factory=Counter[tuple[str, str]])
 
 
-def constants(module: ast.Module) -> Iterator[str]:
-    """The names to which a module or one of its classes assigns something that is no text."""
-    classes = [("", module), *((f"{each.name}.", each) for each in module.body if isinstance(each, ast.ClassDef))]
-    for prefix, body in classes:
-        for node in body.body:
-            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-            text = isinstance(value := getattr(node, "value", None), ast.Constant) and isinstance(value.value, str)
-            yield from (prefix + each.id for each in targets if isinstance(each, ast.Name) and not text)
+def ask(stores: Stores, name: str, *, traced: bool = True) -> Asked:
+    """Ask an input, with nothing remembered from before."""
+    forget()
+    found = Asked({}, frozenset())
 
+    def noted(frame: FrameType, event: str, _: object) -> None:
+        code = frame.f_code
+        if event == "call" and "scenicq" in code.co_filename and "tests" not in code.co_filename:
+            found.calls[code.co_filename, code.co_name] += 1
 
-EVERY = sorted(every_limit())
-
-
-def set_least(patch: pytest.MonkeyPatch, module: str, name: str, least: float) -> None:
-    """Set a limit in its module and where it is imported from there."""
-    owner, _, attribute = name.rpartition(".")
-    if owner:
-        patch.setattr(getattr(importlib.import_module(module), owner), attribute, least)
-        return
-    importlib.import_module(module)
-    for each, value in list(sys.modules.items()):
-        if each == module or (each.startswith("scenicq.") and (module, name) in imported(value.__file__ or "")):
-            patch.setattr(value, name, least)
-
-
-@functools.cache
-def imported(file: str) -> frozenset[tuple[str, str]]:
-    """The names that a file imports, each with its module."""
-    nodes = [node for node in ast.walk(ast.parse(Path(file).read_text())) if isinstance(node, ast.ImportFrom)]
-    return frozenset((node.module or "", alias.name) for node in nodes for alias in node.names)
+    before = sys.getprofile()
+    if traced:
+        sys.setprofile(noted)
+    try:
+        found.facts = INPUTS[name](stores)
+    except ScenicqError as error:
+        found.codes = frozenset(each.code for each in error.diagnostics)
+    finally:
+        sys.setprofile(before)
+        forget()
+    return found
 
 
 def forget() -> None:
@@ -134,73 +219,21 @@ def forget() -> None:
                     clear()
 
 
-def traces(folder: Path) -> Dataset:
-    """Recordings of which something is missing here and there."""
-    draw = random.Random(7)
-    write_dataset(
-        folder, [recording_of_trace(f"r{number:02}", random_trace(draw)) for number in range(10)], {}, name="traces"
-    )
-    return open_dataset(folder)
-
-
-def programs_over_time() -> list[str]:
-    """Programs with choices, hidden numbers and monitors."""
-    draw = random.Random(11)
-    found = [random_program(draw) for _ in range(9)]
-    return [(alike(each) if number % 3 == 0 else each).text() for number, each in enumerate(found)]
-
-
-OVER_TIME = programs_over_time()
-PROGRAM = {
-    **{f"frames: {name}": HEADER + PROGRAMS[name] for name in FRAMES},
-    **{f"time: {number}": text for number, text in enumerate(OVER_TIME)},
-    **{f"frames: smt: {name}": HEADER + PROGRAMS[name] for name in BY_SOLVER},
-    "time: smt: 1": OVER_TIME[1],
-}
-
-
-def answers(dataset: Dataset, program: str, **limited: float) -> Answers:
-    """What is told of each frame, or of each interval and start."""
-    method = "smt" if ": smt: " in program else "auto"
-    usual = MatchOptions(tolerance=TOLERANCE, timeout_s=20.0, method=method)
-    options = QueryOptions(replace(usual, **limited), solver="portable", time=IntervalOptions(intervals="all"))
-    found: Answers = {}
-    for each in Query(dataset, Source("p.scenic", PROGRAM[program]), options).results():
-        verdict = each.verdict
-        roles = () if each.interval is None else tuple(sorted(verdict.correspondence.items()))
-        if isinstance(verdict, Match):
-            found[each.frame, roles, each.interval and each.interval.last] = "match"
-        elif isinstance(verdict, Unknown):
-            found[each.frame, "open"] = "unknown"
-            found[each.frame, roles, "open"] = "unknown"
-    return found
-
-
-def told(dataset: Dataset, program: str, **limited: float) -> tuple[Answers, set[str]]:
-    """The answers, or the codes of what is said instead."""
-    try:
-        return answers(dataset, program, **limited), set()
-    except ScenicqError as error:
-        return {}, {each.code for each in error.diagnostics}
-
-
-def changes(before: Answers, after: Answers) -> list[str]:
+def changes(before: Facts, after: Facts) -> list[str]:
     """Matches that are none any more, without a word, and those that are new."""
-    lost = [
-        f"lost: {key}" for key, value in before.items()
-        if value == "match" and after.get(key) != "match" and (key[0], "open") not in after
-    ]  # fmt: skip
-    new = [
-        f"new: {key}" for key, value in after.items()
-        if value == "match" and before.get(key) != "match" and (key[0], "open") not in before
-    ]  # fmt: skip
+    lost = [f"lost: {key}" for key, value in before.items() if value == "match" and not is_held(key, after)]
+    new = [f"new: {key}" for key, value in after.items() if value == "match" and not is_held(key, before)]
     return lost + new
 
 
+def is_held(key: tuple[object, ...], facts: Facts) -> bool:
+    """Whether what is a match elsewhere is one or unknown; what is open of a frame is so of all about it."""
+    return facts.get(key) in ("match", "unknown") or (key[0], "open") in facts
+
+
 @pytest.fixture(scope="module")
-def datasets(tmp_path_factory) -> dict[str, Dataset]:
-    folder = tmp_path_factory.mktemp("limits")
-    return {"frames": dataset_of({each: PROGRAMS[each] for each in FRAMES}, folder), "time": traces(folder / "t")}
+def stores(tmp_path_factory, crossroads) -> Stores:
+    return stores_of(tmp_path_factory.mktemp("limits"), crossroads)
 
 
 @pytest.fixture(autouse=True)
@@ -213,68 +246,92 @@ def solver_here(monkeypatch):
     monkeypatch.setattr(LazySolver, "check", check)
 
 
-@pytest.fixture(scope="module")
-def usual(datasets) -> dict[str, Answers]:
-    return {}
-
-
 class Compared:
-    """Answers with limits as they are, and what becomes of them with one at its least."""
+    """What inputs come to with limits as they are, and what becomes of it with one at its least."""
 
-    def __init__(self, datasets: dict[str, Dataset]) -> None:
-        self.datasets = datasets
-        self.usual: dict[str, Answers] = {}
-        self.seen: Counter[str] = Counter()
+    def __init__(self, stores: Stores) -> None:
+        self.stores = stores
+        self.usual: dict[str, Asked] = {}
 
-    def compare(self, program: str, *limit: tuple[str, str, float], **limited: float) -> None:
-        dataset = self.datasets[program.partition(":")[0]]
-        if program not in self.usual:
-            self.usual[program] = answers(dataset, program)
-        usual = self.usual[program]
+    def compare(self, name: str, limited: Callable[[pytest.MonkeyPatch], None], *, traced: bool = False) -> bool:
+        """Whether something is another way; never a match that is none any more, or a new one."""
+        if name not in self.usual:
+            ask(self.stores, name)  # what is made once is there
+            self.usual[name] = ask(self.stores, name)
+        usual = self.usual[name]
         with pytest.MonkeyPatch.context() as patch:
-            for each in limit:
-                set_least(patch, *each)
-            forget()
-            found, codes = told(dataset, program, **limited)
-        forget()
-        about = (limit, limited, program, PROGRAM[program])
-        assert not codes & {"internal", "impossible-requirement"}, (*about, codes)
-        assert codes or changes(usual, found) == [], about
-        self.seen["refused" if codes else "the same" if found == usual else "another answer"] += 1
+            limited(patch)
+            found = ask(self.stores, name, traced=traced)
+        assert not found.codes & {"internal", "impossible-requirement"}, (name, found.codes)
+        assert found.codes or changes(usual.facts, found.facts) == [], (name, found.facts)
+        changed = found.codes != usual.codes or found.facts != usual.facts
+        return changed or (traced and found.calls != usual.calls)
 
 
 @pytest.fixture(scope="module")
-def compared(datasets) -> Compared:
-    return Compared(datasets)
+def compared(stores) -> Compared:
+    return Compared(stores)
 
 
-def test_limits_are_found():
-    assert len(EVERY) > 60
-    for each in FACTS:
-        module, _, name = each.rpartition(".")
-        assert isinstance(getattr(importlib.import_module(module), name), int | float), each
+def at_least(limit: str) -> Callable[[pytest.MonkeyPatch], None]:
+    return lambda patch: patch.setattr(LIMITS, limit, LEAST.get(limit, 0))
 
 
-def test_a_few_limits_change_no_answer(compared):
-    before = compared.seen["another answer"]
-    for limit in EVERY:
-        if limit[1].removeprefix("LIMITS.") in STRICT:
-            for program in PROGRAM:
-                if program in SAMPLE:
-                    compared.compare(program, limit)
-    assert compared.seen["another answer"] > before
+def test_each_limit_is_reached_or_it_is_said_why_not():
+    assert REACHED.keys() | UNREACHED.keys() == {each.name for each in limits()}
+    assert not REACHED.keys() & UNREACHED.keys()
+    assert len(UNREACHED) <= 10
+    assert set(REACHED.values()) <= INPUTS.keys()
 
 
-@pytest.mark.parametrize("limited", [{"budget": 0}, {"correspondences": 1}, {"timeout_s": 1e-9}])
-def test_no_option_that_limits_changes_an_answer(compared, limited):
-    for program in PROGRAM:
-        if program in SAMPLE:
-            compared.compare(program, **limited)
+@pytest.mark.parametrize(
+    ("limit", "name"),
+    [pytest.param(*each, marks=[] if each[1] in FAST else [pytest.mark.slow]) for each in REACHED.items()],
+)
+@pytest.mark.timeout(300)
+def test_a_limit_is_reached_and_changes_no_answer(compared, limit, name):
+    assert compared.compare(name, at_least(limit), traced=True)
+
+
+@pytest.mark.parametrize("name", sorted(FAST & {each for each in INPUTS if each.startswith(("frames", "time"))}))
+@pytest.mark.parametrize("limited", [{"budget": 0}, {"correspondences": 1}, {"timeout_s": 1e-9}], ids=str)
+def test_no_option_that_limits_changes_an_answer(stores, compared, name, limited):
+    usual = ask(stores, name, traced=False)
+    found = INPUTS[name](stores, **limited)
+    assert changes(usual.facts, found) == []
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize("limit", EVERY, ids=lambda each: ".".join(map(str, each)))
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("limit", [each.name for each in limits()])
 def test_no_limit_changes_an_answer(compared, limit):
-    for program in PROGRAM:
-        compared.compare(program, limit)
+    for name in INPUTS:
+        compared.compare(name, at_least(limit))
+
+
+# --- sizes of batches
+
+
+def sizes() -> Iterator[tuple[str, str]]:
+    """The module and name of each size of what is done at once."""
+    for layer in ("forest", "geometry", "match", "query", "store", "temporal"):
+        package = importlib.import_module(f"scenicq.{layer}")
+        for found in pkgutil.walk_packages(package.__path__, f"scenicq.{layer}."):
+            spec = importlib.util.find_spec(found.name)
+            assert spec is not None
+            assert spec.origin is not None
+            for node in ast.parse(Path(spec.origin).read_text()).body:
+                for target in node.targets if isinstance(node, ast.Assign) else []:
+                    names = target.elts if isinstance(target, ast.Tuple) else [target]
+                    for each in names:
+                        if isinstance(each, ast.Name) and AT_ONCE.match(each.id):
+                            yield found.name, each.id
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(("module", "name"), sorted(sizes()))
+def test_no_size_of_a_batch_changes_an_answer(compared, module, name):
+    found = importlib.import_module(module)
+    for each in INPUTS:
+        compared.compare(each, lambda patch: patch.setattr(found, name, 1))

@@ -112,7 +112,7 @@ class _Picks:
         while self.sizes and self.picked[-1] + 1 == self.sizes[-1]:
             self.picked.pop()
             self.sizes.pop()
-        if not self.sizes or not self.left:
+        if not self.sizes or self.left <= 0:
             return False
         self.picked[-1] += 1
         self.sizes = []
