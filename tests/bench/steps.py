@@ -137,7 +137,7 @@ STEPS: dict[str, Off] = {
     "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
     "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
     "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
-    "trial": _set(field_solver, "find_witness", lambda *_: None),
+    "trial": _set(field_solver, "find_witness", lambda *_, **__: None),
     "heading propagation": _set(field_solver, "decide_directions", _undecided),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
 }

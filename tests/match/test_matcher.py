@@ -221,7 +221,7 @@ def test_a_requirement_that_is_only_probable_excludes_nothing():
 @pytest.fixture
 def no_search(monkeypatch):
     """No search for witnesses, which finds one before a solver is asked."""
-    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_, **__: None)
 
 
 # --- unknown never becomes no
@@ -267,11 +267,11 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
     scenario = compiled(HEADER + text)
     label = frame(car("a", 2.0, 57.0), car("b", 1.5, 58.0))
 
-    def decide(items, tolerance):
+    def decide(items, tolerance, *, hurried):
         return (
             Undecided(items[0][0], "nonlinear")
             if (2.0, 57.0) in [item[2] for item in items]
-            else real(items, tolerance)
+            else real(items, tolerance, hurried=hurried)
         )
 
     real = group_cache.decide_decomposed

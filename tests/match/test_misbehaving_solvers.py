@@ -33,7 +33,7 @@ other = new Car offset along angle relative to ego.heading by (Range(-6, 6), Ran
 def no_search():
     """No search for witnesses, which finds one before a solver is asked."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(witness_search, "search_witness", lambda *_: None)
+        patch.setattr(witness_search, "search_witness", lambda *_, **__: None)
         yield
 
 

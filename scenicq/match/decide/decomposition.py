@@ -23,12 +23,13 @@ from scenicq.match.tolerance import SLACK, Tolerance
 __all__ = ["decide_decomposed"]
 
 
-def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
+def decide_decomposed(items: list[Item], tolerance: Tolerance, *, hurried: bool = False) -> Outcome:
     """Decide a group without a solver, part by part where it has parts; `Undecided` where a solver is needed.
 
     Args:
         items: The group's constraints, conditioned.
         tolerance: Per feature.
+        hurried: Whether what takes long is postponed.
     """
     left: list[Item] = []
     for item in chain.from_iterable(map(item_conjuncts, items)):
@@ -39,13 +40,13 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
     used = {id(item): {leaf.identity: leaf for leaf in leaves(item[1])} for item in left}
     alone = _components(left, used, None)
     if len(alone) > 1:
-        return _all(alone, items, tolerance)
+        return _all(alone, items, tolerance, hurried=hurried)
     outlined = with_areas(left, tolerance)
     if outlined is not None:
-        found = decide_decomposed(outlined, tolerance)
+        found = decide_decomposed(outlined, tolerance, hurried=hurried)
         if not isinstance(found, Satisfied) or replay(items, found.values, tolerance, SLACK):
             return found
-        found = decide_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance)
+        found = decide_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance, hurried=hurried)
         sure = isinstance(found, Satisfied) and replay(items, found.values, tolerance, SLACK)
         return found if sure else Undecided(items[0][0], "nonlinear")
     if uses_field(left):
@@ -53,16 +54,16 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
 
         shared = _shared(left, used)
         parts, number = ([left], None) if shared is None else (shared[2], shared[0].identity)
-        return decide_directions(parts, number, tolerance)
+        return decide_directions(parts, number, tolerance, hurried=hurried)
     return decide(left, tolerance)
 
 
-def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance) -> Outcome:
+def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, *, hurried: bool) -> Outcome:
     """Parts that have no random variable in common."""
     values: dict[Identity, Value] = {}
     doubt: Undecided | None = None
     for part in parts:
-        outcome = decide_decomposed(part, tolerance)
+        outcome = decide_decomposed(part, tolerance, hurried=hurried)
         if isinstance(outcome, Refuted):
             return outcome
         if isinstance(outcome, Undecided):

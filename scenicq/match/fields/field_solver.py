@@ -25,7 +25,7 @@ from scenicq.match.fields.heading_propagation import bisected, directed, propaga
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.fields.witness_search import THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, conditioned
-from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import POSTPONED, Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["decide_directions", "repaired"]
@@ -36,13 +36,16 @@ _CLOSE = 0.05
 """How far from the answer of a solver a solution is looked for."""
 
 
-def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance) -> Outcome:
+def decide_directions(
+    parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance, *, hurried: bool = False
+) -> Outcome:
     """Decide a group with fields at hidden points, without a solver; `Undecided` where one is needed.
 
     Args:
         parts: The constraints, conditioned, in parts that share no random variable but one.
         shared: The random number that all of them share, if there are several parts.
         tolerance: Per feature.
+        hurried: Whether what takes many cases is postponed.
     """
     first = parts[0][0][0]
     start = BoxSet.start(ConstraintNetwork([item for part in parts for item in part], tolerance), {}).narrowed()
@@ -52,22 +55,27 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     if witness is not None:
         return witness
     if shared is None or len(parts) == 1:
-        return _alone(start, first, tolerance)
+        return _alone(start, first, tolerance, hurried=hurried)
     networks = [ConstraintNetwork(part, tolerance) for part in parts]
     chosen: list[list[BoxSet]] = []
     limits: list[FloatInterval] = []
     try:
         for network in networks:
             known = {shared: limits} if limits else {}
-            found = list(directed(BoxSet.start(network, known)))
-            if not found:
+            left: list[BoxSet] = []
+            for cases in directed(BoxSet.start(network, known), _MANY_CASES):
+                if cases.size:
+                    left.append(cases)
+                elif hurried:
+                    return Undecided(first, POSTPONED)
+            if not left:
                 return Refuted(network.items[0][0])
-            chosen.append(found)
-            limits = _joined(found, shared)
+            chosen.append(left)
+            limits = _joined(left, shared)
         # what a later part excludes of the shared number excludes ways of the earlier ones
         chosen = [_within(found, shared, limits) for found in chosen]
     except Exhausted as error:
-        return _searched(start) or Undecided.by(first, error)
+        return Undecided(first, POSTPONED) if hurried else _searched(start) or Undecided.by(first, error)
     ways = [_ways(found, shared) for found in chosen]
     if not all(ways):
         return Refuted(first)
@@ -75,7 +83,7 @@ def decide_directions(parts: Sequence[list[Item]], shared: Identity | None, tole
     choices = [id(node) for network in networks for node in network.choices]
     if isinstance(found, Undecided) and len(set(choices)) < len(choices):
         # fields that several parts ask for at one point have one direction there
-        return _alone(start, first, tolerance)
+        return _alone(start, first, tolerance, hurried=hurried)
     return found
 
 
@@ -88,12 +96,14 @@ def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:
         yield from (way for way in ways if way is not None)
 
 
-def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
+def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance, *, hurried: bool = False) -> Outcome:
     """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
     todo: deque[HeadingAssignment] = deque()
     doubt, searched = Undecided(first, "nonlinear"), False
     try:
         for number, way in enumerate(_one_by_one(directed(start, _MANY_CASES))):
+            if way is None and hurried:
+                return Undecided(first, POSTPONED)
             found = _searched(start) if way is None else solved(way, tolerance)
             searched = searched or way is None
             if isinstance(found, Satisfied):
@@ -108,6 +118,8 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Outcome:
                 return found
     except Exhausted as error:
         doubt = Undecided.by(first, error)
+    if hurried:
+        return Undecided(first, POSTPONED)
     return doubt if searched else _searched(start) or doubt
 
 

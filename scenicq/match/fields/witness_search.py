@@ -30,7 +30,7 @@ from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Satisfied
 from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["QUICK", "THOROUGH", "Effort", "OutcomeTable", "find_witness", "search_witness"]
+__all__ = ["AGAIN", "QUICK", "THOROUGH", "Effort", "OutcomeTable", "find_witness", "search_witness"]
 
 OutcomeTable = tuple[Sequence[object], NDArray[np.intp]]
 """What choices may come out as: their identities, and by outcome which option each takes, -1 where none matters."""
@@ -57,6 +57,8 @@ class Effort:
 
 QUICK = Effort(96, 8, 6, 3, 1)
 THOROUGH = Effort(384, 24, 4, 6, 2)
+AGAIN = (QUICK, QUICK, QUICK, THOROUGH, THOROUGH)
+"""Searches one after the other, each from other draws: where fields turn often, many a way is found by luck."""
 _CLOSER = 0.45
 """The share of the spread of one round that the next one has."""
 _PROGRESS = 0.7
@@ -82,41 +84,45 @@ _Numbers = NDArray[np.float64]
 _Indices = NDArray[np.intp]
 
 
-def find_witness(start: BoxSet, effort: Effort = QUICK, outcomes: Sequence[OutcomeTable] = ()) -> Satisfied | None:
+def find_witness(start: BoxSet, *efforts: Effort, outcomes: Sequence[OutcomeTable] = ()) -> Satisfied | None:
     """A witness of a group, or None if none was found.
 
     Args:
         start: One case: where the random variables can be.
-        effort: How much it is worth.
+        efforts: How much each of the searches is worth that are made one after the other.
         outcomes: What choices may come out as; others may come out as anything.
     """
-    trials = trials_left()
-    search = _Search(start, effort, outcomes, trials)
-    found = None
-    with suppress(CannotEvaluate, Exhausted):
-        found = search.run()
-    if found is None:
+    trials, space = trials_left(), TrialSpace(start)
+    for number, effort in enumerate(efforts or (QUICK,)):
+        search = _Search(space, effort, outcomes, trials, number)
+        found = None
+        with suppress(CannotEvaluate, Exhausted):
+            found = search.run()
+        if found is not None:
+            return found
         trials.left -= search.tried
-    return found
+    return None
 
 
 def search_witness(
-    items: Sequence[Item], tolerance: Tolerance, effort: Effort = QUICK, outcomes: Sequence[OutcomeTable] = ()
+    items: Sequence[Item], tolerance: Tolerance, *efforts: Effort, outcomes: Sequence[OutcomeTable] = ()
 ) -> Satisfied | None:
     """A witness of constraints, conditioned, or None if none was found; other arguments as of `find_witness`."""
     start = BoxSet.start(ConstraintNetwork(items, tolerance), {}).narrowed()
-    return find_witness(start, effort, outcomes) if start.size else None
+    return find_witness(start, *efforts, outcomes=outcomes) if start.size else None
 
 
 class _Search:
     """A search of one group."""
 
-    def __init__(self, start: BoxSet, effort: Effort, outcomes: Sequence[OutcomeTable], trials: Trials) -> None:
-        space = self.space = TrialSpace(start)
+    def __init__(
+        self, space: TrialSpace, effort: Effort, outcomes: Sequence[OutcomeTable], trials: Trials, seed: int
+    ) -> None:
+        self.space = space
         self.tried = 0
         self.most = trials.left / _SHARE
         self.effort = effort
-        self.rng = np.random.default_rng(0)
+        self.rng = np.random.default_rng(seed)
         self.tables = [
             ([(column, space.hidden[variable]) for column, variable in enumerate(variables)
               if isinstance(variable, Identity) and variable in space.hidden], picks)

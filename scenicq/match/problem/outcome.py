@@ -9,11 +9,15 @@ from scenicq.budget import Exhausted
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Identity, Value
 
-__all__ = ["UNOBSERVED", "Outcome", "Refuted", "Satisfied", "Undecided"]
+__all__ = ["POSTPONED", "UNOBSERVED", "Outcome", "Refuted", "Satisfied", "Undecided"]
 
 
 UNOBSERVED = "unobserved"
 """Why a group is undecided that reads what the label does not tell."""
+
+
+POSTPONED = "postponed"
+"""Why a group is undecided that takes long, as long as other groups or correspondences may make that needless."""
 
 
 @dataclass(frozen=True, slots=True)

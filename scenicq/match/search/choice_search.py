@@ -40,7 +40,7 @@ __all__ = ["Ask", "decide_with_choices"]
 
 
 _SEVERAL = 8
-"""Combinations of outcomes from which on a witness is looked for over all of them."""
+"""Combinations of outcomes from which on a witness is looked for over all of them, even if each may be cheap."""
 
 Decide = Callable[[list[Item]], Outcome]
 """Decides constraints that hold no choices."""
@@ -56,6 +56,8 @@ def decide_with_choices(
     decide: Decide,
     ask: Ask | None = None,
     depth: int = 0,
+    *,
+    hurried: bool = False,
 ) -> Outcome | None:
     """Decide a group that random choices are part of; None if there are none.
 
@@ -65,6 +67,7 @@ def decide_with_choices(
         decide: Decides what is left when all choices have come out.
         ask: The same by a solver, where nothing else decides it.
         depth: In how many other searches it is asked for.
+        hurried: Whether what takes long is postponed.
 
     Raises:
         Exhausted: The time is up.
@@ -84,7 +87,7 @@ def decide_with_choices(
     for constraint, node, seen in parts:
         if isinstance(node, Constant) and not holds(constraint, node.value, seen, tolerance):
             return Refuted(constraint, ground_cause((constraint, node, seen)))
-    return _ChoiceSearch(list(items), found, tolerance, decide, ask, depth).solve()
+    return _ChoiceSearch(list(items), found, tolerance, decide, ask, depth, hurried=hurried).solve()
 
 
 class _ChoiceSearch:
@@ -98,7 +101,10 @@ class _ChoiceSearch:
         decide: Decide,
         ask: Ask | None,
         depth: int,
+        *,
+        hurried: bool,
     ) -> None:
+        self.hurried = hurried
         self.items = items
         self.constraints = [constraint for constraint, _, _ in items]
         self.parts = parts
@@ -145,13 +151,15 @@ class _ChoiceSearch:
 
     def _search_witness(self) -> Satisfied | None:
         """A witness over all outcomes together, where fields at hidden points make each of them costly to decide."""
-        several = not self.depth and math.prod(len(domain.rows) for domain in self.domains) >= _SEVERAL
+        fewest = _SEVERAL if self.hurried else 2
+        several = not self.depth and math.prod(len(domain.rows) for domain in self.domains) >= fewest
         if not several or not uses_field(self.items):
             return None
-        from scenicq.match.fields.witness_search import QUICK, search_witness  # noqa: PLC0415 - takes long to load
+        from scenicq.match.fields.witness_search import AGAIN, QUICK, search_witness  # noqa: PLC0415 - takes long to load
 
+        efforts = (QUICK,) if self.hurried else AGAIN
         tables = [(domain.outcomes.variables, domain.outcomes.picks[domain.rows]) for domain in self.domains]
-        return search_witness(self.items, self.tolerance, QUICK, tables)
+        return search_witness(self.items, self.tolerance, *efforts, outcomes=tables)
 
     # --- domains
 

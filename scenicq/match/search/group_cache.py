@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from typing import Protocol
 
 from scenicq.budget import Exhausted, Trials, look
@@ -21,12 +22,12 @@ from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, condition_group, uses_field
 from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import POSTPONED, UNOBSERVED, Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.problem.radius import within_radius
 from scenicq.match.search.choice_search import Ask, decide_with_choices
 from scenicq.match.search.group_plan import GroupPlan
 
-__all__ = ["Asker", "GroupCache", "known_of", "surely", "translated"]
+__all__ = ["Asker", "GroupCache", "Patience", "known_of", "surely", "translated"]
 
 
 class Asker(Protocol):
@@ -35,6 +36,17 @@ class Asker(Protocol):
     def __call__(self, items: Sequence[Sequence[Item]]) -> Outcome:
         """Decide groups together."""
         ...
+
+
+class Patience(IntEnum):
+    """What may take long, of what is asked about a label."""
+
+    LITTLE = 0
+    """Nothing."""
+    LIKELY = 1
+    """What leaves normal variables likely values: cases of fields, searches for witnesses, the solver."""
+    ALL = 2
+    """Everything."""
 
 
 @dataclass(eq=False, slots=True)
@@ -47,6 +59,7 @@ class GroupCache:
         ask: The solver.
         lookups: What is known of the map.
         trials: How often all searches for witnesses may try in vain.
+        patience: What may take long now; the rest is postponed.
     """
 
     options: MatchOptions
@@ -54,9 +67,19 @@ class GroupCache:
     ask: Asker
     lookups: MapLookups
     trials: Trials = field(default_factory=lambda: Trials(LIMITS.witness_trials))
+    patience: Patience = Patience.ALL
     _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
         default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
     )
+
+    def has_postponed(self) -> bool:
+        """Whether a question is postponed."""
+        return any(_is_postponed(outcome) for _, outcome in self._known.values())
+
+    def have(self, patience: Patience) -> None:
+        """Have more patience, or less: what is postponed may be decided anew."""
+        self._known = {key: known for key, known in self._known.items() if not _is_postponed(known[1])}
+        self.patience = patience
 
     def items(self, group: Group, assignment: Mapping[int, int]) -> list[Item]:
         """The constraints of a group given the label (algorithm 1, line 11).
@@ -102,6 +125,8 @@ class GroupCache:
                     found = self._decided(self.items(likely.group, assignment), self._searched)
                     if isinstance(found, Satisfied):
                         return likely.restored(found)
+                    if self.patience < Patience.ALL:
+                        return Undecided(group.constraints[0], POSTPONED)
                 return self._decided(self.items(group, assignment), self._at_last)
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")
@@ -110,11 +135,15 @@ class GroupCache:
 
     def _decided(self, items: list[Item], at_last: Ask) -> Outcome:
         """What the cascade says of constraints, and where it says nothing, what is asked at last."""
-        tolerance = self.options.tolerance
-        chosen = decide_with_choices(items, tolerance, lambda left: decide_decomposed(left, tolerance), at_last)
+        tolerance, hurried = self.options.tolerance, self.patience is Patience.LITTLE
+
+        def decide(left: list[Item]) -> Outcome:
+            return decide_decomposed(left, tolerance, hurried=hurried)
+
+        chosen = decide_with_choices(items, tolerance, decide, at_last, hurried=hurried)
         if chosen is not None:
             return chosen
-        outcome = decide_decomposed(items, tolerance)
+        outcome = decide(items)
         return at_last([items]) if isinstance(outcome, Undecided) else outcome
 
     def _searched(self, items: Sequence[Sequence[Item]]) -> Outcome:
@@ -129,8 +158,14 @@ class GroupCache:
 
     def _at_last(self, items: Sequence[Sequence[Item]]) -> Outcome:
         """What nothing else decides: a search for a witness, then the solver."""
+        if self.patience is Patience.LITTLE:
+            return Undecided(items[0][0][0], POSTPONED)
         found = self._searched(items)
         return found if isinstance(found, Satisfied) else self.ask(items)
+
+
+def _is_postponed(outcome: Outcome) -> bool:
+    return isinstance(outcome, Undecided) and outcome.reason == POSTPONED
 
 
 def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:

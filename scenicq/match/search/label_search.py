@@ -25,7 +25,7 @@ from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import Asker, GroupCache, known_of, surely, translated
+from scenicq.match.search.group_cache import Asker, GroupCache, Patience, known_of, surely, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -118,12 +118,27 @@ class LabelSearch:
         Raises:
             Exhausted: The search takes more steps than it may.
         """
-        monolithic = self.options.method == "monolithic"
-        judged = None if monolithic else self._slots(plan, candidates)
+        monolithic, was_open = self.options.method == "monolithic", self._open
+        judged: _Judged | None = None
+        # what is cheap may settle a label before what takes long is looked at
+        for patience in Patience if self.options.method == "auto" else (Patience.ALL,):
+            self._open = was_open
+            self._decisions.have(patience)
+            judged = None if monolithic else self._slots(plan, candidates)
+            found = self._monolithic(plan, candidates) if monolithic else self._modular(plan, judged)
+            try:
+                for solution in found:
+                    if self._is_new(solution.assignment, twins):
+                        self._decisions.patience = Patience.ALL
+                        yield solution
+                        self._decisions.patience = patience
+                if not self._decisions.has_postponed() or next(self._modular_open(plan, judged), None) is None:
+                    break
+            except Exhausted as error:
+                if error.reason != "budget" or not self._decisions.has_postponed():
+                    raise
+        self._decisions.have(Patience.ALL)
         self._asked.append((plan, judged, twins))
-        for solution in self._monolithic(plan, candidates) if monolithic else self._modular(plan, judged):
-            if self._is_new(solution.assignment, twins):
-                yield solution
 
     def open_ones(self) -> Iterator[tuple[MatchPlan, Failure]]:
         """Every correspondence that nothing excludes but something keeps from being a match, of what was asked for.
@@ -241,7 +256,7 @@ class LabelSearch:
             return
         assignment = {**ego, index: candidates[index][0]}
         try:
-            found = decide_decomposed(self.items(blamed.group, assignment), self.options.tolerance)
+            found = decide_decomposed(self.items(blamed.group, assignment), self.options.tolerance, hurried=True)
         except CannotEvaluate:
             found = None
         outcome = found if isinstance(found, Refuted) else Refuted(blamed.group.constraints[0])

@@ -27,7 +27,7 @@ FEW = 5000
 def cases(monkeypatch):
     """How many cases are narrowed; no witness is found by trial before."""
     counts = []
-    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
 
     def counted(some):
         counts.append(some.size)

@@ -93,7 +93,7 @@ def test_cells_of_one_box_are_looked_for_once(monkeypatch):
 
     real = cell_assignment._cells_in
     monkeypatch.setattr(cell_assignment, "_cells_in", watched)
-    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
     tolerance, most = MatchOptions(tolerance=EXACT).tolerance, 0
     for seed in range(6):
         for items, _ in groups(CHAIN.format(cars=1), seed):

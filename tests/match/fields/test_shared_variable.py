@@ -62,7 +62,7 @@ def test_intervals_that_meet_are_one():
 def asked(monkeypatch):
     """How many ways the parts had that were put together; no witness is found by trial before."""
     counts = []
-    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
 
     def counted(parts, *rest):
         counts.append([len(ways) for ways in parts])
@@ -76,7 +76,7 @@ def asked(monkeypatch):
 def test_a_way_without_a_solution_excludes_only_if_its_program_is_exact(monkeypatch, exact):
     # no linear program has a solution, of which an inexact one proves nothing
     found = []
-    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
     monkeypatch.setattr(
         field_solver, "find_shared_value", lambda *given: found.append(given) or find_shared_value(*given)
     )
@@ -129,7 +129,7 @@ def blamed(outcome, parts):
 
 @pytest.mark.parametrize("far", [3.0, 12.0])
 def test_parts_suit_each_other_exactly_where_arithmetic_says_so(far, monkeypatch):
-    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
     rng, met = random.Random(1), Counter()
     for _ in range(18):
         field, value = patchwork(rng, 4), rng.uniform(0.5, 5.5)
@@ -161,7 +161,7 @@ def test_parts_suit_each_other_exactly_where_arithmetic_says_so(far, monkeypatch
 
 def test_parts_that_ask_for_one_direction_get_one(monkeypatch):
     told = []
-    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
 
     def noted(*args):
         told.append(find_shared_value(*args))

@@ -20,7 +20,7 @@ BEHIND = "new Car behind spot by Range(2, 14), facing {} relative to spot, with 
 
 @pytest.mark.parametrize("heading", ["Normal(46, 21) deg", "Normal(0, 1)", "Normal(Range(0, 1), 2)"])
 def test_a_heading_without_bounds_is_no_error(heading, monkeypatch):
-    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
     scenario = compiled(EGO + SPOT + BEHIND.format(heading))
     matcher = Matcher(scenario, MatchOptions(tolerance=Tolerance(position=0.05, heading=0.01), timeout_s=3))
     for seed in range(2):

@@ -33,7 +33,7 @@ def found(monkeypatch):
 
     search = field_solver.find_witness
     monkeypatch.setattr(field_solver, "find_witness", noted)
-    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_, **__: None)
     return answers
 
 
@@ -104,8 +104,8 @@ def test_with_and_without_trials_the_verdict_is_the_same(name, monkeypatch):
         ]
     options = MatchOptions(tolerance=EXACT)
     trying = [type(Matcher(scenario, options).match(label)) for label in labels]
-    monkeypatch.setattr(field_solver, "find_witness", lambda *_: None)
-    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_, **__: None)
     assert trying == [type(Matcher(scenario, options).match(label)) for label in labels]
     assert {Match, NoMatch} <= set(trying)
 
@@ -126,11 +126,11 @@ def test_where_ways_are_many_more_draws_find_what_few_have_missed(monkeypatch):
         return propagated(some)
 
     monkeypatch.setattr(field_solver, "find_witness", noted)
-    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_, **__: None)
     monkeypatch.setattr(heading_propagation, "propagated", counted)
     label = label_of(scenario, drawn(scenario, 1), random.Random(1))
     for _ in useful:
         cases.append(0)
         assert isinstance(matcher.match(label), Match)
-    assert efforts == [QUICK, THOROUGH] * 2, "more draws are made once, and where cases were many"
+    assert efforts == [QUICK, QUICK, QUICK, THOROUGH] * 2, "more draws are made once, and where cases were many"
     assert 4 * cases[1] < cases[0], "a witness ends the search"

@@ -165,7 +165,7 @@ def test_what_is_left_of_an_option_goes_to_a_solver_where_nothing_else_decides_i
     chosen: float, option: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # a search for a witness finds one of most of these
-    monkeypatch.setattr(witness_search, "search_witness", lambda *_: None)
+    monkeypatch.setattr(witness_search, "search_witness", lambda *_, **__: None)
     a, b, c = 1.3, 1.7, 1.1
     shown = {"pace": chosen * a * b * c, "drive": chosen + a * b - b * c, "third": a * a * b + c * chosen}
     ego = LabelObject("ego", "Object", "thing", 0.0, 0.0, heading=0.0, attributes=shown)

@@ -1,0 +1,103 @@
+"""What is cheap is decided first: another group, another candidate or another outcome may make the rest needless."""
+
+import math
+import random
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scenes import compiled, drawn, label_of
+from shapely import LineString
+
+from scenicq.geometry.features import MapFeature
+from scenicq.geometry.network import Network
+from scenicq.match.fields import field_solver, heading_propagation
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
+from scenicq.match.verdict import Match, NoMatch
+from scenicq.store.labels import Label, LabelObject
+
+TOLERANCE = parse_tolerance("position=0.05,heading=0.5deg")
+FOLLOWERS = """model scenic.domains.driving.model
+spot = new OrientedPoint on road
+ego = new Car following roadDirection from spot for Range(5, 15)
+lead = new Car following roadDirection from spot for Range(20, 35)
+"""
+
+
+@cache
+def junction() -> Network:
+    """Eight ways over one place: ahead and around a corner, from either side of each of two streets."""
+    features: list[MapFeature] = []
+    corner = [(20 - 20 * math.cos(a), -20 + 20 * math.sin(a)) for a in np.linspace(0, math.pi / 2, 16).tolist()]
+    ways = [[(0.0, -40.0), *corner, (40.0, 0.0)], [(-40.0, 0.0), (40.0, 0.0)]]
+    for quarter in range(4):
+        cosine, sine = round(math.cos(quarter * math.pi / 2)), round(math.sin(quarter * math.pi / 2))
+        for number, way in enumerate(ways):
+            line = [(x * cosine - y * sine, x * sine + y * cosine) for x, y in way]
+            name, area = f"{quarter}{number}", LineString(line).buffer(3.0, cap_style="flat")
+            features += [
+                MapFeature(f"road{name}", "road", area, {"forward": f"group{name}"}),
+                MapFeature(f"group{name}", "lane_group", area, {"road": f"road{name}"}),
+                MapFeature(
+                    f"lane{name}", "lane", area,
+                    {"road": f"road{name}", "group": f"group{name}", "centerline": [line]},
+                ),
+            ]  # fmt: skip
+    return Network("junction", features)
+
+
+@pytest.fixture
+def cases(monkeypatch):
+    """How many cases were looked at of which way fields point."""
+    seen = [0]
+    propagated = heading_propagation.propagated
+
+    def counted(some):
+        seen[0] += some.size
+        return propagated(some)
+
+    monkeypatch.setattr(heading_propagation, "propagated", counted)
+    return seen
+
+
+def label(seed: int):
+    scenario = compiled(FOLLOWERS, junction())
+    return label_of(scenario, drawn(scenario, seed), random.Random(seed))
+
+
+@pytest.fixture
+def matcher():
+    return Matcher(compiled(FOLLOWERS, junction()), MatchOptions(tolerance=TOLERANCE, timeout_s=20))
+
+
+def test_where_ways_cross_two_followers_of_one_hidden_point_are_found_by_luck(matcher, cases):
+    for seed in (2, 4, 5):
+        assert isinstance(matcher.match(label(seed)), Match)
+    assert cases[0] < 2000, "most ways are never looked at"
+
+
+def test_what_another_group_excludes_is_not_gone_into(matcher, cases):
+    seen = label(2)
+    (lead,) = seen.objects
+    assert isinstance(matcher.match(replace(seen, objects=(replace(lead, heading=lead.heading + 0.1),))), NoMatch)
+    assert cases[0] < 1500, "the heading alone excludes it"
+
+
+def test_unlikely_values_are_looked_at_last(monkeypatch):
+    asked = []
+    decide = field_solver.decide_directions
+    monkeypatch.setattr(field_solver, "decide_directions", lambda *a, **k: asked.append(a) or decide(*a, **k))
+    text = "model scenic.domains.driving.model\nego = new Car at (0, -35), facing 0 deg\n"
+    text += "other = new Car following roadDirection from ego for Normal(16.5, 2.7)\n"
+    matcher = Matcher(compiled(text, junction()), MatchOptions(tolerance=TOLERANCE, timeout_s=20))
+    ego = LabelObject("ego", "Car", "car", 0.0, -35.0, 0.0, 2.0, 4.5)
+    aside = LabelObject("aside", "Car", "car", 1.0, -25.0, 0.0, 2.0, 4.5)
+    found = LabelObject("found", "Car", "car", 0.0, -19.0, 0.0, 2.0, 4.5)
+    for objects in ((aside, found), (found, aside)):
+        verdict = matcher.match(Label("f", "r", 0, "junction", ego, objects))
+        assert isinstance(verdict, Match)
+        assert verdict.correspondence["other"] == "found"
+    assert len(asked) < 30, "the way of one that is aside is not looked for over hundreds of metres"
