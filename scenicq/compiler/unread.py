@@ -46,9 +46,12 @@ def evaluate_when_read(
     with run.excluded.apart() as found:
         try:
             value: ModelValue = compute()
-        except NothingLeftError as error:
+        except ScenarioError as error:
             # Scenic refuses `Uniform()` where it stands: it is given nothing, whatever a scene has
-            if any(isinstance(each, ast.Call) and not each.arguments for each in walk(node)):
+            empty = isinstance(error, NothingLeftError) and any(
+                isinstance(each, ast.Call) and not each.arguments for each in walk(node)
+            )
+            if empty or any(each.code != "map-lacks" for each in error.diagnostics):
                 raise
             value = NoValue(error)
     run.excluded.keep(value, found)

@@ -128,7 +128,7 @@ def test_on_no_map_a_program_is_without_scenes_and_without_a_word(name):
         ("ego = new Object in network.laneAt(0 @ 0), facing 0", "no such element", "in network.laneAt(0 @ 0)"),
         (f"ego = new Object {HERE}\nrequire (roadDirection at ego) > 0", "no lane that", "(roadDirection at ego)"),
         (
-            f"ego = new Object {HERE}\nx = network.laneAt(ego).group",
+            f"ego = new Object {HERE}\nrequire network.laneAt(ego).group is None",
             "no element here that `group` could be of",
             "group",
         ),

@@ -42,6 +42,17 @@ def test_a_name_that_is_read(value):
 
 
 @pytest.mark.parametrize(
+    "value",
+    ["network.lanes[0].sections[0].laneToRight.laneToRight", "network.lanes[0].sections[0].fasterLane.lane",
+     "[network.laneAt((1.75, 20)).sections[0].laneToRight.laneToRight, 3]"],
+)  # fmt: skip
+def test_what_the_map_lacks_is_an_error_once_it_is_read(value):
+    assert isinstance(verdict(f"zone = {value}\nother = zone\n"), Match)
+    with pytest.raises(ScenarioError, match="the map"):
+        verdict(f"zone = {value}\nrequire zone is not None\n")
+
+
+@pytest.mark.parametrize(
     "choice", ["*Uniform([], [])", "*Uniform(*[[]])", "*Uniform(*network.lanes[:1]).group.lanes[9:]"]
 )
 def test_a_choice_of_nothing_is_an_error_once_it_is_read(choice):
