@@ -11,8 +11,10 @@ from scenicq.compiler.coerce import to_field, to_heading, to_region, to_scalar, 
 from scenicq.compiler.values import ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.compute import fold
-from scenicq.forest.nodes import Constant, DiscAt, RectangleAt
+from scenicq.forest.bounds import scalar_bounds
+from scenicq.forest.compute import CannotEvaluate, fold
+from scenicq.forest.evaluate import evaluate
+from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, DiscAt, Node, RectangleAt, Undefined
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import PointSet, PolygonSet, PolylineSet
 from scenicq.geometry.road_direction import along_lines
@@ -49,8 +51,13 @@ def _rectangular(
     height: ModelValue = None,
     name: ModelValue = None,
 ) -> ModelValue:
-    size = (to_scalar(width, span), to_scalar(height if length is None else length, span))
+    # sides are mirrored where they are negative, as Scenic does
+    size = [_magnitude(to_scalar(side, span), span) for side in (width, height if length is None else length)]
     return fold(RectangleAt(to_vector(position, span), to_heading(heading, span), *size, span=span))
+
+
+def _magnitude(side: Node, span: Span) -> Node:
+    return build.arithmetic(ArithmeticOp.ABS, side, span=span) if scalar_bounds(side)[0] < 0 else side
 
 
 def _points(values: ModelValue, span: Span, least: int) -> list[tuple[float, float]]:
@@ -58,13 +65,29 @@ def _points(values: ModelValue, span: Span, least: int) -> list[tuple[float, flo
         raise fail("wrong-type", "a list of points is needed here", span, f"this is {describe(values)}")
     points: list[tuple[float, float]] = []
     for value in cast("list[ModelValue]", values):
-        node = to_vector(value, span)
-        if not isinstance(node, Constant):
+        point = _known(to_vector(value, span))
+        if point is None:
             raise fail("unsupported-region", "the corners of this region must be known", span, "a random corner")
-        points.append(cast("tuple[float, float]", node.value))
+        points.append(point)
     if len(points) < least:
         raise fail("wrong-value", f"at least {least} points are needed here", span)
     return points
+
+
+def _known(point: Node) -> tuple[float, float] | None:
+    """The one value that a point has, such as of where a field leads that has one direction there; else None."""
+    choices = False
+
+    def choose(node: DirectionAt, headings: tuple[float, ...]) -> float:
+        nonlocal choices
+        choices = True
+        return headings[0]
+
+    try:
+        value = evaluate(point, {}, None, choose)
+    except CannotEvaluate:
+        return None
+    return None if choices or isinstance(value, Undefined) else cast("tuple[float, float]", value)
 
 
 def _orientation(value: ModelValue, span: Span) -> VectorField | None:
