@@ -144,7 +144,10 @@ def replayed(request: dict[str, Any], chart: Path) -> dict[str, str]:
         with patience(request["seconds"]):
             with places(found):
                 scenario = compiled(request, chart)
-            return replay(scenario, found, request)
+            answer = replay(scenario, found, request)
+            if answer["replay"] == "refuted" and OFF_ROAD:
+                return {"replay": "open", "why": f"direction off the road: {answer['why']}"}
+            return answer
     except (OutOfPatienceError, RejectionException) as end:
         return {"replay": "open", "why": f"{type(end).__name__}: {end}"}
     except Exception as error:  # a replay that Scenic is not made for

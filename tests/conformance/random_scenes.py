@@ -51,7 +51,7 @@ TOLERANCE = parse_tolerance("position=0.05,heading=0.5deg")
 CLOCK_S = 20.0
 """Seconds of processor time for compiling a program, and again for each label."""
 SCENES = 3
-DRAWING_S, FIRST_S = 5.0, 2.0
+DRAWING_S, FIRST_S = 4.0, 1.2
 """Seconds of processor time that Scenic may take for the scenes of one program, and for the first of them."""
 GOOD = frozenset({"right", "Scenic refuses", "no scene", "told apart", "allowed"})
 
@@ -210,6 +210,8 @@ def excuse(text: str, scene: dict[str, Any], why: str = "") -> str:
         return "size that is not positive"
     if scene.get("directions_off_road"):
         return "direction off the road"
+    if re.search(r"Point on (?:ego|o\d+)\b", text) and "distance" in text:
+        return "height of a point on an object"
     if "mutate" in text and "require" in text.replace("with requireVisible", ""):
         return "requirement on what is mutated"
     return ""
