@@ -285,7 +285,7 @@ class Intersection(NetworkElement):
         roads: The roads that the map lists for it.
         lanes: The lanes of those roads that lie inside.
         incomingLanes: Lanes that end at it, by the heading from the middle of their ends, from -pi on.
-        outgoingLanes: Lanes that start at it, in the same order.
+        outgoingLanes: Lanes that start at it, in the map's order if it gives one, else as those.
         maneuvers: Ways through it, start lane by start lane.
         signals: The signals of the roads inside; none where the map gives none.
     """

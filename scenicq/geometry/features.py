@@ -49,7 +49,7 @@ REFERENCES: dict[str, dict[str, str]] = {
     "lane_group": {"road": "road", "opposite": "lane_group", "sidewalk": "sidewalk", "shoulder": "shoulder", **_ENDS},
     "road": {"forward": "lane_group", "backward": "lane_group", "intersection": "intersection", **_ENDS},
     "road_section": {"road": "road", "forward": "lane_section", "backward": "lane_section", **_ENDS},
-    "intersection": {"roads": "road", "incoming": "lane"},
+    "intersection": {"roads": "road", "incoming": "lane", "outgoing": "lane"},
     "sidewalk": {"road": "road", **_ENDS},
     "shoulder": {"road": "road", **_ENDS},
     "curb": {"group": "lane_group"},

@@ -351,7 +351,7 @@ def _link_intersections(features: list[MapFeature], elements: Elements) -> None:
         ahead = [other for lane in crossing.lanes for other in lane.successors if other not in own]
         behind = [other for lane in crossing.lanes for other in lane.predecessors if other not in own]
         crossing.incomingLanes = by_heading((*_found(elements.lanes, feature, "incoming"), *behind), -1)
-        crossing.outgoingLanes = by_heading(ahead, 0)
+        crossing.outgoingLanes = _found(elements.lanes, feature, "outgoing") or by_heading(ahead, 0)
 
 
 def _link_maneuvers(features: list[MapFeature], elements: Elements) -> None:

@@ -263,11 +263,14 @@ def _road_section(section: Any, left_hand: bool) -> dict[str, Any]:
 def _intersection(crossing: Any, turned: Callable[[Any], bool]) -> dict[str, Any]:
     ways = [(each, turned(each.connectingLane)) for each in crossing.maneuvers]
     incoming = [each.endLane if back else each.startLane for each, back in ways]
+    any_turned = any(back for _, back in ways)
     # lanes that end here and lead nowhere
-    incoming += [] if any(back for _, back in ways) else crossing.incomingLanes
+    incoming += [] if any_turned else crossing.incomingLanes
     links = {
         "roads": [road.uid for road in crossing.roads],
         "incoming": list(dict.fromkeys(lane.uid for lane in incoming)),
+        # where several lie in one direction from the middle, Scenic's order is that of rounding errors
+        "outgoing": None if any_turned else [lane.uid for lane in crossing.outgoingLanes],
         "signalized": bool(crossing.isSignalized),
         "signals": [_signal(signal) for signal in crossing.signals],
     }

@@ -16,6 +16,8 @@ from scenicq.geometry.elements import Intersection, Lane
 from scenicq.geometry.features import MapFeature, dangling
 from scenicq.geometry.network import Network
 
+TOLD_OUTGOING = ["w-out", "n-out", "s-out", "e-out"]
+"""An order of lanes away from an intersection that is none of headings."""
 SPAN = Span(Source("no program", ""), 0, 0)
 
 
@@ -53,7 +55,7 @@ def star(*, told: bool) -> Network:
     ]
     middle = LineString([(0, -20), (0, 20)]).buffer(20)
     # the order of maneuvers is that of the file, which the map tells or not
-    order = {"incoming": ["n-in", "w-in", "e-in", "s-in"]} if told else {}
+    order = {"incoming": ["n-in", "w-in", "e-in", "s-in"], "outgoing": TOLD_OUTGOING} if told else {}
     return Network("star", [*features, MapFeature("star", "intersection", middle, order)])
 
 
@@ -70,7 +72,8 @@ def test_lanes_of_an_intersection_go_round_it_and_its_maneuvers_start_by_start(t
     assert isinstance(crossing, Intersection)
     assert [each.id for each in crossing.incomingLanes] == _around(crossing.incomingLanes, -1)
     assert [each.id for each in crossing.incomingLanes] == ["s-in", "e-in", "n-in", "w-in"]
-    assert [each.id for each in crossing.outgoingLanes] == _around(crossing.outgoingLanes, 0)
+    onward = TOLD_OUTGOING if told else _around(crossing.outgoingLanes, 0)
+    assert [each.id for each in crossing.outgoingLanes] == onward
     starts = ["n-in", "w-in", "e-in", "s-in"] if told else [each.id for each in crossing.incomingLanes]
     ways = [each.connectingLane.id for each in crossing.maneuvers if each.connectingLane]
     assert ways == [
