@@ -38,7 +38,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.ego_frame import DISTANCE, PLACE, in_ego_frame
-from scenicq.query.prefilter.map_relations import MapRelations
+from scenicq.query.prefilter.map_relations import MapRelations, is_equation
 from scenicq.query.prefilter.regions import RegionNames, near_region
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
@@ -220,7 +220,7 @@ class ConditionReader:
                 case RegionIntersection(parts=parts):
                     todo += reversed(parts)
                 case Select() as looked_up if names is not None:
-                    near = self.relations.in_region_of(looked_up, reach, surely=False)
+                    near = self.relations.may_be_in(looked_up, reach)
                     if near is not None:
                         yield near, ""
                 case DiscAt() | SectorAt() as seen:
@@ -293,9 +293,14 @@ class ConditionReader:
         """The same for a requirement."""
         for part in conjuncts(in_ego_frame(root, self.scenario.ego)):
             objects = self.involved(part)
-            if (looked_up := self.relations.holds(part, surely=False)) is not None:
+            if (looked_up := self.relations.may_hold(part)) is not None:
                 yield objects, "", looked_up[1]
                 continue
+            if is_equation(part) and len(objects) == 1:
+                shared = self.relations.may_share(part.left, part.right)
+                if shared is not None:
+                    yield objects, "", shared
+                    continue
             if len(objects) > 2:
                 continue
             if isinstance(part, Contains) and isinstance(part.point, Feature) and part.point.property == "position":

@@ -3,13 +3,15 @@
 `ego.lane` at an observed place is one of the elements whose areas are there, which are rows of `memberships`. What a
 program makes of an element (its own area, the lane to its left, its group, the lanes ahead of it) is a relation between
 elements and the regions of a map, so that "in `ego.lane`" is a join. Each relation is asked in two ways: of all
-elements that may be meant (necessary), and where one alone lies at the place and is surely meant (sufficient).
+elements that may be meant (necessary), and of those that surely lie at the place, where any of them may be meant
+(sufficient).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeGuard
 
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -33,7 +35,7 @@ from scenicq.query.prefilter.regions import RegionNames, region_ids
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.sql import sql_text
 
-__all__ = ["LookUp", "MapRelations", "allowed_elements", "look_up_of"]
+__all__ = ["LookUp", "MapRelations", "allowed_elements", "is_equation", "look_up_of"]
 
 _AT = f"distance <= {number(TOLERANCE + SLACK)}"
 """An element that may be found at a place."""
@@ -46,10 +48,16 @@ class LookUp:
     Attributes:
         occupancy: The elements.
         object: The object, by index.
+        ranks: Of how many elements at the place any may be meant; where there are more, it is not known which.
     """
 
     occupancy: Occupancy
     object: int
+    ranks: int = 1
+
+    def is_like(self, other: LookUp) -> bool:
+        """Whether both are of one element."""
+        return self.occupancy is other.occupancy and self.object == other.object
 
 
 def look_up_of(node: Node) -> LookUp | None:
@@ -57,11 +65,9 @@ def look_up_of(node: Node) -> LookUp | None:
     ranked = node.options if isinstance(node, Select) and isinstance(node.index, Index) else (node,)
     found = [_of_rank(each) for each in ranked]
     first = found[0]
-    if first is None or any(
-        each is None or (each.occupancy, each.object) != (first.occupancy, first.object) for each in found
-    ):
+    if first is None or not all(each is not None and each.is_like(first) for each in found):
         return None
-    return first
+    return replace(first, ranks=len(found))
 
 
 def _of_rank(node: Node) -> LookUp | None:
@@ -98,6 +104,14 @@ def allowed_elements(root: Node) -> tuple[LookUp, frozenset[int]] | None:
     return look_up, every & numbers if positive else every - numbers
 
 
+def is_equation(node: Node) -> TypeGuard[Compare]:
+    """Whether a condition is that one element lies at two places."""
+    if not isinstance(node, Compare) or node.op is not CompareOp.EQ:
+        return False
+    one, other = look_up_of(node.left), look_up_of(node.right)
+    return one is not None and other is not None and one.occupancy is other.occupancy and one.object != other.object
+
+
 @dataclass(slots=True)
 class MapRelations:
     """The relations that a plan asks for: tables of frames and of regions that are meant there.
@@ -118,35 +132,127 @@ class MapRelations:
             rows: The view of memberships.
             frames: A query of the frames that are wanted, with their numbers `f`.
         """
-        there = (
-            f"SELECT q.f, m.region, m.distance FROM {rows} m JOIN ({frames}) q ON m.frame = q.frame "
-            f"WHERE m.object = 'ego' AND m.{_AT}"
-        )
         for table, name in self._tables.items():
-            at = there
-            if table.alone:
+            own = "m.object <> 'ego'" if table.everybody else "m.object = 'ego'"
+            at = (
+                f"SELECT q.f, m.object, m.region, m.distance FROM {rows} m JOIN ({frames}) q ON m.frame = q.frame "
+                f"WHERE {own} AND m.{_AT}"
+            )
+            if table.first:
                 at = (
-                    f"SELECT f, any_value(region) AS region FROM ({there}) WHERE region IN {_set(table.alone)} "
-                    "GROUP BY f HAVING count(DISTINCT region) = 1 AND min(distance) = 0"
+                    f"SELECT f, object, region FROM ({at}) WHERE region IN {_set(table.first)} "
+                    f"QUALIFY distance = 0 AND count(*) OVER (PARTITION BY f, object) <= {table.most}"
                 )
             sources, regions = (_list([pair[side] for pair in table.pairs]) for side in (0, 1))
             relation = f"SELECT unnest({sources}) AS source, unnest({regions}) AS region"
-            yield name, f"SELECT DISTINCT e.f, r.region FROM ({at}) e JOIN ({relation}) r ON r.source = e.region"
+            yield (
+                name,
+                f"SELECT DISTINCT e.f, e.object, r.region FROM ({at}) e JOIN ({relation}) r ON r.source = e.region",
+            )
 
-    def in_region_of(self, region: Select, reach: float, *, surely: bool) -> str | None:
-        """A condition on memberships that an object in a region meets which hangs on what lies where the ego is.
+    def may_be_in(self, region: Select, reach: float) -> str | None:
+        """A condition on memberships that an object meets which lies in a region that hangs on where the ego is.
 
         Args:
             region: The region.
             reach: Metres that the object may be off; at most `MEMBERSHIP_RADIUS_M`.
-            surely: Whether the object surely is there; else it may be.
 
         Returns:
             SQL over the columns of `memberships` and `q.f`; None if the region is not made of elements of the map.
         """
-        look_up = look_up_of(region.index)
-        if look_up is None or look_up.object != self.ego:
+        look_up = self.of_ego(region.index)
+        meant = None if look_up is None else self._meant(region)
+        if look_up is None or meant is None:
             return None
+        return self._in_meant(self._table(look_up.occupancy, meant), reach)
+
+    def surely_in(self, region: Select, reach: float, among: Collection[int], most: int) -> str | None:
+        """The same of an object that surely lies there, where the element that is meant is one of some.
+
+        Args:
+            region: The region.
+            reach: Metres that the object may be off.
+            among: The numbers of the elements.
+            most: Of how many elements at the place any may be meant.
+        """
+        look_up = self.of_ego(region.index)
+        meant = None if look_up is None else self._meant(region)
+        if look_up is None or meant is None:
+            return None
+        some = {place: ids for place, ids in meant.items() if place in among}
+        return self._in_meant(self._table(look_up.occupancy, some, most), reach)
+
+    def may_hold(self, root: Node) -> tuple[int, str] | None:
+        """A condition on memberships that a condition on what lies where an object is amounts to.
+
+        Returns:
+            The object, and SQL over the columns of its memberships; None where it is no such condition, or may hold
+            where nothing lies.
+        """
+        found = allowed_elements(root)
+        sources = None if found is None else self._sources(found[0].occupancy)
+        if found is None or sources is None or found[0].occupancy.nothing in found[1]:
+            return None
+        ids = sorted({each for layer in sources for each, place in layer if place in found[1]})
+        return found[0].object, f"(region IN {_set(ids)} AND {_AT})"
+
+    def surely_holds(self, look_up: LookUp, among: Collection[int], most: int) -> str | None:
+        """A condition on frames: that one of some elements lies where the ego is, and may be the one that is meant."""
+        if look_up.occupancy.nothing in among:
+            return None
+        table = self._table(look_up.occupancy, dict.fromkeys(among, ("",)), most)
+        return None if table is None else f"(q.f IN (SELECT f FROM {table}))"
+
+    def may_share(self, one: Node, other: Node) -> str | None:
+        """A condition on memberships of an object in whose place the element may lie that may lie where the ego is."""
+        ours = self._shared(one, other)
+        if ours is None:
+            return None
+        table = self._table(ours.occupancy, self._themselves(ours.occupancy))
+        return None if table is None else f"((q.f, region) IN (SELECT f, region FROM {table}) AND {_AT})"
+
+    def surely_share(self, one: Node, other: Node, among: Collection[int], most: int) -> str | None:
+        """The same where one of some elements surely lies at both places, and any at either may be meant.
+
+        Args:
+            one: The number of the element at one place.
+            other: That at the other.
+            among: The numbers of those that may be meant.
+            most: Of how many elements at a place any may be meant.
+        """
+        ours = self._shared(one, other)
+        if ours is None:
+            return None
+        own = {place: ids for place, ids in self._themselves(ours.occupancy).items() if place in among}
+        ego, anybody = (self._table(ours.occupancy, own, most, everybody=each) for each in (False, True))
+        if ego is None or anybody is None:
+            return None
+        theirs = f"(q.f, q.object, region) IN (SELECT f, object, region FROM {anybody})"
+        return f"({theirs} AND (q.f, region) IN (SELECT f, region FROM {ego}))"
+
+    def _shared(self, one: Node, other: Node) -> LookUp | None:
+        """The look-up where the ego is, if two are of the same elements, one of them where the ego is."""
+        first, second = look_up_of(one), look_up_of(other)
+        if first is None or second is None or first.occupancy is not second.occupancy:
+            return None
+        if (first.object == self.ego) == (second.object == self.ego):
+            return None
+        return first if first.object == self.ego else second
+
+    def _themselves(self, occupancy: Occupancy) -> dict[int, Sequence[str]]:
+        """Each element as the regions in which it is found."""
+        found: dict[int, Sequence[str]] = {}
+        for layer in self._sources(occupancy) or ():
+            for each, place in layer:
+                found[place] = (*found.get(place, ()), each)
+        return found
+
+    def of_ego(self, index: Node) -> LookUp | None:
+        """The look-up where the ego is, whose number an expression is."""
+        found = look_up_of(index)
+        return found if found is not None and found.object == self.ego else None
+
+    def _meant(self, region: Select) -> dict[int, Sequence[str]] | None:
         meant: dict[int, Sequence[str]] = {}
         for place, option in enumerate(region.options):
             if not isinstance(option, Constant):
@@ -156,36 +262,12 @@ class MapRelations:
                 if ids is None:
                     return None
                 meant[place] = ids
-        table = self._table(look_up, meant, surely=surely)
+        return meant
+
+    def _in_meant(self, table: str | None, reach: float) -> str | None:
         if table is None:
             return None
         return f"((q.f, region) IN (SELECT f, region FROM {table}) AND distance <= {number(reach + SLACK)})"
-
-    def holds(self, root: Node, *, surely: bool) -> tuple[int, str] | None:
-        """A condition on memberships that a condition on what lies where an object is amounts to.
-
-        Args:
-            root: The condition.
-            surely: Whether it surely holds; else it may.
-
-        Returns:
-            The object, and SQL over the columns of its memberships; None where it is no such condition, or may hold
-            where nothing lies.
-        """
-        found = allowed_elements(root)
-        if found is None:
-            return None
-        look_up, numbers = found
-        if look_up.occupancy.nothing in numbers or (surely and look_up.object != self.ego):
-            return None
-        if surely:
-            table = self._table(look_up, dict.fromkeys(numbers, ("",)), surely=True)
-            return None if table is None else (look_up.object, f"(q.f IN (SELECT f FROM {table}))")
-        sources = self._sources(look_up.occupancy)
-        if sources is None:
-            return None
-        ids = sorted({each for layer in sources for each, place in layer if place in numbers})
-        return look_up.object, f"(region IN {_set(ids)} AND {_AT})"
 
     def _sources(self, occupancy: Occupancy) -> list[list[tuple[str, int]]] | None:
         """For each layer the regions in which elements are found, with their numbers; None where some has no name."""
@@ -198,18 +280,27 @@ class MapRelations:
             layers.append(list(dict.fromkeys(pairs)))
         return layers
 
-    def _table(self, look_up: LookUp, meant: Mapping[int, Sequence[str]], *, surely: bool) -> str | None:
-        """The table of a relation: for each frame the regions that are meant where the ego is."""
-        layers = self._sources(look_up.occupancy)
+    def _table(
+        self, occupancy: Occupancy, meant: Mapping[int, Sequence[str]], most: int = 0, *, everybody: bool = False
+    ) -> str | None:
+        """The table of a relation: for each frame the regions that are meant where the ego is.
+
+        Args:
+            occupancy: The elements.
+            meant: Of each element the regions that are meant.
+            most: Of how many elements at the place any may be meant, surely; 0 for what is possible.
+            everybody: Whether it is of where all others are, instead.
+        """
+        layers = self._sources(occupancy)
         if layers is None:
             return None
-        # elsewhere a later layer counts: where one element of the first lies, it is surely meant
-        sources = layers[0] if surely else [each for layer in layers for each in layer]
+        # where an element of the first layer lies, no other layer counts
+        sources = layers[0] if most else [each for layer in layers for each in layer]
         pairs = sorted({(source, each) for source, place in sources for each in meant.get(place, ())})
         if len(pairs) > LIMITS.related_regions:
             return None
-        alone = tuple(sorted({source for source, _ in layers[0]})) if surely else ()
-        return self._tables.setdefault(_Table(tuple(pairs), alone), f"meant{len(self._tables)}")
+        first = tuple(sorted({source for source, _ in layers[0]})) if most else ()
+        return self._tables.setdefault(_Table(tuple(pairs), first, most, everybody), f"meant{len(self._tables)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,11 +309,15 @@ class _Table:
 
     Attributes:
         pairs: The element, and a region that is meant.
-        alone: Elements of which one alone must lie there; empty where any of them will do.
+        first: The elements of the first layer, of which that one must be; empty where any of them will do.
+        most: How many of these may lie at the place.
+        everybody: Whether it is of where all others than the ego are.
     """
 
     pairs: tuple[tuple[str, str], ...]
-    alone: tuple[str, ...]
+    first: tuple[str, ...]
+    most: int
+    everybody: bool
 
 
 def _list(ids: Sequence[str]) -> str:

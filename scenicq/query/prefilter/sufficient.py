@@ -16,13 +16,14 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias, TypeGuard, TypeVar
 
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group
 from scenicq.forest.interval_values import Interval
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
+    Compare,
     Constant,
     DiscAt,
     DiscreteRange,
@@ -45,7 +46,12 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, relevant_properties
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO, ConditionReader, difference, object_columns, turned_within
-from scenicq.query.prefilter.map_relations import MapRelations
+from scenicq.query.prefilter.map_relations import (
+    MapRelations,
+    allowed_elements,
+    is_equation,
+    look_up_of,
+)
 from scenicq.query.prefilter.regions import near_region
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, number
@@ -75,6 +81,25 @@ class SufficientCondition:
     objects: tuple[int, ...]
     sql: str
     places: tuple[tuple[int, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Meant:
+    """Which elements may be meant where the ego is.
+
+    Attributes:
+        among: Their numbers; None where each condition has some of its own.
+        most: Of how many elements at the place any may be meant.
+        shared: Whether the same element is meant where another object is.
+    """
+
+    among: frozenset[int] | None
+    most: int
+    shared: bool = False
+
+
+def _is_choice(node: Node) -> TypeGuard[Select]:
+    return isinstance(node, Select)
 
 
 class _OpenError(Exception):
@@ -133,32 +158,82 @@ class _Prover:
         objects = tuple(index for index in group.objects if index != self.scenario.ego)
         # of a third object there are no columns
         bounds, texts, places, chosen = self.reader.of(objects), list[str](), list[tuple[int, str]](), 0
+        meant = self._meant(group)
         for constraint in group.constraints:
             _check_columns(constraint, bounds)
             if isinstance(constraint, Condition):
-                looked_up = self.relations.holds(constraint.expression, surely=True)
-                if looked_up is not None:
-                    places.append(looked_up)
+                if allowed_elements(constraint.expression) is not None:
+                    places += self._looked_up(constraint.expression, meant)
+                    continue
+                if is_equation(constraint.expression) and len(objects) == 1:
+                    places.append((objects[0], self._shared(constraint.expression, meant)))
                     continue
                 texts.append(_told(SQL.negation(bounds.can_fail(constraint.expression))))
                 continue
             chosen += 1
             if constraint.object == PARAMS or chosen > 1:
                 raise _OpenError
-            sql, near = self._comparison(constraint, bounds)
+            sql, near = self._comparison(constraint, bounds, meant)
             texts.append(sql)
             places += near
         return SufficientCondition(
             objects, " AND ".join(dict.fromkeys(f"({text})" for text in texts if text)), tuple(places)
         )
 
-    def _comparison(self, item: Comparison, bounds: SqlBounds) -> tuple[str, list[tuple[int, str]]]:
+    def _meant(self, group: Group) -> _Meant | None:
+        """Which elements may be meant where the ego is, for all that a group asks of them together.
+
+        Where conditions look up elements of several kinds, it is not known which of each go together.
+        """
+        said = [each.expression for each in group.constraints if isinstance(each, Condition)]
+        equations = [each for each in said if is_equation(each)]
+        looked_up = [
+            node.index for node in postorder([each.expression for each in group.constraints]) if _is_choice(node)
+        ]
+        looked_up += [side for each in equations for side in (each.left, each.right)]
+        found = [look_up for each in looked_up if (look_up := look_up_of(each)) is not None]
+        if not found:
+            return None
+        objects = {each.object for each in found}
+        alike = all(each.occupancy is found[0].occupancy for each in found)
+        if not alike or self.scenario.ego not in objects or len(objects) != 1 + len(equations):
+            return _Meant(None, 1)
+        allowed = [numbers for each in said if (known := allowed_elements(each)) for numbers in [known[1]]]
+        among = frozenset(range(found[0].occupancy.nothing)).intersection(*allowed)
+        return _Meant(among, min(each.ranks for each in found), shared=bool(equations))
+
+    def _looked_up(self, condition: Node, meant: _Meant | None) -> list[tuple[int, str]]:
+        """That a condition on what lies where the ego is surely holds."""
+        found = allowed_elements(condition)
+        if found is None or meant is None:
+            raise _OpenError
+        if found[0].object != self.scenario.ego:
+            if meant.shared:
+                return []
+            raise _OpenError
+        near = self.relations.surely_holds(found[0], found[1] if meant.among is None else meant.among, meant.most)
+        if near is None:
+            raise _OpenError
+        return [(self.scenario.ego, near)]
+
+    def _shared(self, equation: Compare, meant: _Meant | None) -> str:
+        """That the same element surely lies where the ego and another object are."""
+        if meant is None or meant.among is None or not meant.shared:
+            raise _OpenError
+        near = self.relations.surely_share(equation.left, equation.right, meant.among, meant.most)
+        if near is None:
+            raise _OpenError
+        return near
+
+    def _comparison(
+        self, item: Comparison, bounds: SqlBounds, meant: _Meant | None
+    ) -> tuple[str, list[tuple[int, str]]]:
         own, node = bounds.columns[item.object, item.property], item.expression
         sure = self.tolerance.of(item.object, item.property).sure
         if sure <= SLACK:
             raise _OpenError
         if item.property == "position":
-            return self._position(item.object, node, bounds, sure)
+            return self._position(item.object, node, bounds, sure, meant)
         if item.property == "heading":
             return self._heading(item.object, node, bounds, sure), []
         if not isinstance(own, str):
@@ -180,10 +255,12 @@ class _Prover:
         return " AND ".join([*known, *[within] * bool(within)]) or "true"
 
     def _position(
-        self, index: int, node: Node, bounds: SqlBounds, sure: float
+        self, index: int, node: Node, bounds: SqlBounds, sure: float, meant: _Meant | None
     ) -> tuple[str, list[tuple[int, str]]]:  # fmt: skip
         own = bounds.columns[index, "position"]
         place = (own[0], own[1])
+        if isinstance(node, PointIn) and isinstance(node.region, Select):
+            return "", self._in_looked_up(index, node.region, sure, meant)
         if isinstance(node, PointIn):
             return self._inside(index, node.region, place, bounds, sure)
         rest_place, rest, _ = self.reader.framed(place, node, bounds)
@@ -205,11 +282,6 @@ class _Prover:
         self, index: int, region: Node, place: tuple[str, str], bounds: SqlBounds, sure: float
     ) -> tuple[str, list[tuple[int, str]]]:
         """That the place, or one within tolerance of it, lies in a region."""
-        if isinstance(region, Select) and self.options.radius is None:
-            near = self.relations.in_region_of(region, min(sure, MEMBERSHIP_RADIUS_M) - SLACK, surely=True)
-            if near is None:
-                raise _OpenError
-            return "", [(index, near)]
         views, regions = _parts(region)
         # of several parts each may have a place of its own nearby: the place itself is asked for
         reach = min(sure, MEMBERSHIP_RADIUS_M) if len(views) + len(regions) == 1 else 0.0
@@ -225,6 +297,17 @@ class _Prover:
         elif self.options.radius is not None and self.options.radius <= reach + SLACK:
             raise _OpenError
         return " AND ".join(texts), places
+
+    def _in_looked_up(self, index: int, region: Select, sure: float, meant: _Meant | None) -> list[tuple[int, str]]:
+        """That a place, or one within tolerance of it, lies in a region that hangs on where the ego is."""
+        look_up = self.relations.of_ego(region.index)
+        if look_up is None or meant is None or self.options.radius is not None:
+            raise _OpenError
+        among = range(look_up.occupancy.nothing) if meant.among is None else meant.among
+        near = self.relations.surely_in(region, min(sure, MEMBERSHIP_RADIUS_M) - SLACK, among, meant.most)
+        if near is None:
+            raise _OpenError
+        return [(index, near)]
 
     def _in_view(self, region: DiscAt | SectorAt, place: tuple[str, str], bounds: SqlBounds) -> str:
         radius = bounds.exact(region.radius)
