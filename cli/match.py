@@ -218,11 +218,14 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         _tell_cut(query, resume=resume)
     elif near is not None and not came_close:
         _tell_far(query)
+    cut = [each for each in query.funnel.warnings if each.code == "ranking-cut"]
+    show(cut)
     limit = query.options.limit
     reached = limit is not None and query.funnel.matches >= limit
     whole = not reached and not query.funnel.cut and not query.funnel.over_time
     if advised or (not quiet and whole and is_nearly_empty(query)):
         advise(query, asked=advised, near=near is not None)
+    told = [*told, *cut]
     _conclude(ctx, query, told, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 

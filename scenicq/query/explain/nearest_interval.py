@@ -22,7 +22,7 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.interval_changes import Change
 from scenicq.query.explain.interval_explanation import changes_of, placed
-from scenicq.query.explain.nearest_miss import FINEST_M, LADDER_M, show_tolerance, widened, with_parts
+from scenicq.query.explain.nearest_miss import FINEST_M, LADDER_M, show_tolerance, tell_cut, widened, with_parts
 
 __all__ = ["nearest_intervals"]
 
@@ -59,6 +59,8 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
         if each.recording not in matching and isinstance(each.verdict, NoMatch):
             missed.setdefault(each.recording, []).append(each)
     furthest = sorted(missed.values(), key=lambda mine: -max(map(_length, mine)))
+    if len(furthest) > LIMITS.ranked_recordings:
+        tell_cut(query, LIMITS.ranked_recordings, "recordings")
     for mine in furthest[: LIMITS.ranked_recordings]:
         longest = sorted(mine, key=_length, reverse=True)
         _keep(near, _by_number(every, longest[: max(1, LIMITS.ranked_bindings // len(missed))]))
@@ -69,9 +71,13 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
         if widening_m > nearer and widening_m / 10 > nearer:
             break
         for each in _under(every, widened(query.options.match.tolerance, widening_m)):
-            if each.recording not in seen and len(seen) - len(matching) < LIMITS.ranked_recordings:
-                seen.add(each.recording)
-                _keep(near, _by_tolerance(every, each.recording, widening_m, _bound(near, count)))
+            if each.recording in seen:
+                continue
+            if len(seen) - len(matching) >= LIMITS.ranked_recordings:
+                tell_cut(query, LIMITS.ranked_recordings, "recordings")
+                break
+            seen.add(each.recording)
+            _keep(near, _by_tolerance(every, each.recording, widening_m, _bound(near, count)))
         if widening_m >= _bound(near, count):
             break
     order = {each: place for place, each in enumerate(query.dataset.manifest.by_recording)}

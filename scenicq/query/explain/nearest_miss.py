@@ -17,6 +17,7 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 
+from scenicq.errors import Diagnostic
 from scenicq.forest.groups import Comparison
 from scenicq.limits import LIMITS
 from scenicq.match.explanation import Finding
@@ -39,6 +40,7 @@ __all__ = [
     "nearest_misses",
     "separated",
     "show_tolerance",
+    "tell_cut",
     "widened",
     "with_parts",
 ]
@@ -278,7 +280,7 @@ def nearest_misses(
         progress: Called with 1 for each frame looked at.
     """
     ranking = _Ranking(count, [])
-    left = LIMITS.ranked_frames if most_frames is None else most_frames
+    left = most = LIMITS.ranked_frames if most_frames is None else most_frames
     seen: set[str] = set()
     with LazySolver(query.options.solver) as solver:
         worlds = [(world, Matcher(world.scenario, query.options.match, solver)) for world in query.fitting()]
@@ -287,7 +289,10 @@ def nearest_misses(
             if len(ranking.heap) >= count and ranking.bound <= nearer:
                 break
             for map_number, (world, matcher) in enumerate(worlds):
-                fresh = [each for each in _frames(query, world, widening_m) if each[1] not in seen][:left]
+                fresh = [each for each in _frames(query, world, widening_m) if each[1] not in seen]
+                if len(fresh) > left:
+                    tell_cut(query, most, "frames")
+                fresh = fresh[:left]
                 left -= len(fresh)
                 for start in range(0, len(fresh), _BATCH):
                     places = {frame: place for place, frame in fresh[start : start + _BATCH]}
@@ -301,6 +306,14 @@ def nearest_misses(
             nearer = widening_m
         nearest = sorted(ranking.heap, key=lambda each: (-each[0], (-each[1][0], -each[1][1])))
         return [_result(matcher, label, found) for _, _, matcher, label, found in nearest]
+
+
+def tell_cut(query: Query, most: int, what: str) -> None:
+    """Say, once, that a ranking has not looked at all that may be among the closest."""
+    message = f"--near looked at {most:,} {what}: others may come closer"
+    warning = Diagnostic("ranking-cut", message, severity="warning")
+    if warning not in query.funnel.warnings:
+        query.funnel.warnings.append(warning)
 
 
 def _result(matcher: Matcher, label: Label, found: Closest) -> Result:

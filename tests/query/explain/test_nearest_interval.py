@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 
 from scenicq.errors import Source
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
@@ -53,6 +54,15 @@ def test_under_the_tolerance_that_is_told_the_recording_matches_and_under_a_smal
     for text, matches in ((f"position={metres}", True), (f"position={0.97 * metres}", False)):
         # no other recording is closer
         assert (matching(with_tolerance(text, program, crossroads)) > matching(query)) == matches
+
+
+def test_a_ranking_that_has_not_looked_at_all_recordings_says_so(crossroads, monkeypatch):
+    program = "parked = new Car\nrequire (distance to parked) < 30\nrequire always parked.speed < 0.2\n"
+    for most, cut in ((200, []), (1, ["ranking-cut"])):
+        monkeypatch.setattr(LIMITS, "ranked_recordings", most)
+        query = ask(crossroads, program)
+        nearest_intervals(query, 3)
+        assert [each.code for each in query.funnel.warnings if each.code == "ranking-cut"] == cut
 
 
 def test_with_the_number_that_is_told_the_recording_matches(crossroads):

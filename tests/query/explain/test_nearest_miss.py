@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import pytest
 
+from scenicq.limits import LIMITS
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
@@ -40,6 +41,15 @@ def test_the_ranking_is_that_of_looking_at_every_frame(query):
         tolerance = parse_tolerance(re.search(r"with (\S+)", result.verdict.cause.detail).group(1))
         (label,) = query.dataset.labels([result.frame])
         assert isinstance(Matcher(matcher.scenario, MatchOptions(tolerance=tolerance)).match(label), Match)
+
+
+def test_a_ranking_that_has_not_looked_at_all_says_so(run, crossroads, scenarios, monkeypatch):
+    words = ("match", scenarios / "02_crossing_cars.scenic", crossroads, "--near", 2, "--jobs", 1, "--format", "ids")
+    told = "warning[ranking-cut]: --near looked at 3 frames: others may come closer"
+    assert told not in run(*words).stderr
+    monkeypatch.setattr(LIMITS, "ranked_frames", 3)
+    assert run(*words).stderr.count(told) == 1
+    assert run(*words, "--summary").stderr.count(told) == 1
 
 
 def test_the_ranking_leaves_out_what_cannot_be_among_the_closest(query):
