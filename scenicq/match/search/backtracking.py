@@ -75,6 +75,7 @@ def find_assignments(
     twins: Mapping[int, int] | None = None,
     links: Mapping[int, Collection[int]] | None = None,
     budget: int = 1_000_000,
+    spent: Exhausted | None = None,
     reporter: Reporter | None = None,
     in_order: bool = False,
 ) -> Iterator[dict[int, int]]:
@@ -88,6 +89,7 @@ def find_assignments(
         twins: For a slot, an earlier one that is interchangeable with it: it then takes later candidates only.
         links: For a slot, those that it shares conditions with: they are assigned soon after it.
         budget: Candidates to try at most.
+        spent: What is raised then; without it, that there are more steps.
         reporter: Watches.
         in_order: Whether slots are assigned in the order of their names, not the most constrained first.
 
@@ -137,7 +139,7 @@ def find_assignments(
             look()
             budget -= 1
             if budget < 0:
-                raise Exhausted("budget", f"more than {most:,} steps")
+                raise spent or Exhausted("budget", f"more than {most:,} steps")
             assignment[slot] = candidate
             answer, blamed = check(slot, assignment)
             if answer is not Consistency.NO:

@@ -211,7 +211,9 @@ class _ChoiceSearch:
         for group in together:
             for slot in group:
                 links.setdefault(slot, set()).update(group - {slot})
-        return find_assignments(slots, self._check, links=links, budget=LIMITS.choice_tries)
+        return find_assignments(
+            slots, self._check, links=links, budget=LIMITS.choice_tries, spent=exhausted("choice_tries")
+        )
 
     def _check(self, slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
         domain = self.domains[slot]
