@@ -14,13 +14,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Condition
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import features, leaves
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint, relevant_properties
 from scenicq.match.problem.map_lookups import MapLookups
@@ -346,10 +347,10 @@ def narrowed(candidates: RoleCandidates, kept: NDArray[np.bool_], place: NDArray
 def _column(places: BoundSamples, index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
     """The values of a property as closed forms read them."""
     if name != "position" and name not in _SCALARS:
-        raise UnclearError
+        raise CannotEvaluate("what a closed form does not say")
     found = places.observed(index, name)
     if not isinstance(found, tuple):
-        raise UnclearError
+        raise CannotEvaluate("what a closed form does not say")
     return (found[0], found[1]) if len(found) == 2 else found[0]
 
 
@@ -361,7 +362,7 @@ def _getter(places: BoundSamples, number: int) -> Get:
         if isinstance(found, tuple):
             return (float(found[0][0]), float(found[1][0])) if len(found) == 2 else float(found[0][0])
         if found is None:
-            raise UnclearError
+            raise CannotEvaluate("what a closed form does not say")
         value = found[0]
         return value if isinstance(value, str | bool) else float(value)  # type: ignore[arg-type]
 

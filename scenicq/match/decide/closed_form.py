@@ -20,7 +20,7 @@ from scenicq.forest.groups import Comparison, Condition
 from scenicq.forest.nodes import Identity, Value
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import XY, MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied
@@ -54,7 +54,7 @@ class ClosedForm:
     Attributes:
         constraint: Its first constraint, of most groups the only one.
         evaluate: From the observed values, tolerance and radius, and what is known of the map, to what is clear.
-            It may raise `UnclearError` or `CannotEvaluate`, of columns where single values would do.
+            It may raise `CannotEvaluate`, of columns where single values would do.
         field: The field that it asks at the position of `index`.
         regions: The regions that it asks for the position of `index`.
         index: The object whose position matters to field or regions.
@@ -90,7 +90,7 @@ class ClosedForm:
                     return part.decide(get, options, lookups)
             try:
                 return Refuted(self.constraint, "" if self.detail is None else self.detail(get, lookups))
-            except (UnclearError, CannotEvaluate):
+            except CannotEvaluate:
                 pass
         return None
 
@@ -98,7 +98,7 @@ class ClosedForm:
         """The same without words; nothing is said where an expression has no value."""
         try:
             return self.evaluate(get, options, lookups)
-        except (UnclearError, CannotEvaluate):
+        except CannotEvaluate:
             return _UNCLEAR
 
     def evaluate_many(
@@ -115,7 +115,7 @@ class ClosedForm:
         try:
             with np.errstate(all="ignore"):
                 return self.evaluate(columns, options, lookups)
-        except (UnclearError, CannotEvaluate):
+        except CannotEvaluate:
             return self._one_by_one([row(number) for number in range(columns.size)], options, lookups)
 
     def _one_by_one(self, rows: Sequence[Get], options: MatchOptions, lookups: MapLookups) -> Evaluated:

@@ -9,6 +9,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import postorder
@@ -17,7 +18,7 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, UnclearError, clipped, spread
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, clipped, spread
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
 from scenicq.match.problem.map_lookups import MapLookups
@@ -71,7 +72,7 @@ def number(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | No
         margin, seen = options.tolerance.of(index, name), get(index, name)
         many, fails = isinstance(get, Columns), True
         if (many and len(cases) > 1) or not isinstance(seen, float | np.ndarray):
-            raise UnclearError
+            raise CannotEvaluate("what a closed form does not say")
         for chosen, form in cases:
             known = form.known(get)
             value = clipped(seen, known + form.low, known + form.high)
@@ -112,7 +113,7 @@ def text(item: Comparison) -> ClosedForm | None:
 
     def evaluate(get: Get, options_: MatchOptions, lookups: MapLookups) -> Evaluated:
         if isinstance(get, Columns):
-            raise UnclearError
+            raise CannotEvaluate("what a closed form does not say")
         seen = get(index, name)
         for chosen, value in options:
             if value == seen:
@@ -148,7 +149,7 @@ def heading(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | N
         margin, seen = options.tolerance.of(index, "heading"), cast(float, get(index, "heading"))
         many, fails = isinstance(get, Columns), True
         if many and len(choices) > 1:
-            raise UnclearError
+            raise CannotEvaluate("what a closed form does not say")
         allowed = None if directions is None else directions(get, lookups)
         for chosen, form, middle, half in choices:
             rest = seen - form.known(get) - middle

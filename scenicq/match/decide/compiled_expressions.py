@@ -10,7 +10,7 @@ from typing import cast
 
 import numpy as np
 
-from scenicq.forest.compute import compute
+from scenicq.forest.compute import CannotEvaluate, compute
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
@@ -46,7 +46,6 @@ from scenicq.match.decide.range_forms import (
     Form,
     Get,
     Scalar,
-    UnclearError,
     turned,
 )
 from scenicq.match.linear.affine_reach import ends
@@ -59,7 +58,7 @@ VECTORS = frozenset({"position", "velocity"})
 
 
 def truth(root: Node, chosen: Mapping[Identity, float]) -> Callable[[Get], bool] | None:
-    """A condition on what is observed alone as a function of it, which raises `UnclearError` where it has no value.
+    """A condition on what is observed alone as a function of it, which raises `CannotEvaluate` where it has no value.
 
     None if anything else about it is random or it takes too many steps.
 
@@ -130,7 +129,7 @@ def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[G
             def observed(get: Get) -> Value:
                 found = as_kind(node, get(index, name))
                 if isinstance(found, Undefined):
-                    raise UnclearError
+                    raise CannotEvaluate("what a closed form does not say")
                 return found
 
             return observed
@@ -138,10 +137,10 @@ def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[G
 
             def computed(get: Get) -> Value:
                 if isinstance(get, Columns):
-                    raise UnclearError
+                    raise CannotEvaluate("what a closed form does not say")
                 found = compute(node, tuple([arg(get) for arg in args]))
                 if isinstance(found, Undefined):
-                    raise UnclearError
+                    raise CannotEvaluate("what a closed form does not say")
                 return found
 
             return computed

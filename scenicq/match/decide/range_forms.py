@@ -22,7 +22,6 @@ __all__ = [
     "Form",
     "Get",
     "Scalar",
-    "UnclearError",
     "clipped",
     "spread",
     "turned",
@@ -37,10 +36,6 @@ Scalar: TypeAlias = Callable[[Get], float]
 CompiledVector: TypeAlias = Callable[[Get], "tuple[float, float]"]
 
 
-class UnclearError(Exception):
-    """A closed form does not say."""
-
-
 class Columns:
     """The observed values of many labels at once, in place of a `Get`: formulas of it give columns.
 
@@ -53,7 +48,7 @@ class Columns:
 
         Args:
             size: Labels.
-            column: The values of an object's property; `UnclearError` where they are neither numbers nor vectors.
+            column: The values of an object's property; `CannotEvaluate` where they are neither numbers nor vectors.
         """
         self.size = size
         self._column = functools.cache(column)

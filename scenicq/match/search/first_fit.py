@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
+from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, UnclearError
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
@@ -271,13 +272,13 @@ def _column(
 
 
 def _numeric(values: Sequence[Value]) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
-    """Values as a column, or as a pair of columns; `UnclearError` where they are not all numbers or all vectors."""
+    """Values as a column, or as a pair of columns; `CannotEvaluate` where they are not all numbers or all vectors."""
     if all(isinstance(value, float) for value in values):
         return np.array(values, dtype=np.float64)
     if all(isinstance(value, tuple) for value in values):
         x, y = np.array(values, dtype=np.float64).T
         return x, y
-    raise UnclearError
+    raise CannotEvaluate("what a closed form does not say")
 
 
 def _label_object(label: Label, number: int) -> LabelObject:
