@@ -107,7 +107,13 @@ class ConditionReader:
     names: RegionNames
     relations: MapRelations
     road: RoadDirection
+    required: tuple[Node, ...] = field(init=False)
     bounds: dict[tuple[int, ...], SqlBounds] = field(default_factory=dict["tuple[int, ...]", "SqlBounds"])
+
+    def __post_init__(self) -> None:
+        """Take apart what is required."""
+        said = [each.condition for each in self.scenario.requirements if each.built_in is None]
+        self.required = tuple(part for each in said for part in conjuncts(each))
 
     def of(self, objects: tuple[int, ...]) -> SqlBounds:
         """SqlBounds over the columns of some objects and the ego's."""
@@ -297,7 +303,7 @@ class ConditionReader:
                 yield objects, "", looked_up[1]
                 continue
             if is_equation(part) and len(objects) == 1:
-                shared = self.relations.may_share(part.left, part.right)
+                shared = self.relations.may_share(part.left, part.right, self.required)
                 if shared is not None:
                     yield objects, "", shared
                     continue

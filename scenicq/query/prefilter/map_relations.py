@@ -203,10 +203,18 @@ class MapRelations:
         table = self._table(look_up.occupancy, dict.fromkeys(among, ("",)), most)
         return None if table is None else f"(q.f IN (SELECT f FROM {table}))"
 
-    def may_share(self, one: Node, other: Node) -> str | None:
-        """A condition on memberships of an object in whose place the element may lie that may lie where the ego is."""
-        ours = self._shared(one, other)
-        if ours is None:
+    def may_share(self, one: Node, other: Node, required: Sequence[Node]) -> str | None:
+        """A condition on memberships of an object in whose place the element may lie that may lie where the ego is.
+
+        Args:
+            one: The number of the element at one place.
+            other: That at the other.
+            required: All that is required: without more, nothing may lie at both.
+        """
+        ours, places = self._shared(one, other), (look_up_of(one), look_up_of(other))
+        found = [allowed_elements(each) for each in required]
+        there = [look_up for look_up, numbers in filter(None, found) if look_up.occupancy.nothing not in numbers]
+        if ours is None or not any(place and place.is_like(each) for place in places for each in there):
             return None
         table = self._table(ours.occupancy, self._themselves(ours.occupancy))
         return None if table is None else f"((q.f, region) IN (SELECT f, region FROM {table}) AND {_AT})"

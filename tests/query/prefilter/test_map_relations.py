@@ -59,6 +59,7 @@ def question(draw: random.Random) -> str:
             + draw.choice([
                 f"{one} is {two}", f"{one} is not {two}", f"{one} is None", f"not ({one} is None)",
                 f"{one} is not None",
+                "ego._laneGroup is other._laneGroup", "ego._intersection is other._intersection",
                 "ego.lane is other.lane", "ego.road is other.road", f"ego._lane is network.elements['{lane}']",
                 f"not (other._lane is network.elements['{lane}'])", "ego.laneGroup is other._laneGroup",
                 "5 < (distance to other) < 20", f"other.position in {place}", "ego.lane is not other._lane",
@@ -129,6 +130,18 @@ def check(dataset: Dataset, seed: int) -> int:
             elif isinstance(verdict, NoMatch):
                 assert frame not in found, (text, options.tolerance, frame, proofs, verdict)
     return sum(isinstance(each, Match) for each in right.values())
+
+
+@pytest.mark.parametrize("kind", ["lane", "laneGroup", "road", "intersection", "crossing", "laneSection"])
+@pytest.mark.parametrize("said", ["ego._{0} is other._{0}", "other._{0} is ego.{0}", "not (ego._{0} is other._{0})"])
+@pytest.mark.one_in(4)
+def test_the_same_element_may_be_none(dataset: Dataset, kind: str, said: str):
+    text = f"{HEAD}other = new Car {ANY}\nrequire {said.format(kind)}\n"
+    scenario = ready(compile_scenario(Source("p.scenic", text), STREET))
+    matcher = Matcher(scenario, MatchOptions())
+    right = {each.frame for each in dataset.labels() if isinstance(matcher.match(each), Match)}
+    for proofs in (False, True):
+        assert set(verdicts(dataset, text, MatchOptions(), proofs=proofs)) == right
 
 
 def test_sql_says_what_the_matcher_says(dataset: Dataset, rounds):
