@@ -162,7 +162,7 @@ class MapRelations:
         """
         look_up = self.of_ego(region.index)
         meant = None if look_up is None else self._meant(region)
-        if look_up is None or meant is None:
+        if look_up is None or meant is None or look_up.occupancy.nothing in meant:
             return None
         return self._in_meant(self._table(look_up.occupancy, meant), reach)
 

@@ -5,18 +5,23 @@ from __future__ import annotations
 import math
 import random
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.forest.nodes import PointIn, Select
+from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.query.prefilter.map_relations import MapRelations
+from scenicq.query.prefilter.regions import RegionNames
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset
@@ -31,7 +36,7 @@ OWNERS = ("ego.lane", "ego.laneGroup", "ego.road", "ego.laneSection", "network.l
 PLACES = (
     *OWNERS, "ego.intersection", "ego.crossing", "ego.laneSection.laneToLeft", "ego.laneSection.laneToRight",
     "ego.laneGroup.sidewalk", "ego.lane.group", "ego.lane.road", "ego.lane.lanesAhead(30)", "ego.element",
-    "ego.lane.union(ego.road)",
+    "ego.lane.union(ego.road)", "(ego._intersection or ego._road or road)",
 )  # fmt: skip
 NAMES = (
     "ego._lane",
@@ -130,6 +135,18 @@ def check(dataset: Dataset, seed: int) -> int:
             elif isinstance(verdict, NoMatch):
                 assert frame not in found, (text, options.tolerance, frame, proofs, verdict)
     return sum(isinstance(each, Match) for each in right.values())
+
+
+def test_something_may_be_meant_where_nothing_lies():
+    scenario = compile_scenario(Source("p.scenic", HEAD + "other = new Car on ego.lane\n"), STREET)
+    node = scenario.objects[1].properties["position"].value
+    assert isinstance(node, PointIn)
+    assert isinstance(node.region, Select)
+    relations = MapRelations(RegionNames(STREET), 0)
+    assert relations.may_be_in(node.region, 0.25) is not None
+    somewhere = next(each for each in node.region.options if isinstance(each.value, PolygonSet))
+    options = [each if isinstance(each.value, PolygonSet) else somewhere for each in node.region.options]
+    assert relations.may_be_in(replace(node.region, options=tuple(options)), 0.25) is None
 
 
 @pytest.mark.parametrize("kind", ["lane", "laneGroup", "road", "intersection", "crossing", "laneSection"])
