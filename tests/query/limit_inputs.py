@@ -212,6 +212,8 @@ def answers(stores: Stores, store: str, text: str, **options: object) -> Facts:
         roles = () if each.interval is None else tuple(sorted(verdict.correspondence.items()))
         if isinstance(verdict, Match):
             found[each.frame, roles, each.interval and each.interval.last] = "match"
+            if each.interval is not None and each.interval.open_ended:
+                found[each.frame, roles, "longer"] = "unknown"
         elif isinstance(verdict, Unknown):
             found[each.frame, "open"] = "unknown"
             found[each.frame, roles, "open"] = "unknown"

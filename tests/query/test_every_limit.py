@@ -227,8 +227,11 @@ def changes(before: Facts, after: Facts) -> list[str]:
 
 
 def is_held(key: tuple[object, ...], facts: Facts) -> bool:
-    """Whether what is a match elsewhere is one or unknown; what is open of a frame is so of all about it."""
-    return facts.get(key) in ("match", "unknown") or (key[0], "open") in facts
+    """Whether what is a match elsewhere is one or unknown, as where it is told that an interval may be longer.
+
+    What is open of a frame is so of all about it.
+    """
+    return facts.get(key) in ("match", "unknown") or (key[0], "open") in facts or (*key[:2], "longer") in facts
 
 
 @pytest.fixture(scope="module")
