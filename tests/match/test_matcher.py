@@ -267,11 +267,11 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
     scenario = compiled(HEADER + text)
     label = frame(car("a", 2.0, 57.0), car("b", 1.5, 58.0))
 
-    def decide(items, tolerance, *, hurried):
+    def decide(items, tolerance, patience):
         return (
             Undecided(items[0][0], "nonlinear")
             if (2.0, 57.0) in [item[2] for item in items]
-            else real(items, tolerance, hurried=hurried)
+            else real(items, tolerance, patience)
         )
 
     real = group_cache.decide_decomposed

@@ -17,19 +17,19 @@ from scenicq.match.decide.hidden_distances import with_areas
 from scenicq.match.linear.affine_reach import ends
 from scenicq.match.problem.conditioned import Item, item_conjuncts, uses_field
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
-from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
 
 __all__ = ["decide_decomposed"]
 
 
-def decide_decomposed(items: list[Item], tolerance: Tolerance, *, hurried: bool = False) -> Outcome:
+def decide_decomposed(items: list[Item], tolerance: Tolerance, patience: Patience = Patience.ALL) -> Outcome:
     """Decide a group without a solver, part by part where it has parts; `Undecided` where a solver is needed.
 
     Args:
         items: The group's constraints, conditioned.
         tolerance: Per feature.
-        hurried: Whether what takes long is postponed.
+        patience: What may take long; the rest is postponed.
     """
     left: list[Item] = []
     for item in chain.from_iterable(map(item_conjuncts, items)):
@@ -40,13 +40,13 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance, *, hurried: bool 
     used = {id(item): {leaf.identity: leaf for leaf in leaves(item[1])} for item in left}
     alone = _components(left, used, None)
     if len(alone) > 1:
-        return _all(alone, items, tolerance, hurried=hurried)
+        return _all(alone, items, tolerance, patience)
     outlined = with_areas(left, tolerance)
     if outlined is not None:
-        found = decide_decomposed(outlined, tolerance, hurried=hurried)
+        found = decide_decomposed(outlined, tolerance, patience)
         if not isinstance(found, Satisfied) or replay(items, found.values, tolerance, SLACK):
             return found
-        found = decide_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance, hurried=hurried)
+        found = decide_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance, patience)
         sure = isinstance(found, Satisfied) and replay(items, found.values, tolerance, SLACK)
         return found if sure else Undecided(items[0][0], "nonlinear")
     if uses_field(left):
@@ -54,16 +54,16 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance, *, hurried: bool 
 
         shared = _shared(left, used)
         parts, number = ([left], None) if shared is None else (shared[2], shared[0].identity)
-        return decide_directions(parts, number, tolerance, hurried=hurried)
+        return decide_directions(parts, number, tolerance, patience)
     return decide(left, tolerance)
 
 
-def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, *, hurried: bool) -> Outcome:
+def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, patience: Patience) -> Outcome:
     """Parts that have no random variable in common."""
     values: dict[Identity, Value] = {}
     doubt: Undecided | None = None
     for part in parts:
-        outcome = decide_decomposed(part, tolerance, hurried=hurried)
+        outcome = decide_decomposed(part, tolerance, patience)
         if isinstance(outcome, Refuted):
             return outcome
         if isinstance(outcome, Undecided):

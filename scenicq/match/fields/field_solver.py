@@ -7,12 +7,13 @@ these the directions are known, so that the rest is a linear program with one ma
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from scenicq.budget import Exhausted, look
+from scenicq.budget import Exhausted, Trials, look
 from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import DiscreteRange, Identity, Index, Value
@@ -25,19 +26,23 @@ from scenicq.match.fields.heading_propagation import bisected, directed, propaga
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.fields.witness_search import THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, conditioned
-from scenicq.match.problem.outcome import POSTPONED, Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import POSTPONED, Outcome, Patience, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["decide_directions", "repaired"]
 
 _MANY_CASES = 128
-"""Cases of one part after which a witness is looked for by more draws than at first."""
+"""Cases of one part after which more draws look for a witness than before, and again after four times so many."""
+_SEARCHES = {Patience.LITTLE: 0, Patience.LIKELY: 1, Patience.ALL: math.inf}
+"""How often that is, until the rest is postponed."""
+_TRIALS = 400.0
+"""Trials of each of these searches, a share of which it may take."""
 _CLOSE = 0.05
 """How far from the answer of a solver a solution is looked for."""
 
 
 def decide_directions(
-    parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance, *, hurried: bool = False
+    parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance, patience: Patience = Patience.ALL
 ) -> Outcome:
     """Decide a group with fields at hidden points, without a solver; `Undecided` where one is needed.
 
@@ -45,7 +50,7 @@ def decide_directions(
         parts: The constraints, conditioned, in parts that share no random variable but one.
         shared: The random number that all of them share, if there are several parts.
         tolerance: Per feature.
-        hurried: Whether what takes many cases is postponed.
+        patience: What may take long; what takes more cases is postponed.
     """
     first = parts[0][0][0]
     start = BoxSet.start(ConstraintNetwork([item for part in parts for item in part], tolerance), {}).narrowed()
@@ -55,7 +60,7 @@ def decide_directions(
     if witness is not None:
         return witness
     if shared is None or len(parts) == 1:
-        return _alone(start, first, tolerance, hurried=hurried)
+        return _alone(start, first, tolerance, patience)
     networks = [ConstraintNetwork(part, tolerance) for part in parts]
     chosen: list[list[BoxSet]] = []
     limits: list[FloatInterval] = []
@@ -66,7 +71,7 @@ def decide_directions(
             for cases in directed(BoxSet.start(network, known), _MANY_CASES):
                 if cases.size:
                     left.append(cases)
-                elif hurried:
+                elif patience is Patience.LITTLE:
                     return Undecided(first, POSTPONED)
             if not left:
                 return Refuted(network.items[0][0])
@@ -75,7 +80,9 @@ def decide_directions(
         # what a later part excludes of the shared number excludes ways of the earlier ones
         chosen = [_within(found, shared, limits) for found in chosen]
     except Exhausted as error:
-        return Undecided(first, POSTPONED) if hurried else _searched(start) or Undecided.by(first, error)
+        return (
+            Undecided(first, POSTPONED) if patience < Patience.ALL else _searched(start) or Undecided.by(first, error)
+        )
     ways = [_ways(found, shared) for found in chosen]
     if not all(ways):
         return Refuted(first)
@@ -83,7 +90,7 @@ def decide_directions(
     choices = [id(node) for network in networks for node in network.choices]
     if isinstance(found, Undecided) and len(set(choices)) < len(choices):
         # fields that several parts ask for at one point have one direction there
-        return _alone(start, first, tolerance, hurried=hurried)
+        return _alone(start, first, tolerance, patience)
     return found
 
 
@@ -96,16 +103,19 @@ def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:
         yield from (way for way in ways if way is not None)
 
 
-def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance, *, hurried: bool = False) -> Outcome:
+def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance, patience: Patience = Patience.ALL) -> Outcome:
     """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
     todo: deque[HeadingAssignment] = deque()
-    doubt, searched = Undecided(first, "nonlinear"), False
+    doubt, searched = Undecided(first, "nonlinear"), 0
     try:
         for number, way in enumerate(_one_by_one(directed(start, _MANY_CASES))):
-            if way is None and hurried:
-                return Undecided(first, POSTPONED)
-            found = _searched(start) if way is None else solved(way, tolerance)
-            searched = searched or way is None
+            if way is None:
+                if searched >= _SEARCHES[patience]:
+                    return Undecided(first, POSTPONED)
+                found = _searched(start, searched)
+                searched += 1
+            else:
+                found = solved(way, tolerance)
             if isinstance(found, Satisfied):
                 return found
             if number == LIMITS.field_ways:
@@ -118,7 +128,7 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance, *, hurried: b
                 return found
     except Exhausted as error:
         doubt = Undecided.by(first, error)
-    if hurried:
+    if patience < Patience.ALL:
         return Undecided(first, POSTPONED)
     return doubt if searched else _searched(start) or doubt
 
@@ -141,11 +151,12 @@ def _halved(todo: deque[HeadingAssignment], first: Constraint, tolerance: Tolera
     return doubt
 
 
-def _searched(start: BoxSet) -> Satisfied | None:
-    """A witness of one part by more draws than at first."""
+def _searched(start: BoxSet, seed: int = 0) -> Satisfied | None:
+    """A witness of one part by more draws than at first; what it costs is little beside the cases before."""
     look()
     narrowed = start.narrowed()
-    return find_witness(narrowed, THOROUGH) if narrowed.size else None
+    with Trials(_TRIALS):
+        return find_witness(narrowed, THOROUGH, seed=seed) if narrowed.size else None
 
 
 def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAssignment] | None:

@@ -84,16 +84,19 @@ _Numbers = NDArray[np.float64]
 _Indices = NDArray[np.intp]
 
 
-def find_witness(start: BoxSet, *efforts: Effort, outcomes: Sequence[OutcomeTable] = ()) -> Satisfied | None:
+def find_witness(
+    start: BoxSet, *efforts: Effort, outcomes: Sequence[OutcomeTable] = (), seed: int = 0
+) -> Satisfied | None:
     """A witness of a group, or None if none was found.
 
     Args:
         start: One case: where the random variables can be.
         efforts: How much each of the searches is worth that are made one after the other.
         outcomes: What choices may come out as; others may come out as anything.
+        seed: Of the draws of the first.
     """
     trials, space = trials_left(), TrialSpace(start)
-    for number, effort in enumerate(efforts or (QUICK,)):
+    for number, effort in enumerate(efforts or (QUICK,), seed):
         search = _Search(space, effort, outcomes, trials, number)
         found = None
         with suppress(CannotEvaluate, Exhausted):
@@ -105,11 +108,15 @@ def find_witness(start: BoxSet, *efforts: Effort, outcomes: Sequence[OutcomeTabl
 
 
 def search_witness(
-    items: Sequence[Item], tolerance: Tolerance, *efforts: Effort, outcomes: Sequence[OutcomeTable] = ()
+    items: Sequence[Item],
+    tolerance: Tolerance,
+    *efforts: Effort,
+    outcomes: Sequence[OutcomeTable] = (),
+    seed: int = 0,
 ) -> Satisfied | None:
     """A witness of constraints, conditioned, or None if none was found; other arguments as of `find_witness`."""
     start = BoxSet.start(ConstraintNetwork(items, tolerance), {}).narrowed()
-    return find_witness(start, *efforts, outcomes=outcomes) if start.size else None
+    return find_witness(start, *efforts, outcomes=outcomes, seed=seed) if start.size else None
 
 
 class _Search:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 
 from scenicq.budget import Exhausted
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Identity, Value
 
-__all__ = ["POSTPONED", "UNOBSERVED", "Outcome", "Refuted", "Satisfied", "Undecided"]
+__all__ = ["POSTPONED", "UNOBSERVED", "Outcome", "Patience", "Refuted", "Satisfied", "Undecided"]
 
 
 UNOBSERVED = "unobserved"
@@ -18,6 +19,17 @@ UNOBSERVED = "unobserved"
 
 POSTPONED = "postponed"
 """Why a group is undecided that takes long, as long as other groups or correspondences may make that needless."""
+
+
+class Patience(IntEnum):
+    """What may take long, of what is asked about a label."""
+
+    LITTLE = 0
+    """Nothing."""
+    LIKELY = 1
+    """Some hundred cases of fields, searches for witnesses and the solver, over likely values of normal variables."""
+    ALL = 2
+    """Everything."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ from scenicq.limits import LIMITS, exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_field
 from scenicq.match.problem.evaluation import ground_cause, holds
-from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import POSTPONED, Outcome, Patience, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
 from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices
 from scenicq.match.search.outcome_bounds import possible_outcomes
@@ -57,7 +57,7 @@ def decide_with_choices(
     ask: Ask | None = None,
     depth: int = 0,
     *,
-    hurried: bool = False,
+    patience: Patience = Patience.ALL,
 ) -> Outcome | None:
     """Decide a group that random choices are part of; None if there are none.
 
@@ -67,7 +67,7 @@ def decide_with_choices(
         decide: Decides what is left when all choices have come out.
         ask: The same by a solver, where nothing else decides it.
         depth: In how many other searches it is asked for.
-        hurried: Whether what takes long is postponed.
+        patience: What may take long; the rest is postponed.
 
     Raises:
         Exhausted: The time is up.
@@ -87,7 +87,7 @@ def decide_with_choices(
     for constraint, node, seen in parts:
         if isinstance(node, Constant) and not holds(constraint, node.value, seen, tolerance):
             return Refuted(constraint, ground_cause((constraint, node, seen)))
-    return _ChoiceSearch(list(items), found, tolerance, decide, ask, depth, hurried=hurried).solve()
+    return _ChoiceSearch(list(items), found, tolerance, decide, ask, depth, patience=patience).solve()
 
 
 class _ChoiceSearch:
@@ -102,9 +102,9 @@ class _ChoiceSearch:
         ask: Ask | None,
         depth: int,
         *,
-        hurried: bool,
+        patience: Patience,
     ) -> None:
-        self.hurried = hurried
+        self.patience = patience
         self.items = items
         self.constraints = [constraint for constraint, _, _ in items]
         self.parts = parts
@@ -151,15 +151,16 @@ class _ChoiceSearch:
 
     def _search_witness(self) -> Satisfied | None:
         """A witness over all outcomes together, where fields at hidden points make each of them costly to decide."""
-        fewest = _SEVERAL if self.hurried else 2
+        fewest = _SEVERAL if self.patience is Patience.LITTLE else 2
         several = not self.depth and math.prod(len(domain.rows) for domain in self.domains) >= fewest
         if not several or not uses_field(self.items):
             return None
         from scenicq.match.fields.witness_search import AGAIN, QUICK, search_witness  # noqa: PLC0415 - takes long to load
 
-        efforts = (QUICK,) if self.hurried else AGAIN
+        efforts = (QUICK,) if self.patience is Patience.LITTLE else AGAIN
+        seed = len(AGAIN) * (self.patience is Patience.ALL)
         tables = [(domain.outcomes.variables, domain.outcomes.picks[domain.rows]) for domain in self.domains]
-        return search_witness(self.items, self.tolerance, *efforts, outcomes=tables)
+        return search_witness(self.items, self.tolerance, *efforts, outcomes=tables, seed=seed)
 
     # --- domains
 
@@ -278,7 +279,8 @@ class _ChoiceSearch:
 
     def _by_solver(self, items: list[Item]) -> Outcome:
         outcome = self.decide(items)
-        return self.ask([items]) if isinstance(outcome, Undecided) and self.ask is not None else outcome
+        undecided = isinstance(outcome, Undecided) and outcome.reason != POSTPONED
+        return self.ask([items]) if undecided and self.ask is not None else outcome
 
     def _decided(
         self,

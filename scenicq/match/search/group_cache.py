@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import IntEnum
 from typing import Protocol
 
 from scenicq.budget import Exhausted, Trials, look
@@ -22,12 +21,12 @@ from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, condition_group, uses_field
 from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.outcome import POSTPONED, UNOBSERVED, Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import POSTPONED, UNOBSERVED, Outcome, Patience, Refuted, Satisfied, Undecided
 from scenicq.match.problem.radius import within_radius
 from scenicq.match.search.choice_search import Ask, decide_with_choices
 from scenicq.match.search.group_plan import GroupPlan
 
-__all__ = ["Asker", "GroupCache", "Patience", "known_of", "surely", "translated"]
+__all__ = ["Asker", "GroupCache", "known_of", "surely", "translated"]
 
 
 class Asker(Protocol):
@@ -36,17 +35,6 @@ class Asker(Protocol):
     def __call__(self, items: Sequence[Sequence[Item]]) -> Outcome:
         """Decide groups together."""
         ...
-
-
-class Patience(IntEnum):
-    """What may take long, of what is asked about a label."""
-
-    LITTLE = 0
-    """Nothing."""
-    LIKELY = 1
-    """What leaves normal variables likely values: cases of fields, searches for witnesses, the solver."""
-    ALL = 2
-    """Everything."""
 
 
 @dataclass(eq=False, slots=True)
@@ -135,16 +123,16 @@ class GroupCache:
 
     def _decided(self, items: list[Item], at_last: Ask) -> Outcome:
         """What the cascade says of constraints, and where it says nothing, what is asked at last."""
-        tolerance, hurried = self.options.tolerance, self.patience is Patience.LITTLE
+        tolerance, patience = self.options.tolerance, self.patience
 
         def decide(left: list[Item]) -> Outcome:
-            return decide_decomposed(left, tolerance, hurried=hurried)
+            return decide_decomposed(left, tolerance, patience)
 
-        chosen = decide_with_choices(items, tolerance, decide, at_last, hurried=hurried)
+        chosen = decide_with_choices(items, tolerance, decide, at_last, patience=patience)
         if chosen is not None:
             return chosen
         outcome = decide(items)
-        return at_last([items]) if isinstance(outcome, Undecided) else outcome
+        return at_last([items]) if isinstance(outcome, Undecided) and not _is_postponed(outcome) else outcome
 
     def _searched(self, items: Sequence[Sequence[Item]]) -> Outcome:
         """What a search for a witness finds; where fields are, there was one already."""

@@ -21,11 +21,11 @@ from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Undecided
 from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import Asker, GroupCache, Patience, known_of, surely, translated
+from scenicq.match.search.group_cache import Asker, GroupCache, known_of, surely, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -256,7 +256,7 @@ class LabelSearch:
             return
         assignment = {**ego, index: candidates[index][0]}
         try:
-            found = decide_decomposed(self.items(blamed.group, assignment), self.options.tolerance, hurried=True)
+            found = decide_decomposed(self.items(blamed.group, assignment), self.options.tolerance, Patience.LITTLE)
         except CannotEvaluate:
             found = None
         outcome = found if isinstance(found, Refuted) else Refuted(blamed.group.constraints[0])
