@@ -94,13 +94,11 @@ def _compile(tree: Any, filename: str = "<string>") -> Any:
 
 def plain(scene: Any) -> dict[str, Any]:
     """A scene as plain data."""
-    known = {(round(each.x, 3), round(each.y, 3)) for each in KNOWN_OFF_ROAD}
-    placed = [(round(each.position.x, 3), round(each.position.y, 3)) for each in scene.objects]
     values = {name: value for name, value in scene.params.items() if isinstance(value, str | int | float | bool)}
     return {
         "objects": [thing(each) for each in scene.objects],
         "params": {name: value for name, value in values.items() if name != "map"},
-        "directions_off_road": len(OFF_ROAD) + sum(place in known for place in placed),
+        "directions_off_road": len(OFF_ROAD) + len(KNOWN_OFF_ROAD),
     }
 
 

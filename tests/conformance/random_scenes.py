@@ -210,6 +210,8 @@ def excuse(text: str, scene: dict[str, Any], why: str = "") -> str:
         return "size that is not positive"
     if scene.get("directions_off_road"):
         return "direction off the road"
+    if re.search(r"(?:left of|right of|ahead of|behind) Uniform\(.*centerline\.(?:start|end)\b", text):
+        return "side of the end of a random line"
     if re.search(r"Point on (?:ego|o\d+)\b", text) and "distance" in text:
         return "height of a point on an object"
     if "mutate" in text and "require" in text.replace("with requireVisible", ""):

@@ -132,6 +132,7 @@ class TrialSpace:
             if isinstance(select.index, Index) and any(not isinstance(option, Constant) for option in select.options):
                 row = self.hidden[select.index.identity].rows.start
                 for number in range(len(select.options)):
+                    look()
                     for node in self._fields_below(select.index, number):
                         if (row, number) not in (known := self._only_below.setdefault(node, [])):
                             known.append((row, number))
