@@ -21,6 +21,7 @@ from scenicq.compiler.imported_files import Loader
 from scenicq.compiler.imports import Modules
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.models import default_library
+from scenicq.compiler.requirements import RequireStatement
 from scenicq.compiler.temporal import Behaviors, TimedStatements
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.compiler.version_detection import decide_version
@@ -180,12 +181,21 @@ def _scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
         tuple(
-            Requirement(_at_the_end(each.condition, each.span), each.span, probability=each.probability)
-            for each in soft
+            Requirement(_soft_condition(each), each.span, probability=each.probability) for each in soft
         ),
         tuple(run.ignored), warnings,
         dynamics=dynamics,
     )  # fmt: skip
+
+
+def _soft_condition(requirement: RequireStatement) -> Node:
+    """What a requirement says that need not hold; what the map lacks for it never holds, and excludes nothing."""
+    try:
+        return _at_the_end(requirement.condition, requirement.span)
+    except ScenarioError as error:
+        if any(each.code != "map-lacks" for each in error.diagnostics):
+            raise
+        return Constant(False, span=requirement.span)
 
 
 def _at_the_end(work: Callable[[], _Result], span: Span | None) -> _Result:

@@ -60,3 +60,12 @@ def test_a_choice_of_nothing_is_an_error_once_it_is_read(choice):
     assert isinstance(verdict(nothing), Match)
     with pytest.raises(ScenarioError, match="nothing to choose from"):
         verdict(nothing + "require zone > 3\n")
+
+
+def test_what_the_map_lacks_for_a_requirement_that_need_not_hold_excludes_nothing():
+    needs = "network.lanes[0].sections[0].laneToRight.laneToRight is not None"
+    for head in ("require[0.6]", "require[0.1]"):
+        assert isinstance(verdict(f"{head} {needs}\n"), Match)
+    for head in ("require", "require[1]"):
+        with pytest.raises(ScenarioError, match="the map"):
+            verdict(f"{head} {needs}\n")
