@@ -74,7 +74,10 @@ def heading_of(dx: float, dy: float) -> float:
 
 def heading_of_array(dx: NDArray[np.float64], dy: NDArray[np.float64]) -> NDArray[np.float64]:
     """`heading_of` of every direction of two arrays of one shape."""
-    headings = np.arctan2(-dx, dy)
+    # NumPy's function rounds as the machine and its version do, and a dataset is the same wherever it is made
+    pairs = np.broadcast_arrays(-dx, dy)
+    each = [*map(math.atan2, *(side.ravel().tolist() for side in pairs))]
+    headings = np.array(each, dtype=np.float64).reshape(pairs[0].shape)
     return np.where((dx == 0) & (dy == 0), -math.pi / 2, np.where(headings == -math.pi, math.pi, headings))
 
 

@@ -90,3 +90,13 @@ def test_direction_and_heading_are_inverse(heading: float, length: float) -> Non
 def test_rotate_is_multiplication_by_a_unit_complex_number(x: float, y: float, angle: float) -> None:
     expected = complex(x, y) * complex(math.cos(angle), math.sin(angle))
     assert complex(*angles.rotate(x, y, angle)) == pytest.approx(expected, abs=1e-8)
+
+
+def test_headings_of_arrays_are_those_of_numbers_to_the_last_bit():
+    steps = np.random.default_rng(1).normal(0, 10.0, (2, 5000)) * np.random.default_rng(2).choice(
+        [1.0, 1e-6, 0.0], 5000
+    )
+    for many, one in ((angles.heading_of_array, angles.heading_of), (angles.azimuth_array, angles.azimuth)):
+        found = many(steps[0], steps[1]).tolist()
+        assert found == [one(x, y) for x, y in steps.T.tolist()]
+        assert many(steps.reshape(2, 50, 100)[0], steps.reshape(2, 50, 100)[1]).ravel().tolist() == found
