@@ -164,7 +164,7 @@ def test_labels_side_by_side_are_decided_as_each_by_itself(name: str, monkeypatc
     options = MatchOptions(tolerance=parse_tolerance("position=0.25,heading=5deg"))
     together = Matcher(scenario(name), options)
     found = list(together.match_all([(each, None) for each in labels]))
-    if name in ("own lane", "same lane", "road", "numbers"):
+    if name in ("own lane", "same lane", "road"):
         assert together.plans.first_fits([(each, None) for each in labels], {})
     monkeypatch.setattr(group_plan, "closed_form_of", lambda *_: None)
     matcher = Matcher(scenario(name), options)
