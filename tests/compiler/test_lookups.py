@@ -251,7 +251,7 @@ def test_what_is_found_is_what_the_map_says() -> None:
         ("ego = new Object\nx = ego.lane\n", ("unknown-attribute", "lane")),
         ("ego = new Car\nif ego.lane.isForward:\n    pass\n", ("random-branch", "ego.lane.isForward")),
         ("ego = new Car at (500, 500)\nx = ego.lane\n", ("impossible-requirement", "lane")),
-        ("ego = new Car\nx = network.roads[0].sections\n", ("map-lacks", "sections")),
+        ("ego = new Car\nx = network.roads[0].sections\nrequire len(x) > 0\n", ("map-lacks", "sections")),
         ("ego = new Car\nx = resample(ego.lane)\n", ("wrong-type", "resample(ego.lane)")),
         ("ego = new Car\nx = network.findPointIn(ego, [1])\n", ("wrong-type", "network.findPointIn(ego, [1])")),
     ],
@@ -292,6 +292,6 @@ def test_signals_at_intersections_are_what_the_map_says_of_them():
 )
 def test_what_an_element_of_the_map_lacks_is_said_of_the_map(part: str, lacked: str):
     # where Scenic ends with an error of Python
-    text = f"{HEADER}some = [road for road in network.allRoads if len(road.{part}) == 1]\nego = new Car\n"
+    text = f"{HEADER}some = [road for road in network.allRoads if len(road.{part}) == 1]\nego = new Car on some[0]\n"
     assert refused(text) == ("map-lacks", lacked)
     assert refused(f"{HEADER}found = [None]\nego = new Car at (found[0].x, 1)\n") == ("unknown-attribute", "x")
