@@ -38,7 +38,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.ego_frame import DISTANCE, PLACE, in_ego_frame
-from scenicq.query.prefilter.map_relations import MapRelations, is_equation
+from scenicq.query.prefilter.map_relations import MapRelations, shared_look_ups
 from scenicq.query.prefilter.regions import RegionNames, near_region
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
@@ -302,8 +302,8 @@ class ConditionReader:
             if (looked_up := self.relations.may_hold(part)) is not None:
                 yield objects, "", looked_up[1]
                 continue
-            if is_equation(part) and len(objects) == 1:
-                shared = self.relations.may_share(part.left, part.right, self.required)
+            if (places := shared_look_ups(part)) is not None and len(objects) == 1:
+                shared = self.relations.may_share(places, self.required)
                 if shared is not None:
                     yield objects, "", shared
                     continue

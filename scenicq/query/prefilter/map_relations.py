@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeGuard
 
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -35,7 +34,7 @@ from scenicq.query.prefilter.regions import RegionNames, region_ids
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.sql import sql_text
 
-__all__ = ["LookUp", "MapRelations", "allowed_elements", "is_equation", "look_up_of"]
+__all__ = ["LookUp", "MapRelations", "allowed_elements", "look_up_of", "shared_look_ups"]
 
 _AT = f"distance <= {number(TOLERANCE + SLACK)}"
 """An element that may be found at a place."""
@@ -48,7 +47,7 @@ class LookUp:
     Attributes:
         occupancy: The elements.
         object: The object, by index.
-        ranks: Of how many elements at the place any may be meant; where there are more, it is not known which.
+        ranks: Any of so many elements at the place may be meant; where there are more, it is not known which.
     """
 
     occupancy: Occupancy
@@ -104,12 +103,14 @@ def allowed_elements(root: Node) -> tuple[LookUp, frozenset[int]] | None:
     return look_up, every & numbers if positive else every - numbers
 
 
-def is_equation(node: Node) -> TypeGuard[Compare]:
-    """Whether a condition is that one element lies at two places."""
+def shared_look_ups(node: Node) -> tuple[LookUp, LookUp] | None:
+    """The look-ups at the two places at which one element lies, if that is what a condition says."""
     if not isinstance(node, Compare) or node.op is not CompareOp.EQ:
-        return False
+        return None
     one, other = look_up_of(node.left), look_up_of(node.right)
-    return one is not None and other is not None and one.occupancy is other.occupancy and one.object != other.object
+    if one is None or other is None or one.occupancy is not other.occupancy or one.object == other.object:
+        return None
+    return one, other
 
 
 @dataclass(slots=True)
@@ -161,23 +162,22 @@ class MapRelations:
             SQL over the columns of `memberships` and `q.f`; None if the region is not made of elements of the map.
         """
         look_up = self.of_ego(region.index)
-        meant = None if look_up is None else self._meant(region)
-        if look_up is None or meant is None or look_up.occupancy.nothing in meant:
+        if look_up is None or (meant := self._meant(region)) is None or look_up.occupancy.nothing in meant:
             return None
         return self._in_meant(self._table(look_up.occupancy, meant), reach)
 
-    def surely_in(self, region: Select, reach: float, among: Collection[int], most: int) -> str | None:
+    def surely_in(self, region: Select, look_up: LookUp, reach: float, among: Collection[int], most: int) -> str | None:
         """The same of an object that surely lies there, where the element that is meant is one of some.
 
         Args:
             region: The region.
+            look_up: That where the ego is, on which the region hangs.
             reach: Metres that the object may be off.
             among: The numbers of the elements.
-            most: Of how many elements at the place any may be meant.
+            most: Any of so many elements at the place may be meant.
         """
-        look_up = self.of_ego(region.index)
-        meant = None if look_up is None else self._meant(region)
-        if look_up is None or meant is None:
+        meant = self._meant(region)
+        if meant is None:
             return None
         some = {place: ids for place, ids in meant.items() if place in among}
         return self._in_meant(self._table(look_up.occupancy, some, most), reach)
@@ -203,49 +203,42 @@ class MapRelations:
         table = self._table(look_up.occupancy, dict.fromkeys(among, ("",)), most)
         return None if table is None else f"(q.f IN (SELECT f FROM {table}))"
 
-    def may_share(self, one: Node, other: Node, required: Sequence[Node]) -> str | None:
+    def may_share(self, places: tuple[LookUp, LookUp], required: Sequence[Node]) -> str | None:
         """A condition on memberships of an object in whose place the element may lie that may lie where the ego is.
 
         Args:
-            one: The number of the element at one place.
-            other: That at the other.
+            places: The look-ups at both places.
             required: All that is required: without more, nothing may lie at both.
         """
-        ours, places = self._shared(one, other), (look_up_of(one), look_up_of(other))
         found = [allowed_elements(each) for each in required]
         there = [look_up for look_up, numbers in filter(None, found) if look_up.occupancy.nothing not in numbers]
-        if ours is None or not any(place and place.is_like(each) for place in places for each in there):
+        if not self._is_of_ego(places) or not any(place.is_like(each) for place in places for each in there):
             return None
-        table = self._table(ours.occupancy, self._themselves(ours.occupancy))
+        occupancy = places[0].occupancy
+        table = self._table(occupancy, self._themselves(occupancy))
         return None if table is None else f"((q.f, region) IN (SELECT f, region FROM {table}) AND {_AT})"
 
-    def surely_share(self, one: Node, other: Node, among: Collection[int], most: int) -> str | None:
+    def surely_share(self, places: tuple[LookUp, LookUp], among: Collection[int], most: int) -> str | None:
         """The same where one of some elements surely lies at both places, and any at either may be meant.
 
         Args:
-            one: The number of the element at one place.
-            other: That at the other.
+            places: The look-ups at both places.
             among: The numbers of those that may be meant.
-            most: Of how many elements at a place any may be meant.
+            most: Any of so many elements at a place may be meant.
         """
-        ours = self._shared(one, other)
-        if ours is None:
+        if not self._is_of_ego(places):
             return None
-        own = {place: ids for place, ids in self._themselves(ours.occupancy).items() if place in among}
-        ego, anybody = (self._table(ours.occupancy, own, most, everybody=each) for each in (False, True))
+        occupancy = places[0].occupancy
+        own = {place: ids for place, ids in self._themselves(occupancy).items() if place in among}
+        ego, anybody = (self._table(occupancy, own, most, everybody=each) for each in (False, True))
         if ego is None or anybody is None:
             return None
         theirs = f"(q.f, q.object, region) IN (SELECT f, object, region FROM {anybody})"
         return f"({theirs} AND (q.f, region) IN (SELECT f, region FROM {ego}))"
 
-    def _shared(self, one: Node, other: Node) -> LookUp | None:
-        """The look-up where the ego is, if two are of the same elements, one of them where the ego is."""
-        first, second = look_up_of(one), look_up_of(other)
-        if first is None or second is None or first.occupancy is not second.occupancy:
-            return None
-        if (first.object == self.ego) == (second.object == self.ego):
-            return None
-        return first if first.object == self.ego else second
+    def _is_of_ego(self, places: tuple[LookUp, LookUp]) -> bool:
+        """Whether the ego is at one of two places, which are of two objects."""
+        return self.ego in (places[0].object, places[1].object)
 
     def _themselves(self, occupancy: Occupancy) -> dict[int, Sequence[str]]:
         """Each element as the regions in which it is found."""
@@ -295,8 +288,8 @@ class MapRelations:
 
         Args:
             occupancy: The elements.
-            meant: Of each element the regions that are meant.
-            most: Of how many elements at the place any may be meant, surely; 0 for what is possible.
+            meant: The regions that are meant, by element.
+            most: Any of so many elements at the place may be meant, surely; 0 for what is possible.
             everybody: Whether it is of where all others are, instead.
         """
         layers = self._sources(occupancy)

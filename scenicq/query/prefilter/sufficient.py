@@ -16,14 +16,13 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TypeAlias, TypeGuard, TypeVar
+from typing import TypeAlias, TypeVar
 
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group
 from scenicq.forest.interval_values import Interval
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
-    Compare,
     Constant,
     DiscAt,
     DiscreteRange,
@@ -47,10 +46,11 @@ from scenicq.match.problem.constraints import build_groups, relevant_properties
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.conditions import EGO, ConditionReader, difference, object_columns, turned_within
 from scenicq.query.prefilter.map_relations import (
+    LookUp,
     MapRelations,
     allowed_elements,
-    is_equation,
     look_up_of,
+    shared_look_ups,
 )
 from scenicq.query.prefilter.regions import near_region
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
@@ -89,17 +89,13 @@ class _Meant:
 
     Attributes:
         among: Their numbers; None where each condition has some of its own.
-        most: Of how many elements at the place any may be meant.
+        most: Any of so many elements at the place may be meant.
         shared: Whether the same element is meant where another object is.
     """
 
     among: frozenset[int] | None
     most: int
     shared: bool = False
-
-
-def _is_choice(node: Node) -> TypeGuard[Select]:
-    return isinstance(node, Select)
 
 
 class _OpenError(Exception):
@@ -165,8 +161,9 @@ class _Prover:
                 if allowed_elements(constraint.expression) is not None:
                     places += self._looked_up(constraint.expression, meant)
                     continue
-                if is_equation(constraint.expression) and len(objects) == 1:
-                    places.append((objects[0], self._shared(constraint.expression, meant)))
+                equal = shared_look_ups(constraint.expression)
+                if equal is not None and len(objects) == 1:
+                    places.append((objects[0], self._shared(equal, meant)))
                     continue
                 texts.append(_told(SQL.negation(bounds.can_fail(constraint.expression))))
                 continue
@@ -186,19 +183,17 @@ class _Prover:
         Where conditions look up elements of several kinds, it is not known which of each go together.
         """
         said = [each.expression for each in group.constraints if isinstance(each, Condition)]
-        equations = [each for each in said if is_equation(each)]
-        looked_up = [
-            node.index for node in postorder([each.expression for each in group.constraints]) if _is_choice(node)
-        ]
-        looked_up += [side for each in equations for side in (each.left, each.right)]
-        found = [look_up for each in looked_up if (look_up := look_up_of(each)) is not None]
+        equations = [places for each in said if (places := shared_look_ups(each)) is not None]
+        nodes = postorder([each.expression for each in group.constraints])
+        found = [look_up for node in nodes if isinstance(node, Select) and (look_up := look_up_of(node.index))]
+        found += [place for places in equations for place in places]
         if not found:
             return None
         objects = {each.object for each in found}
         alike = all(each.occupancy is found[0].occupancy for each in found)
         if not alike or self.scenario.ego not in objects or len(objects) != 1 + len(equations):
             return _Meant(None, 1)
-        allowed = [numbers for each in said if (known := allowed_elements(each)) for numbers in [known[1]]]
+        allowed = [known[1] for each in said if (known := allowed_elements(each))]
         among = frozenset(range(found[0].occupancy.nothing)).intersection(*allowed)
         return _Meant(among, min(each.ranks for each in found), shared=bool(equations))
 
@@ -216,11 +211,11 @@ class _Prover:
             raise _OpenError
         return [(self.scenario.ego, near)]
 
-    def _shared(self, equation: Compare, meant: _Meant | None) -> str:
+    def _shared(self, places: tuple[LookUp, LookUp], meant: _Meant | None) -> str:
         """That the same element surely lies where the ego and another object are."""
         if meant is None or meant.among is None or not meant.shared:
             raise _OpenError
-        near = self.relations.surely_share(equation.left, equation.right, meant.among, meant.most)
+        near = self.relations.surely_share(places, meant.among, meant.most)
         if near is None:
             raise _OpenError
         return near
@@ -304,7 +299,7 @@ class _Prover:
         if look_up is None or meant is None or self.options.radius is not None:
             raise _OpenError
         among = range(look_up.occupancy.nothing) if meant.among is None else meant.among
-        near = self.relations.surely_in(region, min(sure, MEMBERSHIP_RADIUS_M) - SLACK, among, meant.most)
+        near = self.relations.surely_in(region, look_up, min(sure, MEMBERSHIP_RADIUS_M) - SLACK, among, meant.most)
         if near is None:
             raise _OpenError
         return [(index, near)]
