@@ -121,7 +121,7 @@ class CsvRows:
 
         Args:
             text: Where to.
-            names: Of the columns.
+            names: The names of the columns.
             spreadsheet: Whether a spreadsheet is to read it.
         """
         self._spreadsheet = spreadsheet

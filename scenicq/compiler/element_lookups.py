@@ -88,18 +88,19 @@ class LookupTable:
         numbers = {element: number for number, element in enumerate(self.options)}
         nothing = len(self.options)
 
-        def places(layer: list[LookupEntry]) -> Layer:
+        places: list[Layer] = []
+        ids: list[tuple[str, ...]] = []
+        for layer in layers:
             owners = {owner: number for number, owner in enumerate(dict.fromkeys(owner for _, _, owner in layer))}
-            return tuple(
-                (part, nothing if element is None else numbers[element], owners[owner])
-                for area, element, owner in layer
-                for part in shapes.simple_parts([area.polygon])
+            parts = [(part, *entry) for entry in layer for part in shapes.simple_parts([entry[0].polygon])]
+            ids.append(tuple(area.id for _, area, _, _ in parts))
+            places.append(
+                tuple(
+                    (part, nothing if element is None else numbers[element], owners[owner])
+                    for part, _, element, owner in parts
+                )
             )
-
-        ids = tuple(
-            tuple(area.id for area, _, _ in layer for _ in shapes.simple_parts([area.polygon])) for layer in layers
-        )
-        self.occupancy = Occupancy(tuple(places(layer) for layer in layers), nothing, name, ids)
+        self.occupancy = Occupancy(tuple(places), nothing, name, tuple(ids))
 
 
 class Lookups:

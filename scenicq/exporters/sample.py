@@ -72,7 +72,7 @@ def sample_labels(
     Args:
         scenario: The scenario.
         count: How many.
-        seed: Of the random numbers.
+        seed: The seed of the random numbers.
         waive: Built-in requirements that need not hold.
         attempts: Failures for one scene after which the acceptance rate counts as hopeless.
         timeout_s: Seconds of the processor that one scene may take.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import assert_never
 
@@ -83,18 +84,8 @@ def parts_near(region: UnionOf, box: Bounds) -> list[Region]:
 def contains_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
     """`contains` for points of shape (n, 2); a boolean array (n,)."""
     match region:
-        case Everywhere() | Nowhere():
-            return np.full(len(xy), isinstance(region, Everywhere))
-        case Disc() | Sector() | Rectangle():
-            return _to_shape(region, xy) <= SLACK
-        case PolygonSet() | PolylineSet() | PointSet():
-            result = np.zeros(len(xy), dtype=bool)
-            result[shapes.tree_pairs_within(region.tree, shapes.points(xy), SLACK)[0]] = True
-            return result
-        case UnionOf():
-            return _filtered(xy, region.parts, start=False)
-        case IntersectionOf():
-            return _filtered(xy, region.parts, start=True)
+        case UnionOf() | IntersectionOf():
+            return _filtered(xy, region, contains_many)
         case DifferenceOf():
             result = contains_many(region.base, xy)
             (doubtful,) = np.nonzero(result)
@@ -102,7 +93,7 @@ def contains_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
             result[doubtful] = [contains(region, x, y) for x, y in xy[doubtful].tolist()]
             return result
         case _:
-            assert_never(region)
+            return may_be_within(region, xy, 0.0)
 
 
 def may_be_within(region: Region, xy: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
@@ -123,12 +114,7 @@ def may_be_within(region: Region, xy: NDArray[np.float64], reach: float) -> NDAr
             result[shapes.tree_pairs_within(region.tree, shapes.points(xy), reach + SLACK)[0]] = True
             return result
         case UnionOf() | IntersectionOf():
-            several = isinstance(region, UnionOf)
-            result = np.full(len(xy), not several)
-            for part in region.parts:
-                open_ = np.flatnonzero(result != several)
-                result[open_] = may_be_within(part, xy[open_], reach)
-            return result
+            return _filtered(xy, region, lambda part, some: may_be_within(part, some, reach))
         case DifferenceOf():
             return may_be_within(region.base, xy, reach)
         case _:
@@ -235,12 +221,16 @@ def _to_shape(region: Disc | Sector | Rectangle, xy: NDArray[np.float64]) -> NDA
             return to_rectangles(dx, dy, region.heading, region.width, region.length)
 
 
-def _filtered(xy: NDArray[np.float64], parts: tuple[Region, ...], *, start: bool) -> NDArray[np.bool_]:
-    """Conjunction (start True) or disjunction over the parts, each looking only at the points still open."""
+def _filtered(
+    xy: NDArray[np.float64], region: UnionOf | IntersectionOf,
+    holds: Callable[[Region, NDArray[np.float64]], NDArray[np.bool_]],
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Whether something holds of a part, or of all, each asked only of the points still open."""
+    start = isinstance(region, IntersectionOf)
     result = np.full(len(xy), start)
-    for part in parts:
+    for part in region.parts:
         (still,) = np.nonzero(result == start)
-        result[still] = contains_many(part, xy[still])
+        result[still] = holds(part, xy[still])
     return result
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.geometry.angles import direction
+from scenicq.geometry.angles import rotate
 from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.fields import InvalidError
@@ -260,9 +260,7 @@ def _poses(file: Path, report: Report) -> list[_Pose]:
         north = scale * _EARTH_M * math.log(math.tan(math.radians(90 + latitude) / 2))
         first = first or (east, north)
         place = euler(roll, pitch, yaw, (east - first[0], north - first[1], altitude))
-        ahead_x, ahead_y = direction(place.heading)
-        velocity = (forward * ahead_x - left * ahead_y, forward * ahead_y + left * ahead_x)
-        found.append(_Pose(place, velocity))
+        found.append(_Pose(place, rotate(-left, forward, place.heading)))
     return found
 
 

@@ -37,7 +37,7 @@ def of_elements(network: Any, count: int, seed: int) -> list[dict[str, Any]]:
     Args:
         network: Scenic's.
         count: Points of each element; half of them lie in it, the others around it.
-        seed: Of the random numbers.
+        seed: The seed of the random numbers.
     """
     random.seed(seed)
     np.random.seed(seed)

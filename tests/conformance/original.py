@@ -67,7 +67,7 @@ class Original:
         Args:
             text: The program.
             count: How many scenes.
-            seed: Of the random numbers.
+            seed: The seed of the random numbers.
             seconds: Processor time for all of them.
             first: Processor time after which there is one or it gives up.
 
@@ -109,7 +109,7 @@ class Original:
 
         Args:
             program: Its `text`, or the path of its `file`.
-            seed: Of the random numbers.
+            seed: The seed of the random numbers.
             seconds: Processor time that it may take.
             steps: How many there may be.
 

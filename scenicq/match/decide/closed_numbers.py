@@ -18,7 +18,7 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, clipped, spread
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, Scalar, by_option, clipped, spread
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
 from scenicq.match.problem.map_lookups import MapLookups
@@ -217,19 +217,19 @@ def _directions(
     number_ = CompiledExpressions(known).exact(node.field.index) if isinstance(node.field, Select) else None
     if not isinstance(node.field, Select) or number_ is None:
         return None
+    picked = cast(Scalar, number_)
     fields = [each.value for each in node.field.options if isinstance(each, Constant)]
     if len(fields) < len(node.field.options):
         return None
 
     def directions(get: Get, lookups: MapLookups) -> list[tuple[float, ...]]:
         places = each_position(get(where, "position"))
-        meant = np.rint(np.broadcast_to(np.asarray(number_(get)), len(places))).astype(np.intp)
         found: list[tuple[float, ...]] = [()] * len(places)
-        for each in cast("list[int]", np.unique(meant).tolist()):
-            field, mine = fields[each], np.flatnonzero(meant == each).tolist()
+        for option, mine in by_option(picked, get, len(places)):
+            field = fields[option]
             if isinstance(field, VectorField):
-                values = field.values_many(np.array([places[place] for place in mine]))
-                for place, value in zip(mine, values, strict=True):
+                values = field.values_many(np.array(places)[mine])
+                for place, value in zip(mine.tolist(), values, strict=True):
                     found[place] = value
         return found
 

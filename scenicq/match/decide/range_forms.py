@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
 
@@ -22,6 +22,7 @@ __all__ = [
     "Form",
     "Get",
     "Scalar",
+    "by_option",
     "clipped",
     "spread",
     "turned",
@@ -65,6 +66,19 @@ class Columns:
             return (found[0][which], found[1][which]) if isinstance(found, tuple) else found[which]
 
         return Columns(len(which), column)
+
+
+def by_option(number: Scalar, get: Get, size: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """The options that a number picks for labels, each with the numbers of those labels.
+
+    Args:
+        number: The number of an option.
+        get: What is observed.
+        size: Labels.
+    """
+    meant = np.rint(np.broadcast_to(np.asarray(number(get)), size)).astype(np.intp)
+    for option in cast("list[int]", np.unique(meant).tolist()):
+        yield option, np.flatnonzero(meant == option)
 
 
 def turned(angle: float) -> tuple[float, float]:

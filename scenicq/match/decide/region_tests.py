@@ -32,7 +32,7 @@ from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, Exact, Get, Scalar
+from scenicq.match.decide.range_forms import Columns, Exact, Get, Scalar, by_option
 from scenicq.match.problem.map_lookups import XY, MapLookups
 
 __all__ = ["RegionTest", "region_test"]
@@ -108,10 +108,9 @@ def _selected(number: Scalar, tests: list[_Test | None]) -> _Test:
         if not isinstance(get, Columns):
             one = tests[round(number(get))]
             return (False, False) if one is None else one(get, position, lookups, reach)
-        meant = np.rint(np.broadcast_to(np.asarray(number(get)), get.size)).astype(np.intp)
         held, missed = np.zeros((2, get.size), dtype=np.bool_)
-        for option in cast("list[int]", np.unique(meant).tolist()):
-            one, mine = tests[option], np.flatnonzero(meant == option)
+        for option, mine in by_option(number, get, get.size):
+            one = tests[option]
             if one is not None:
                 x, y = cast("tuple[NDArray[np.float64], NDArray[np.float64]]", position)
                 some = get.some(mine)

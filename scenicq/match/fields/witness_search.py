@@ -93,7 +93,7 @@ def find_witness(
         start: One case: where the random variables can be.
         efforts: How much each of the searches is worth that are made one after the other.
         outcomes: What choices may come out as; others may come out as anything.
-        seed: Of the draws of the first.
+        seed: The seed of the first one's draws.
     """
     trials, space = trials_left(), TrialSpace(start)
     for number, effort in enumerate(efforts or (QUICK,), seed):
