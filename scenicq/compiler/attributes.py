@@ -28,7 +28,7 @@ from scenicq.forest.nodes import ArithmeticOp, Node
 from scenicq.geometry.elements import Lane, Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
-from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS
+from scenicq.syntax.hints import BIKE_LANES, MOVES, STANDS
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter

@@ -22,7 +22,7 @@ from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import CompareOp, Constant, Feature, Kind, Node, Select, Undefined
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
-from scenicq.syntax.phrases import condition_hint
+from scenicq.syntax.hints import condition_hint
 
 __all__ = [
     "OBSERVABLE",

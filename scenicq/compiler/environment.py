@@ -12,7 +12,7 @@ from scenicq.forest.nodes import Node
 from scenicq.geometry.features import region_name
 from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
-from scenicq.syntax.phrases import BIKE_LANES, MOVES, STANDS, TURNS
+from scenicq.syntax.hints import BIKE_LANES, MOVES, STANDS, TURNS
 
 __all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Course", "Environment"]
 

@@ -22,7 +22,7 @@ from scenicq.limits import LIMITS
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
-    from scenicq.compiler.placing import SpecifierContext
+    from scenicq.compiler.specifier_meanings import SpecifierContext
 
 __all__ = ["follow"]
 

@@ -27,9 +27,9 @@ from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition
-from scenicq.compiler.placing import SpecifierContext, bind
 from scenicq.compiler.requirements import RequireStatement, requirement
 from scenicq.compiler.scoping import own_names
+from scenicq.compiler.specifier_meanings import SpecifierContext, bind
 from scenicq.compiler.specifiers import construct
 from scenicq.compiler.temporal import TimedStatements
 from scenicq.compiler.timed_statements import leave_out, timed_statement

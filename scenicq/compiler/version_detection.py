@@ -128,9 +128,9 @@ def _number_places(node: ast.SyntaxNode) -> tuple[ast.SyntaxNode | None, ...]:
             return (argument.value,)
         case ast.WithSpecifier() if node.property in _SCALAR_PROPERTIES:
             return (node.value,)
-        case ast.FacingSpecifier():
-            return (node.heading,)
-        case ast.FollowingSpecifier() | ast.Follow():
+        case ast.Phrase():
+            return tuple(node.of_kind("number", "heading"))
+        case ast.Follow():
             return (node.distance,)
         case ast.PropertyDefault() if node.name in _SCALAR_PROPERTIES:
             return (node.value,)

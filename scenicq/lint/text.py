@@ -10,7 +10,7 @@ from functools import cache
 from scenicq.compiler.models import library_texts
 from scenicq.compiler.roots import root_classes
 from scenicq.errors import Diagnostic, Span, similar
-from scenicq.syntax import ast
+from scenicq.syntax import ast, phrases
 from scenicq.syntax.walk import children, walk
 
 __all__ = ["lint_text"]
@@ -110,8 +110,8 @@ def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Numbers of more than a full turn where an angle stands."""
     places: list[ast.SyntaxNode] = []
     match node:
-        case ast.FacingSpecifier() | ast.ApparentlyFacingSpecifier():
-            places = [node.heading]
+        case ast.Phrase():
+            places += node.of_kind("heading")
         case ast.WithSpecifier(property=name) if name in _ANGLE_PROPERTIES:
             places = [node.value]
         case ast.PropertyDefault(name=name) if name in _ANGLE_PROPERTIES:
@@ -144,7 +144,7 @@ def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
                 pass
     for node in nodes:
         match node:
-            case ast.FacingSpecifier(heading=ast.Name(id=name) as heading) if name in objects:
+            case ast.Phrase(row=phrases.FACING, operands=(ast.Name(id=name) as heading,)) if name in objects:
                 yield _warning(
                     "facing-object", f"`facing {name}` is the direction in which `{name}` itself faces", heading.span,
                     "taken for its heading", f"`facing toward {name}` turns to it",

@@ -81,25 +81,7 @@ from scenicq.syntax.nodes.program import (
     RequireMonitor,
     Simulator,
 )
-from scenicq.syntax.nodes.specifiers import (
-    ApparentlyFacingSpecifier,
-    AtSpecifier,
-    BeyondSpecifier,
-    ContainedInSpecifier,
-    DirectionSpecifier,
-    FacingAwayFromSpecifier,
-    FacingSpecifier,
-    FacingTowardSpecifier,
-    FollowingSpecifier,
-    InSpecifier,
-    NotVisibleSpecifier,
-    OffsetAlongSpecifier,
-    OffsetBySpecifier,
-    OnSpecifier,
-    UsingSpecifier,
-    VisibleSpecifier,
-    WithSpecifier,
-)
+from scenicq.syntax.nodes.specifiers import Phrase, WithSpecifier
 from scenicq.syntax.nodes.statements import (
     AnnotatedAssign,
     Assert,
@@ -136,14 +118,11 @@ __all__ = [
     "Angle",
     "AnnotatedAssign",
     "ApparentHeading",
-    "ApparentlyFacingSpecifier",
     "Argument",
     "Assert",
     "Assign",
-    "AtSpecifier",
     "Attribute",
     "AugmentedAssign",
-    "BeyondSpecifier",
     "BinaryOp",
     "BoolOp",
     "Branch",
@@ -155,14 +134,12 @@ __all__ = [
     "ComparisonChain",
     "ComparisonLink",
     "Comprehension",
-    "ContainedInSpecifier",
     "Continue",
     "Deg",
     "Delete",
     "Dict",
     "DictComprehension",
     "DictItem",
-    "DirectionSpecifier",
     "DistanceOperator",
     "DistancePast",
     "DynamicDefinition",
@@ -171,12 +148,8 @@ __all__ = [
     "ExceptHandler",
     "Expression",
     "ExpressionStatement",
-    "FacingAwayFromSpecifier",
-    "FacingSpecifier",
-    "FacingTowardSpecifier",
     "FieldAt",
     "Follow",
-    "FollowingSpecifier",
     "For",
     "FormattedString",
     "FunctionDef",
@@ -187,7 +160,6 @@ __all__ = [
     "Import",
     "ImportAlias",
     "ImportFrom",
-    "InSpecifier",
     "InitialScenario",
     "IntersectsOperator",
     "Lambda",
@@ -198,17 +170,14 @@ __all__ = [
     "Name",
     "New",
     "Nonlocal",
-    "NotVisibleSpecifier",
     "OffsetAlong",
-    "OffsetAlongSpecifier",
     "OffsetBy",
-    "OffsetBySpecifier",
-    "OnSpecifier",
     "Param",
     "ParamItem",
     "Parameter",
     "PartOf",
     "Pass",
+    "Phrase",
     "Program",
     "PropertyDefault",
     "Raise",
@@ -234,11 +203,9 @@ __all__ = [
     "UnsupportedExpression",
     "UnsupportedStatement",
     "UntilOperator",
-    "UsingSpecifier",
     "VectorOperator",
     "Visible",
     "VisibleFrom",
-    "VisibleSpecifier",
     "Walrus",
     "While",
     "WithItem",
@@ -246,25 +213,7 @@ __all__ = [
     "WithStatement",
 ]  # fmt: skip
 
-Specifier: TypeAlias = (
-    WithSpecifier
-    | AtSpecifier
-    | InSpecifier
-    | OnSpecifier
-    | ContainedInSpecifier
-    | OffsetBySpecifier
-    | OffsetAlongSpecifier
-    | BeyondSpecifier
-    | VisibleSpecifier
-    | NotVisibleSpecifier
-    | DirectionSpecifier
-    | FollowingSpecifier
-    | FacingSpecifier
-    | FacingTowardSpecifier
-    | FacingAwayFromSpecifier
-    | ApparentlyFacingSpecifier
-    | UsingSpecifier
-)
+Specifier: TypeAlias = WithSpecifier | Phrase
 """What can follow the class of an instance."""
 
 Expression: TypeAlias = (

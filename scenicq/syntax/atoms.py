@@ -7,8 +7,8 @@ from typing import Literal
 from scenicq.errors import Note, ScenarioError
 from scenicq.syntax import ast
 from scenicq.syntax.bindings import BindingParser
+from scenicq.syntax.hints import phrase_hint
 from scenicq.syntax.literals import number_value
-from scenicq.syntax.phrases import phrase_hint
 from scenicq.syntax.tokens import Token
 
 __all__ = ["AtomParser"]

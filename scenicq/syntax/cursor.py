@@ -53,6 +53,12 @@ class Cursor:
         """Whether the next token reads like one of these."""
         return self.text in texts
 
+    def reads(self, index: int, words: tuple[str, ...]) -> bool:
+        """Whether the tokens from an index on read like these words."""
+        return all(
+            self.tokens[min(index + ahead, len(self.tokens) - 1)].text == word for ahead, word in enumerate(words)
+        )
+
     def accept(self, text: str) -> bool:
         """Go past the next token if it reads so."""
         if self.text != text:

@@ -10,7 +10,7 @@ import re
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
 from scenicq.limits import LIMITS
-from scenicq.syntax.phrases import unit_hint
+from scenicq.syntax.hints import unit_hint
 from scenicq.syntax.tokens import CLOSERS, KEYWORDS, Token, TokenKind
 
 __all__ = ["tokenize", "tokenize_part"]

@@ -9,9 +9,10 @@ from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 from scenicq.syntax.jumps import check_jumps
 from scenicq.syntax.lexer import tokenize
+from scenicq.syntax.phrases import VERSIONS
 from scenicq.syntax.scenic_statements import ProgramParser
 from scenicq.syntax.tokens import INFIX_WORDS, Token
-from scenicq.syntax.versions import VERSIONS, choose_version, find_evidence
+from scenicq.syntax.versions import choose_version, find_evidence
 from scenicq.syntax.walk import check_height
 
 __all__ = ["parse"]

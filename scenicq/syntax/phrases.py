@@ -1,92 +1,146 @@
-"""What people write in plain English where Scenic has other words: hints for places where the parser cannot go on."""
+"""Scenic's phrases, one row each: the only place that says how a phrase is written.
+
+The parser reads a phrase off its row, `versions` which Scenic has it, the linter where angles stand; its meaning
+stands under the same text in the compiler. In a row, `{name}` is an operand and `[from {name}]` one that may be left
+out. `{name:kind}` says what kind of value it is, where more than the meaning needs to know: a `number`, or a `heading`,
+which a number is, too. `{name=ego}` is the ego where it is left out.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
 
-from scenicq.syntax.tokens import Token
+from scenicq.syntax.precedence import POWER
 
-__all__ = ["BIKE_LANES", "MOVES", "STANDS", "TURNS", "condition_hint", "phrase_hint", "unit_hint"]
+__all__ = ["FACING", "SPECIFIERS", "SPECIFIERS_AT", "VERSIONS", "Operand", "PhraseRow", "each_meaning"]
 
-_LENGTH, _SPEED, _TIME = "lengths are in metres", "speeds are in metres a second", "times are in seconds"
-_DEGREES, _RADIANS = "`deg` stands for degrees", "angles are in radians"
-_UNITS = {
-    "m meter meters metre metres": (_LENGTH, ""), "km kilometers kilometres": (_LENGTH, " * 1000"),
-    "cm": (_LENGTH, " / 100"), "ft feet": (_LENGTH, " * 0.3048"), "m/s mps": (_SPEED, ""),
-    "km/h kmh kph": (_SPEED, " / 3.6"), "mph": (_SPEED, " * 0.447"), "degree degrees degs": (_DEGREES, " deg"),
-    "rad radians": (_RADIANS, ""), "s sec secs second seconds": (_TIME, ""), "min minutes": (_TIME, " * 60"),
-}  # fmt: skip
-"""What numbers mean without a unit, by the units that people write, and what makes such a number of theirs."""
-_UNIT = {word: told for words, told in _UNITS.items() for word in words.split()}
+Meaning = TypeVar("Meaning")
 
-_DISTANCE = "`(distance from a to b) < 10` compares a distance"
-STANDS, MOVES = "`X.speed < 0.5` asks whether X stands", "`X.speed > 1` asks whether X moves"
-TURNS = "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right"
-BIKE_LANES = "`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows"
-_SIDE = "`(distance past X) < 0` asks whether X is ahead of the ego; `ahead of Y by Range(0, 20)` places a new object"
-_LEFT = "`(distance to X) * sin((angle to X) - ego.heading) > 0` asks whether X is left of the ego, `sin` is of `math`"
-_RIGHT = _LEFT.replace("> 0", "< 0").replace("left of", "right of")
-_INSIDE = "`X in R` asks whether the box of X lies in a region, `X.position in R` its centre alone"
-_TOWARD = "`abs((angle from X to Y) - X.heading) < 20 deg` asks whether X faces Y; `facing toward Y` turns a new object"
-_SEES = "`X can see Y` asks whether Y is in view"
-_OVER_TIME = "`require (A) until (B)` and `eventually (A and next (eventually B))` say what comes after what"
-_BEYOND = "`beyond X by Range(2, 30)` places a new object where X hides it from the ego"
-_SAID = {
-    "between": "`5 < a < 10` asks whether a number is between two", "near": _DISTANCE, "within": _DISTANCE,
-    "close": _DISTANCE, "far": _DISTANCE, "turning": TURNS, "turns": TURNS, "stopped": STANDS, "parked": STANDS,
-    "stationary": STANDS, "standing": STANDS, "ahead": _SIDE, "front": _SIDE, "behind": _SIDE, "left": _LEFT,
-    "right": _RIGHT, "on": _INSIDE, "inside": _INSIDE, "onto": _INSIDE, "faces": _TOWARD, "facing": _TOWARD,
-    "sees": _SEES, "visible": _SEES, "then": _OVER_TIME, "after": _OVER_TIME, "before": _OVER_TIME,
-    "overtakes": _OVER_TIME, "passes": _OVER_TIME, "initial": _OVER_TIME, "initially": _OVER_TIME,
-    "occludes": _BEYOND, "hides": _BEYOND, "occluded": _BEYOND, "hidden": _BEYOND,
-}  # fmt: skip
-"""How a condition is said that people write with that word."""
-_MADE = {
-    "same": "`facing Range(-10, 10) deg relative to X.heading` is the direction of X",
-    "opposite": "`facing Range(170, 190) deg relative to X.heading` is against the direction of X",
-    "between": "`Range(a, b)` is an interval",
-    "front": "`ahead of X by Range(0, 20)` places an object in front of another",
-}  # fmt: skip
-"""How an object is described that people describe with that word."""
-_FURTHEST = 4
-"""Words before the place where the parser cannot go on that may say what was meant."""
+VERSIONS = frozenset((1, 2, 3))
+_NEW = frozenset((3,))
 
 
-def unit_hint(number: str, word: str) -> str:
-    """What to write for a number with a unit; nothing for a word that is none."""
-    told = _UNIT.get(word)
-    return f"{told[0]}: write `{number}{told[1]}`" if told else ""
+@dataclass(frozen=True, slots=True, eq=False)
+class Operand:
+    """A place in a phrase.
+
+    Attributes:
+        name: What stands there.
+        kind: `number`, `heading`, or nothing.
+        word: The word that introduces what may be left out, else nothing.
+        is_ego: Whether what is left out is the ego.
+        level: How tight the operators in it are at least; 0 for any expression.
+    """
+
+    name: str
+    kind: str
+    word: str
+    is_ego: bool
+    level: int
 
 
-def phrase_hint(tokens: Sequence[Token], index: int) -> str:
-    """What to write for English words around a token that continues nothing.
+@dataclass(frozen=True, slots=True, eq=False)
+class PhraseRow:
+    """A phrase.
+
+    Attributes:
+        text: How it is written, without kinds: its name.
+        words: The words that it starts with.
+        rest: What follows them: operands and words.
+        versions: The versions of Scenic that have it.
+        construct: What those are told who mix versions.
+        after: What stands before a word that is missing.
+        example: What to write then.
+    """
+
+    text: str
+    words: tuple[str, ...]
+    rest: tuple[Operand | str, ...]
+    versions: frozenset[int]
+    construct: str
+    after: str
+    example: str
+
+    @property
+    def operands(self) -> tuple[Operand, ...]:
+        """The operands, in the order of the text."""
+        return tuple(part for part in self.rest if isinstance(part, Operand))
+
+
+_PART = re.compile(r"(\[(?P<word>\w+) )?\{(?P<name>\w+)(:(?P<kind>\w+))?(?P<ego>=ego)?\}\]?|(?P<plain>\w+)")
+_KIND = re.compile(r":\w+|=ego")
+
+
+def _specifier(text: str, *, since_3: str = "", level: int = 0, after: str = "", example: str = "") -> PhraseRow:
+    parts: list[Operand | str] = []
+    for found in _PART.finditer(text):
+        name, kind, word = found["name"], found["kind"] or "", found["word"] or ""
+        parts.append(Operand(name, kind, word, bool(found["ego"]), level) if name else found["plain"])
+    count = next((number for number, part in enumerate(parts) if isinstance(part, Operand)), len(parts))
+    words = tuple(part for part in parts[:count] if isinstance(part, str))
+    versions = _NEW if since_3 else VERSIONS
+    return PhraseRow(_KIND.sub("", text), words, tuple(parts[count:]), versions, since_3, after, example)
+
+
+def _by_word(rows: Iterable[PhraseRow]) -> dict[str, list[PhraseRow]]:
+    """The rows by their first word, those of more words first."""
+    found: dict[str, list[PhraseRow]] = {}
+    for row in sorted(rows, key=lambda row: -len(row.words)):
+        found.setdefault(row.words[0], []).append(row)
+    return found
+
+
+_DIRECTLY = "`facing directly`"
+
+SPECIFIERS: tuple[PhraseRow, ...] = (
+    _specifier("at {position}"),
+    _specifier("in {region}"),
+    _specifier("on {region}"),
+    _specifier("contained in {region}", since_3="`contained in`"),
+    _specifier("offset by {offset}"),
+    _specifier("offset along {direction:heading} by {offset}",
+               after="the direction", example="offset along direction by vector"),
+    _specifier("beyond {target} by {offset} [from {origin=ego}]",
+               after="the position to be beyond", example="beyond position by offset"),
+    _specifier("visible [from {viewer=ego}]"),
+    _specifier("not visible [from {viewer=ego}]"),
+    _specifier("left of {reference} [by {distance}]"),
+    _specifier("right of {reference} [by {distance}]"),
+    _specifier("ahead of {reference} [by {distance}]"),
+    _specifier("behind {reference} [by {distance}]"),
+    _specifier("above {reference} [by {distance}]", since_3="`above`"),
+    _specifier("below {reference} [by {distance}]", since_3="`below`"),
+    _specifier("following {field} [from {origin=ego}] for {distance:number}",
+               after="the field to follow", example="following field for distance"),
+    _specifier("facing {heading:heading}"),
+    _specifier("facing toward {target}"),
+    _specifier("facing away from {target}"),
+    _specifier("facing directly toward {target}", since_3=_DIRECTLY),
+    _specifier("facing directly away from {target}", since_3=_DIRECTLY),
+    _specifier("apparently facing {heading:heading} [from {origin=ego}]"),
+    _specifier("using {value}", level=POWER + 1),
+)  # fmt: skip
+"""What can follow the class of an instance, besides `with property value`."""
+
+SPECIFIERS_AT = _by_word(SPECIFIERS)
+FACING = next(row for row in SPECIFIERS if row.text == "facing {heading}")
+
+
+def each_meaning(rows: Iterable[PhraseRow], meanings: Mapping[str, Meaning]) -> dict[PhraseRow, Meaning]:
+    """The meaning of each row.
 
     Args:
-        tokens: All of them.
-        index: The token that the parser cannot use.
+        rows: The rows of a table.
+        meanings: Meanings by the text of the row.
 
-    Returns:
-        The hint, or nothing.
+    Raises:
+        ValueError: A row has no meaning, or a meaning has no row.
     """
-    word, before = tokens[index].text, tokens[max(0, index - 1)]
-    after = [each.text for each in tokens[index + 1 : index + 3]]
-    if before.kind == "number":
-        unit = word + "".join(after) if after[:1] == ["/"] else word
-        end = word.lstrip(".") if word.startswith(".") else after[0] if word == "to" and after else ""
-        if end.isdecimal():
-            return f"`Range({before.text.rstrip('.')}, {end})` is an interval"
-        if hint := unit_hint(before.text, unit):
-            return hint
-    if before.text == "distance":
-        return "`distance from a to b` is the distance between two"
-    start = index
-    while start and tokens[start - 1].kind not in ("newline", "indent", "dedent"):
-        start -= 1
-    said = _SAID if tokens[start].text == "require" else _MADE
-    words = (token.text for token in tokens[max(start, index - _FURTHEST) : index + 1])
-    return next((said[each] for each in words if each in said), "")
-
-
-def condition_hint(word: str) -> str:
-    """How the condition is said that people write with a word between two names; nothing for other words."""
-    return _SAID.get(word, "")
+    by_text = {row.text: row for row in rows}
+    if by_text.keys() != meanings.keys():
+        message = f"rows and meanings differ: {sorted(by_text.keys() ^ meanings.keys())}"
+        raise ValueError(message)
+    return {row: meanings[text] for text, row in by_text.items()}

@@ -36,20 +36,12 @@ class PrefixParser(InstanceParser):
         self.retries = 0
 
     @abstractmethod
-    def binary(self, level: int) -> ast.Expression:
-        """Read an expression of operators at least as tight as the level."""
-
-    @abstractmethod
     def climb(self, start: int, left: ast.Expression, level: int) -> ast.Expression:
         """Read the operators after a left operand, as long as they are tight enough."""
 
     @abstractmethod
     def conditional(self, start: int, then: ast.Expression) -> ast.Expression:
         """Read `if test else other` after a value, if it is there."""
-
-    @abstractmethod
-    def level_here(self) -> int:
-        """How tight the operator is that stands here; 0 for none."""
 
     def is_prefix(self) -> bool:
         """Whether an operator of several words starts here, such as `distance to`."""

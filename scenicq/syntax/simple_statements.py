@@ -6,8 +6,8 @@ from typing import Literal, cast
 
 from scenicq.errors import ScenarioError
 from scenicq.syntax import ast
+from scenicq.syntax.hints import phrase_hint
 from scenicq.syntax.operators import OperatorParser
-from scenicq.syntax.phrases import phrase_hint
 
 __all__ = ["SimpleParser"]
 

@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Literal
 
 from scenicq.errors import ScenarioError, Source, similar
 from scenicq.syntax import ast
 from scenicq.syntax.atoms import AtomParser
-from scenicq.syntax.precedence import POWER
+from scenicq.syntax.phrases import SPECIFIERS, SPECIFIERS_AT, PhraseRow
 from scenicq.syntax.tokens import INFIX_NAMES, Token
 
 __all__ = ["InstanceParser"]
 
-_SPECIFIERS = [
-    "with", "at", "in", "on", "contained in", "offset by", "offset along", "beyond", "visible", "not visible",
-    "left of", "right of", "ahead of", "behind", "above", "below", "following", "facing", "facing toward",
-    "facing away from", "apparently facing", "using",
-]  # fmt: skip
-_ONE_WORD = frozenset(("on", "at", "facing", "following", "beyond", "behind", "above", "below", "using"))
-_UNMISTAKABLE = _ONE_WORD - {"at"}
-_TWO_WORDS = {
-    "left": ("of",), "right": ("of",), "ahead": ("of",), "contained": ("in",), "apparently": ("facing",),
-    "offset": ("by", "along"),
-}  # fmt: skip
+_NAMES = ["with", *(" ".join(row.words) for row in SPECIFIERS)]
 _ENDS = frozenset((",", ")", "]", "}", ";", ":", "if", "else", "for", "and", "or", "from", "as"))
 
 _FAR = "a requirement says how far: `require (distance from a to b) < 10`"
@@ -53,8 +42,12 @@ class InstanceParser(AtomParser):
         self.has_new = False
 
     @abstractmethod
-    def operand(self, level: int) -> ast.Expression:
-        """Read what stands before, between or after operators."""
+    def binary(self, level: int) -> ast.Expression:
+        """Read an expression of operators at least as tight as the level."""
+
+    @abstractmethod
+    def level_here(self) -> int:
+        """How tight the operator is that stands here; 0 for none."""
 
     def looks_like_class(self, node: ast.Expression) -> bool:
         """Whether a name is one of a class: defined as such, or in capitals as classes are."""
@@ -72,44 +65,38 @@ class InstanceParser(AtomParser):
 
     def starts_instance(self, node: ast.Expression) -> bool:
         """Whether the next tokens make a name the class of an instance without `new`."""
-        text = self.text
-        following = self.peek()
-        match text:
-            case "with":
-                return True
-            case "at":
-                return self.looks_like_class(node)
-            case "offset":
-                return following.text in ("by", "along") and self.looks_like_class(node)
-            case "in":
-                return not self.has_new and self.looks_like_class(node)
-            case "visible":
-                return following.text != "from" or (not self.has_new and self.looks_like_class(node))
-            case "not":
-                if following.text != "visible":
-                    return False
-                return self.peek(2).text != "from" or (not self.has_new and self.looks_like_class(node))
-            case "left" | "right" | "ahead" | "contained" | "apparently":
-                return following.text in _TWO_WORDS[text]
-            case _:
-                return text in _UNMISTAKABLE
+        if self.text == "with":
+            return True
+        if self.specifier_at(self.index) is None:
+            return False
+        if not self.level_here():
+            return True
+        # the words are an operator after a value, and a specifier after a class
+        only_old = self.text not in ("at", "offset")
+        return not (only_old and self.has_new) and self.looks_like_class(node)
+
+    def specifier_at(self, index: int) -> PhraseRow | None:
+        """The specifier that starts at the token, but for `with`."""
+        for row in SPECIFIERS_AT.get(self.tokens[index].text, ()):
+            # `toward` may be a variable
+            if self.reads(index, row.words) and (
+                row.words[-1] != "toward" or self.starts_operand(index + len(row.words))
+            ):
+                return row
+        return None
 
     def starts_specifier(self, index: int) -> bool:
         """Whether a specifier starts at the token."""
-        token, following = self.tokens[index], self.tokens[min(index + 1, len(self.tokens) - 1)]
-        text = token.text
-        if text == "in":
-            return True
-        if text == "with":
-            return following.kind == "name"
-        if text in _ONE_WORD:
-            return self.starts_operand(index + 1) or following.text in INFIX_NAMES
-        if text in _TWO_WORDS:
-            return following.text in _TWO_WORDS[text]
-        if text == "not" and following.text == "visible":
-            following = self.tokens[index + 2]
-            return following.text in _ENDS or not following.text
-        return text == "visible" and (following.text in _ENDS or not following.text)
+        if self.tokens[index].text == "with":
+            return self.tokens[min(index + 1, len(self.tokens) - 1)].kind == "name"
+        row = self.specifier_at(index)
+        if row is None:
+            return False
+        after = index + len(row.words)
+        text = self.tokens[after].text
+        if row.operands[0].word:
+            return text in _ENDS or not text
+        return len(row.words) > 1 or row.words == ("in",) or self.starts_operand(after) or text in INFIX_NAMES
 
     def names_class(self, index: int) -> bool:
         """Whether the name after `new` is that of a class, and not an operator after a variable called `new`."""
@@ -157,9 +144,7 @@ class InstanceParser(AtomParser):
         if self.token.kind != "name" or not self.starts_operand(self.index) or self.text[:1].isupper():
             return False
         if following.kind == "name":
-            return (
-                self.starts_operand(self.index + 1) and bool(similar(self.text, _SPECIFIERS)) and not self.is_prefix()
-            )
+            return self.starts_operand(self.index + 1) and bool(similar(self.text, _NAMES)) and not self.is_prefix()
         return following.kind in ("number", "string")
 
     @abstractmethod
@@ -168,7 +153,7 @@ class InstanceParser(AtomParser):
 
     def unknown(self) -> ScenarioError:
         """The error for a word that starts no specifier."""
-        close = similar(self.text, _SPECIFIERS) or similar(f"{self.text} {self.peek().text}", _SPECIFIERS)
+        close = similar(self.text, _NAMES) or similar(f"{self.text} {self.peek().text}", _NAMES)
         if close.startswith(f"{self.text} "):
             message = f"`{self.text}` alone starts no specifier"
             return self.fail(message, hint=f"write `{close}`", code="unknown-specifier")
@@ -179,101 +164,25 @@ class InstanceParser(AtomParser):
     def specifier(self) -> ast.Specifier:
         """Read one specifier."""
         start = self.token.start
-        word = self.advance().text
-        match word:
-            case "with":
-                name = self.name("the name of the property")
-                value = self.expression()
-                return ast.WithSpecifier(self.span(start), name.text, self.token_span(name), value)
-            case "at":
-                value = self.expression()
-                return ast.AtSpecifier(self.span(start), value)
-            case "in":
-                value = self.expression()
-                return ast.InSpecifier(self.span(start), value)
-            case "on":
-                value = self.expression()
-                return ast.OnSpecifier(self.span(start), value)
-            case "contained":
-                self.advance()
-                value = self.expression()
-                return ast.ContainedInSpecifier(self.span(start), value)
-            case "offset":
-                return self.offset(start)
-            case "beyond":
-                return self.beyond(start)
-            case "visible":
-                viewer = self.expression() if self.accept("from") else None
-                return ast.VisibleSpecifier(self.span(start), viewer)
-            case "not":
-                self.expect("visible", "after `not`")
-                viewer = self.expression() if self.accept("from") else None
-                return ast.NotVisibleSpecifier(self.span(start), viewer)
-            case "left" | "right" | "ahead":
-                self.expect("of", f"after `{word}`")
-                return self.direction(start, word)
-            case "behind" | "above" | "below":
-                return self.direction(start, word)
-            case "following":
-                field = self.expression()
-                origin = self.expression() if self.accept("from") else None
-                self.expect("for", "after the field to follow", "write `following field for distance`")
-                distance = self.expression()
-                return ast.FollowingSpecifier(self.span(start), field, origin, distance)
-            case "facing":
-                return self.facing(start)
-            case "apparently":
-                self.expect("facing", "after `apparently`")
-                heading = self.expression()
-                origin = self.expression() if self.accept("from") else None
-                return ast.ApparentlyFacingSpecifier(self.span(start), heading, origin)
-            case "using":
-                value = self.operand(POWER)
-                return ast.UsingSpecifier(self.span(start), value)
-            case _:
-                self.move(self.index - 1)
-                raise self.unknown()
-
-    def offset(self, start: int) -> ast.Specifier:
-        """Read what follows `offset`."""
-        if self.accept("along"):
-            direction = self.expression()
-            self.expect("by", "after the direction", "write `offset along direction by vector`")
+        if self.accept("with"):
+            name = self.name("the name of the property")
             value = self.expression()
-            return ast.OffsetAlongSpecifier(self.span(start), direction, value)
-        self.expect("by", "after `offset`", "write `offset by vector` or `offset along direction by vector`")
-        value = self.expression()
-        return ast.OffsetBySpecifier(self.span(start), value)
+            return ast.WithSpecifier(self.span(start), name.text, self.token_span(name), value)
+        row = self.specifier_at(self.index)
+        if row is None:
+            raise self.unknown()
+        return self.phrase(row)
 
-    def beyond(self, start: int) -> ast.Specifier:
-        """Read what follows `beyond`."""
-        target = self.expression()
-        self.expect("by", "after the position to be beyond", "write `beyond position by offset`")
-        offset = self.expression()
-        origin = self.expression() if self.accept("from") else None
-        return ast.BeyondSpecifier(self.span(start), target, offset, origin)
-
-    def direction(
-        self, start: int, word: Literal["left", "right", "ahead", "behind", "above", "below"]
-    ) -> ast.Specifier:
-        """Read what follows `left of` and its like."""
-        reference = self.expression()
-        distance = self.expression() if self.accept("by") else None
-        return ast.DirectionSpecifier(self.span(start), word, reference, distance)
-
-    def facing(self, start: int) -> ast.Specifier:
-        """Read what follows `facing`."""
-        directly = self.text == "directly" and self.peek().text in ("toward", "away")
-        if directly:
-            self.advance()
-        if self.text == "toward" and self.starts_operand(self.index + 1):
-            self.advance()
-            target = self.expression()
-            return ast.FacingTowardSpecifier(self.span(start), target, directly)
-        if self.text == "away" and self.peek().text == "from":
-            self.advance()
-            self.advance()
-            target = self.expression()
-            return ast.FacingAwayFromSpecifier(self.span(start), target, directly)
-        heading = self.expression()
-        return ast.FacingSpecifier(self.span(start), heading)
+    def phrase(self, row: PhraseRow) -> ast.Phrase:
+        """Read a phrase whose first words stand here."""
+        start = self.token.start
+        self.move(self.index + len(row.words))
+        operands: list[ast.Expression | None] = []
+        for part in row.rest:
+            if isinstance(part, str):
+                self.expect(part, f"after {row.after}", f"write `{row.example}`")
+            elif part.word and not self.accept(part.word):
+                operands.append(None)
+            else:
+                operands.append(self.binary(part.level) if part.level else self.expression())
+        return ast.Phrase(self.span(start), row, tuple(operands))

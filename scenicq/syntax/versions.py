@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
 from scenicq.syntax import ast
-from scenicq.syntax.phrases import condition_hint
+from scenicq.syntax.hints import condition_hint
+from scenicq.syntax.phrases import VERSIONS
 from scenicq.syntax.walk import walk
 
-__all__ = ["VERSIONS", "choose_version", "find_evidence"]
+__all__ = ["choose_version", "find_evidence"]
 
-VERSIONS = frozenset((1, 2, 3))
 _OLD = frozenset((1, 2))
 _RECENT = frozenset((2, 3))
 _NEW = frozenset((3,))
@@ -51,12 +51,8 @@ def _evidence(source: Source, node: ast.SyntaxNode, defined: set[str]) -> ast.Ev
             return ast.Evidence(node.span, "`intersects`", _NEW)
         case ast.Altitude():
             return ast.Evidence(node.span, "`altitude`", _NEW)
-        case ast.ContainedInSpecifier():
-            return ast.Evidence(node.span, "`contained in`", _NEW)
-        case ast.DirectionSpecifier(direction="above" | "below"):
-            return ast.Evidence(node.span, f"`{node.direction}`", _NEW)
-        case ast.FacingTowardSpecifier(directly=True) | ast.FacingAwayFromSpecifier(directly=True):
-            return ast.Evidence(node.span, "`facing directly`", _NEW)
+        case ast.Phrase(row=row) if row.construct:
+            return ast.Evidence(node.span, row.construct, row.versions)
         case ast.PartOf() if node.part.startswith(_SCENIC_3_PARTS):
             return ast.Evidence(node.span, f"`{node.part} of`", _NEW)
         case ast.RequireMonitor():

@@ -18,6 +18,8 @@ from .scenes import compiled
         ("ego = Car\ndef ahead(gap=3):\n    return Car ahead of ego by 2 * gap\nahead(gap=(2, 8))\n", 1),
         ("ego = Car\ndef ahead(gap, more=1):\n    return Car ahead of ego by 2 * gap\nahead((2, 8))\n", 1),
         ("ego = Car\ndef ahead(gap):\n    return Car ahead of ego by gap\nahead((2, 8))\n", 2),
+        ("ego = Car at 9 @ 9\nCar at 1 @ 2, apparently facing (0, 0.5)\n", 1),
+        ("ego = Car at 9 @ 9\nCar offset along (0, 0.5) by 3 @ 4\n", 1),
         ("ego = Car\ndef put(place):\n    Car at place\nput((2, 8))\n", 2),
     ],
 )

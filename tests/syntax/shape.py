@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from scenicq.errors import ScenarioError, Source, render
 from scenicq.syntax import ast
 from scenicq.syntax.parser import parse
 from scenicq.syntax.walk import walk
+
+_PLACE = r"( )\[(\w+ )\{\w+\}\]|\{\w+\}"
+"""An operand of a phrase, with the word before one that may be left out."""
 
 
 def module(text: str, version: int | None = None) -> ast.Program:
@@ -35,7 +40,7 @@ def error(text: str, version: int | None = None) -> str:
 
 
 def shape(value: object) -> str:
-    """`Deg(x)` for `x deg`; operators of arithmetic in prefix form; places, None and empty fields left out."""
+    """`<x deg>` for `x deg`; operators of arithmetic in prefix form; places, None and empty fields left out."""
     match value:
         case ast.Name():
             return value.id
@@ -59,6 +64,14 @@ def shape(value: object) -> str:
             return f"{shape(value.function)}({', '.join(shape(item) for item in value.arguments)})"
         case ast.ExpressionStatement():
             return shape(value.value)
+        case ast.Phrase():
+            operands = iter(value.operands)
+
+            def fill(place: re.Match[str]) -> str:
+                operand = next(operands)
+                return "" if operand is None else (place[1] or "") + (place[2] or "") + shape(operand)
+
+            return f"<{re.sub(_PLACE, fill, value.row.text)}>"
         case ast.SyntaxNode():
             names = [name for name in value.__dataclass_fields__ if name != "span" and not name.endswith("_span")]
             fields = [getattr(value, name) for name in names]

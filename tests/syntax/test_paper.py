@@ -41,9 +41,9 @@ def test_badly_parked_car() -> None:
     body = module(PROGRAMS["badly parked car"][0]).body
     assert [shape(node) for node in body] == [
         "Assign([ego], Car)",
-        "Assign([spot], New(OrientedPoint, [On(Visible(curb, False))], False))",
+        "Assign([spot], New(OrientedPoint, [<on Visible(curb, False)>], False))",
         "Assign([badAngle], Deg((* Uniform(1.0, (- 1.0)) Tuple([10, 20]))))",
-        "New(Car, [Direction(left, spot, 0.5), Facing(RelativeTo(badAngle, roadDirection))], False)",
+        "New(Car, [<left of spot by 0.5>, <facing RelativeTo(badAngle, roadDirection)>], False)",
     ]
 
 
@@ -55,11 +55,11 @@ def test_platoon_function() -> None:
     assert [shape(node) for node in loop.body] == [
         "Assign([center], Follow(roadDirection, PartOf(front, lastCar), resample(dist)))",
         (
-            "Assign([pos], New(OrientedPoint, [Direction(right, center, shift), "
-            "Facing(RelativeTo(resample(wiggle), roadDirection))], False))"
+            "Assign([pos], New(OrientedPoint, [<right of center by shift>, "
+            "<facing RelativeTo(resample(wiggle), roadDirection)>], False))"
         ),
         (
-            "Assign([lastCar], New(Car, [Direction(ahead, pos), "
+            "Assign([lastCar], New(Car, [<ahead of pos>, "
             "With(model, IfElse((model is None), car.model, resample(model)))], False))"
         ),
     ]

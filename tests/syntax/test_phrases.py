@@ -1,72 +1,53 @@
-"""Plain English where Scenic has other words: the error says what to write, and what it says can be read."""
+"""The table of phrases: each row is read as it is written, has one meaning, and nothing else has one."""
+
+from __future__ import annotations
 
 import re
+from itertools import product
 
 import pytest
 
-from scenicq.errors import ScenarioError, Source
-from scenicq.syntax.parser import parse
+from scenicq.syntax import ast
+from scenicq.syntax.phrases import SPECIFIERS, PhraseRow, each_meaning
+from scenicq.syntax.walk import walk
 
-HINTS = {
-    "require (distance to other) < 20 m": "write `20`",
-    "require (distance to other) < 20m": "write `20`",
-    "require other.speed > 5 m/s": "write `5`",
-    "require other.speed > 30 km/h": "write `30 / 3.6`",
-    "require other.speed > 30 mph": "write `30 * 0.447`",
-    "require (angle to other) < 30 degrees": "write `30 deg`",
-    "require (distance to other) between 5 and 10": "`5 < a < 10`",
-    "require distance between ego and other < 10": "`distance from a to b`",
-    "require other is ahead of ego": "`(distance past X) < 0`",
-    "require other is behind ego": "`(distance past X) < 0`",
-    "require (other is ahead of ego) until (other is behind ego)": "`(distance past X) < 0`",
-    "require other is turning left": "`X.angularSpeed > 0.2`",
-    "require other is on road": "`X.position in R`",
-    "require other ahead of ego": "`(distance past X) < 0`",
-    "require other left of ego": "sin((angle to X) - ego.heading) > 0`",
-    "require (other right of ego)": "sin((angle to X) - ego.heading) < 0`",
-    "require other on crossing": "`X.position in R`",
-    "require other facing ego": "`abs((angle from X to Y) - X.heading) < 20 deg`",
-    "require other faces ego": "`abs((angle from X to Y) - X.heading) < 20 deg`",
-    "require ego sees other": "`X can see Y`",
-    "require other.speed > 3 then other.speed < 1": "`require (A) until (B)`",
-    "require other occludes ego": "`beyond X by Range(2, 30)`",
-    "new Car left of ego by 1 to 4": "`Range(1, 4)`",
-    "new Car left of ego by 1..4": "`Range(1, 4)`",
-    "new Car with speed between 5 and 10": "`Range(a, b)`",
-    "new Car ahead of ego by < 10": "`by Range(a, b)`",
-    "new Car in front of ego by 5": "`ahead of X by Range(0, 20)`",
-    "new Car facing same direction as ego": "`facing Range(-10, 10) deg relative to X.heading`",
-    "new Car facing opposite direction": "`facing Range(170, 190) deg relative to X.heading`",
-    "new Car next to ego": "`at X offset by Range(1, 6) @ Range(-5, 5)`",
-}
+from .shape import error, module
+
+OPTIONAL = re.compile(r" ?\[(\w+ \{\w+\})\]")
 
 
-def told(line):
-    with pytest.raises(ScenarioError) as caught:
-        parse(Source("p.scenic", f"ego = new Car\nother = new Car\n{line}\n"), None)
-    (found,) = caught.value.diagnostics
-    assert found.code != "mixed-versions"
-    return " ".join(found.hints)
+def written(row: PhraseRow) -> list[tuple[str, tuple[str | None, ...]]]:
+    """The texts of a row, with and without what may be left out, and the names of the operands in each."""
+    found: list[tuple[str, tuple[str | None, ...]]] = []
+    for kept in product((True, False), repeat=len(OPTIONAL.findall(row.text))):
+        places = iter(kept)
+        text = OPTIONAL.sub(lambda part, places=places: f" {part[1]}" if next(places) else "", row.text)
+        left = [name for name in re.findall(r"\{(\w+)\}", row.text) if f"{{{name}}}" in text]
+        names = re.findall(r"\{(\w+)\}", row.text)
+        found.append((text.replace("{", "a_").replace("}", ""), tuple(f"a_{n}" if n in left else None for n in names)))
+    return found
 
 
-@pytest.mark.parametrize("line", HINTS)
-def test_what_to_write(line):
-    assert HINTS[line] in told(line)
+@pytest.mark.parametrize("row", SPECIFIERS, ids=lambda row: row.text)
+def test_each_specifier_is_read_as_it_is_written(row: PhraseRow) -> None:
+    for text, names in written(row):
+        for program in (f"x = new Car {text}", f"x = f(new Car with b 1, {text}, with a 1)"):
+            (phrase,) = [
+                each for each in walk(*module(program).body) if isinstance(each, ast.Phrase) and each.row is row
+            ]
+            assert phrase.span.text == text
+            assert tuple(each and each.span.text for each in phrase.operands) == names
 
 
-@pytest.mark.parametrize("line", HINTS)
-def test_what_it_says_to_write_can_be_read(line):
-    for text in re.findall("`([^`]+)`", told(line)):
-        specifier = re.match(r"(facing|at|ahead of|beyond|left of|by|with)\b", text)
-        program = f"new Car left of X {text}" if text.startswith("by") else f"new Car {text}" if specifier else text
-        if not specifier and not program.startswith("require"):
-            program = f"require {program}"
-        if text not in ("deg", "< -0.2"):
-            parse(Source("p.scenic", f"ego = new Car\n{program}\n"), 3)
+def test_each_row_has_exactly_one_meaning() -> None:
+    meanings = {row.text: row.words for row in SPECIFIERS}
+    assert each_meaning(SPECIFIERS, meanings) == {row: row.words for row in SPECIFIERS}
+    with pytest.raises(ValueError, match=r"differ: \['behind \{reference\} \[by \{distance\}\]'\]"):
+        each_meaning(SPECIFIERS, {text: meanings[text] for text in meanings if not text.startswith("behind")})
+    with pytest.raises(ValueError, match=r"differ: \['near'\]"):
+        each_meaning(SPECIFIERS, {**meanings, "near": ()})
 
 
-@pytest.mark.parametrize(
-    "line", ["require other.speed > 3 nonsense", "new Car left of ego by 3 nonsense", "x = 3 nonsense", "f(3 nonsense)"]
-)
-def test_other_words_have_no_hint(line):
-    assert told(line) == ""
+def test_no_word_is_passed_over_in_silence() -> None:
+    assert "`toward` does not continue the statement" in error("x = new Car facing directly toward")
+    assert "`away` does not continue the statement" in error("x = new Car facing directly away")

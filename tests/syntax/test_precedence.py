@@ -83,10 +83,10 @@ CASES = {
     "follow (a).f from b for 1": "Follow(a.f, b, 1)",
     "initial scenario": "InitialScenario()",
     # an instance reaches as far as an expression does
-    "new Car at a if b else c": "New(Car, [At(IfElse(b, a, c))], True)",
+    "new Car at a if b else c": "New(Car, [<at IfElse(b, a, c)>], True)",
     "-new Car": "(- New(Car, True))",
     "[new Car, visible road]": "List([New(Car, True), Visible(road, False)])",
-    "(new Car at x, facing y).z": "New(Car, [At(x), Facing(y)], True).z",
+    "(new Car at x, facing y).z": "New(Car, [<at x>, <facing y>], True).z",
 }
 
 

@@ -114,7 +114,7 @@ CLASSES = {
     "class Car: pass": "ClassDef(Car, [Pass()])",
     "class Car(Object):\n    width: self.model.width\n    position: Point on road\n": (
         "ClassDef(Car, [Object], [PropertyDefault(width, self.model.width), "
-        "PropertyDefault(position, New(Point, [On(road)], False))])"
+        "PropertyDefault(position, New(Point, [<on road>], False))])"
     ),
     "class C:\n  a[additive]: 1\n  b[dynamic, final]: 2\n  def f(self): return self.a[1]\n  x[0] = 3\n": (
         "ClassDef(C, [PropertyDefault(a, [additive], 1), PropertyDefault(b, [dynamic, final], 2), "

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import assert_never, cast
+from functools import partial
+from typing import cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.choices import holds_instances, make_choice
@@ -25,6 +26,7 @@ from scenicq.forest.compute import fold
 from scenicq.forest.nodes import Constant, Feature, Index, Node, PointIn, RegionDifference, Select
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
+from scenicq.syntax.phrases import SPECIFIERS, PhraseRow, each_meaning
 
 __all__ = ["SpecifierContext", "bind"]
 
@@ -109,7 +111,7 @@ def _own_position(instance: Instance, position: Node, span: Span) -> Node:
 
 
 def _in_region(
-    span: Span, region: ModelValue, around: SpecifierContext, *, contained: bool = False, modifies: bool = False
+    around: SpecifierContext, span: Span, region: ModelValue, *, contained: bool = False, modifies: bool = False
 ) -> BoundSpecifier:
     on_object = isinstance(region, Instance) and region.index is not None and around.version == 3
     area = operators.object_box(region, span) if on_object else operators.existing(region, span)
@@ -135,16 +137,10 @@ def _in_region(
     return replace(bound, perhaps=perhaps)
 
 
-_SIDES: dict[str, tuple[int, int]] = {"left": (-1, 0), "right": (1, 0), "ahead": (0, 1), "behind": (0, -1)}
-
-
-def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue) -> BoundSpecifier:
+def _beside(
+    right: int, ahead: int, around: SpecifierContext, span: Span, reference: ModelValue, by: ModelValue
+) -> BoundSpecifier:
     """`left of X by D` and its like: from the edge of X's box to the edge of the object's own."""
-    span = node.span
-    if node.direction not in _SIDES:
-        raise fail("unsupported-construct", f"`{node.direction}` is not supported: labels are matched in 2D", span,
-                   "a place above or below", ("use `at`, `ahead of`, `left of` or their like",))  # fmt: skip
-    right, ahead = _SIDES[node.direction]
     size = "width" if right else "length"
 
     def gap(away: ModelValue, instance: Instance) -> tuple[Node, Node]:
@@ -183,16 +179,13 @@ def _beside(node: ast.DirectionSpecifier, reference: ModelValue, by: ModelValue)
     return _specifier(span, "position", evaluate, by, optionally="heading" if oriented else "", needs=needs)
 
 
-def _visible(
-    node: ast.VisibleSpecifier | ast.NotVisibleSpecifier, viewer: ModelValue, around: SpecifierContext
-) -> BoundSpecifier:
+def _visible(hidden: bool, around: SpecifierContext, span: Span, viewer: ModelValue) -> BoundSpecifier:
     """`visible`, `not visible`: up to Scenic 2 about the position; in 3 also about the object, however placed."""
-    span, hidden = node.span, isinstance(node, ast.NotVisibleSpecifier)
     seen = operators.visible_region(viewer, span)
     if around.version < 3:
         whole = around.workspace()
-        return _in_region(span, fold(RegionDifference(whole, seen, span=span)) if hidden
-                          else operators.region_intersection(seen, whole, span), around)  # fmt: skip
+        return _in_region(around, span, fold(RegionDifference(whole, seen, span=span)) if hidden
+                          else operators.region_intersection(seen, whole, span))  # fmt: skip
 
     def place(instance: Instance) -> Mapping[str, ModelValue]:
         if not hidden:
@@ -210,9 +203,8 @@ def _visible(
 
 
 def _beyond(
-    node: ast.BeyondSpecifier, target: ModelValue, by: ModelValue, origin: ModelValue, around: SpecifierContext
+    around: SpecifierContext, span: Span, target: ModelValue, by: ModelValue, origin: ModelValue
 ) -> BoundSpecifier:
-    span = node.span
     goal = to_vector(target, span)
     sight = build.bearing(build.vector_difference(goal, to_vector(origin, span), span), span)
     is_vector = kind_of_model(by) == "vector" or isinstance(by, tuple | list)
@@ -235,8 +227,10 @@ def _either(one: ModelValue, other: ModelValue, span: Span) -> Node:
     return Select(Index((1.0, 1.0), span=span), (to_heading(one, span), to_heading(other, span)), span=span)
 
 
-def _following(span: Span, field: ModelValue, end: Instance) -> BoundSpecifier:
-    position = end.properties["position"]
+def _following(
+    around: SpecifierContext, span: Span, field: ModelValue, start: ModelValue, length: ModelValue
+) -> BoundSpecifier:
+    position = follow(around, field, start, length, span).properties["position"]
 
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         here = _own_position(instance, position, span)
@@ -245,9 +239,7 @@ def _following(span: Span, field: ModelValue, end: Instance) -> BoundSpecifier:
     return _specifier(span, "position", evaluate, optionally="heading")
 
 
-def _facing(node: ast.FacingSpecifier, value: ModelValue) -> BoundSpecifier:
-    span = node.span
-
+def _facing(around: SpecifierContext, span: Span, value: ModelValue) -> BoundSpecifier:
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         heading = _known(value, instance)
         if operators.is_field(heading):
@@ -258,7 +250,7 @@ def _facing(node: ast.FacingSpecifier, value: ModelValue) -> BoundSpecifier:
     return _specifier(span, "heading", evaluate, value, needs=needs)
 
 
-def _facing_point(span: Span, target: ModelValue, *, away: bool) -> BoundSpecifier:
+def _facing_point(away: bool, around: SpecifierContext, span: Span, target: ModelValue) -> BoundSpecifier:
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         own, goal = (
             to_vector(property_node(instance, "position", span), span),
@@ -270,12 +262,12 @@ def _facing_point(span: Span, target: ModelValue, *, away: bool) -> BoundSpecifi
     return _specifier(span, "heading", evaluate, target, needs="position")
 
 
-def _apparently(span: Span, heading: ModelValue, origin: ModelValue, version: int) -> BoundSpecifier:
+def _apparently(around: SpecifierContext, span: Span, heading: ModelValue, origin: ModelValue) -> BoundSpecifier:
     def evaluate(instance: Instance) -> Mapping[str, ModelValue]:
         own = to_vector(property_node(instance, "position", span), span)
         line = build.vector_difference(own, to_vector(origin, span), span)
         seen = build.add(to_heading(_known(heading, instance), span), build.bearing(line, span), span)
-        if version < 3:
+        if around.version < 3:
             return {"heading": seen}
         # the papers and Scenic 3's manual mean the line of sight alone, Scenic 3.1 adds to it: either is a match
         parent = to_heading(instance.properties["parentOrientation"], span)
@@ -283,7 +275,7 @@ def _apparently(span: Span, heading: ModelValue, origin: ModelValue, version: in
         plain = isinstance(parent, Constant) and parent.value == 0.0
         return {"heading": seen if plain else _either(seen, added, span)}
 
-    needs = "position" if version < 3 else "position parentOrientation"
+    needs = "position" if around.version < 3 else "position parentOrientation"
     return _specifier(span, "heading", evaluate, heading, needs=needs)
 
 
@@ -300,9 +292,11 @@ def bind(node: ast.Specifier, evaluate: Evaluate, around: SpecifierContext) -> B
     """
     if isinstance(node, ast.WithSpecifier):
         return _with(node, evaluate(node.value), around)
-    parts = [getattr(node, name) for name in node.__dataclass_fields__]
-    values = {id(part): evaluate(cast(ast.Expression, part)) for part in parts if isinstance(part, ast.SyntaxNode)}
-    bound = _bind_each(node, values, around)
+    values = [None if part is None else evaluate(part) for part in node.operands]
+    for number, (operand, part) in enumerate(zip(node.row.operands, node.operands, strict=True)):
+        if part is None and operand.is_ego:
+            values[number] = around.ego(node.span)
+    bound = _bind_each(_MEANINGS[node.row], values, node.span, around)
     return _as_parent(bound) if around.version == 3 and "heading" in bound.optionally else bound
 
 
@@ -316,28 +310,30 @@ def _as_parent(bound: BoundSpecifier) -> BoundSpecifier:
     return replace(bound, optionally=bound.optionally - {"heading"} | {"parentOrientation"}, evaluate=evaluate)
 
 
-def _bind_each(node: ast.Specifier, values: dict[int, ModelValue], around: SpecifierContext) -> BoundSpecifier:
+def _bind_each(
+    meaning: Callable[..., BoundSpecifier], values: list[ModelValue], span: Span, around: SpecifierContext
+) -> BoundSpecifier:
     """The specifier for each outcome of a random choice of objects among its arguments, as one."""
-    choice = next((value for value in values.values() if holds_instances(value)), None)
+    choice = next((value for value in values if holds_instances(value)), None)
     if choice is None:
-        return _bind(node, lambda part: values[id(part)], around)
+        return meaning(around, span, *values)
     choice = cast(Choice, choice)
     options = [
-        _bind_each(node, {key: option if value is choice else value for key, value in values.items()}, around)
+        _bind_each(meaning, [option if value is choice else value for value in values], span, around)
         for option in choice.options
     ]
     if any(option.condition for option in options):
-        raise fail("unsupported-construct", "this specifier with a random object is not supported", node.span,
+        raise fail("unsupported-construct", "this specifier with a random object is not supported", span,
                    "which object is random", ("write the condition with `require`",))  # fmt: skip
     optional = frozenset[str].intersection(*(option.optionally for option in options))
 
     def chosen(instance: Instance) -> Mapping[str, ModelValue]:
         given = [option.evaluate(instance) for option in options]
-        return {name: make_choice(choice.index, [each[name] for each in given], node.span)
+        return {name: make_choice(choice.index, [each[name] for each in given], span)
                 for name in options[0].gives | optional}  # fmt: skip
 
     needs = frozenset[str]().union(*(option.needs for option in options))
-    return BoundSpecifier(options[0].gives, optional, needs, chosen, node.span)
+    return BoundSpecifier(options[0].gives, optional, needs, chosen, span)
 
 
 def _with(node: ast.WithSpecifier, value: ModelValue, around: SpecifierContext) -> BoundSpecifier:
@@ -351,58 +347,61 @@ def _with(node: ast.WithSpecifier, value: ModelValue, around: SpecifierContext) 
     )
 
 
-def _bind(node: ast.Specifier, evaluate: Evaluate, around: SpecifierContext) -> BoundSpecifier:
-    span = node.span
+def _at(around: SpecifierContext, span: Span, position: ModelValue) -> BoundSpecifier:
+    return _position(span, position)
 
-    def origin(expression: ast.Expression | None) -> ModelValue:
-        return around.ego(span) if expression is None else evaluate(expression)
 
-    match node:
-        case ast.AtSpecifier():
-            return _position(span, evaluate(node.position))
-        case ast.OnSpecifier():
-            region = evaluate(node.region)
-            is_place = kind_of_model(region) == "vector" or isinstance(region, tuple | list)
-            if around.version == 3 and (is_place or (isinstance(region, Instance) and region.index is None)):
-                return _position(span, region)
-            return _in_region(span, region, around, modifies=around.version == 3)
-        case ast.InSpecifier():
-            return _in_region(span, evaluate(node.region), around)
-        case ast.ContainedInSpecifier():
-            return _in_region(span, evaluate(node.region), around, contained=True)
-        case ast.OffsetBySpecifier():
-            ego = around.ego(span)
-            position = lift(lambda by: operators.offset(ego, by, span), evaluate(node.offset))
-            return _position(span, position, _inherited(ego, around, span))
-        case ast.OffsetAlongSpecifier():
-            ego = around.ego(span)
-            position = lift(
-                lambda way, by: operators.along(ego, way, by, span), evaluate(node.direction), evaluate(node.offset)
-            )
-            return _position(span, position, _inherited(ego, around, span))
-        case ast.BeyondSpecifier():
-            return _beyond(node, evaluate(node.target), evaluate(node.offset), origin(node.origin), around)
-        case ast.VisibleSpecifier() | ast.NotVisibleSpecifier():
-            return _visible(node, origin(node.viewer), around)
-        case ast.DirectionSpecifier():
-            by = None if node.distance is None else evaluate(node.distance)
-            return _beside(node, evaluate(node.reference), by)
-        case ast.FollowingSpecifier():
-            way, start, length = evaluate(node.field), origin(node.origin), evaluate(node.distance)
-            end = follow(around, way, start, length, span)
-            return _following(span, way, end)
-        case ast.FacingSpecifier():
-            return _facing(node, evaluate(node.heading))
-        case ast.FacingTowardSpecifier():
-            return _facing_point(span, evaluate(node.target), away=False)
-        case ast.FacingAwayFromSpecifier():
-            return _facing_point(span, evaluate(node.target), away=True)
-        case ast.ApparentlyFacingSpecifier():
-            return _apparently(span, evaluate(node.heading), origin(node.origin), around.version)
-        case ast.WithSpecifier():
-            raise AssertionError("bound elsewhere")
-        case ast.UsingSpecifier():
-            raise fail("unsupported-construct", "`using` is not supported", span, "places by a function of its own",
-                       ("write the place with the built-in specifiers",))  # fmt: skip
-        case _:
-            assert_never(node)
+def _on(around: SpecifierContext, span: Span, region: ModelValue) -> BoundSpecifier:
+    is_place = kind_of_model(region) == "vector" or isinstance(region, tuple | list)
+    if around.version == 3 and (is_place or (isinstance(region, Instance) and region.index is None)):
+        return _position(span, region)
+    return _in_region(around, span, region, modifies=around.version == 3)
+
+
+def _offset_by(around: SpecifierContext, span: Span, by: ModelValue) -> BoundSpecifier:
+    ego = around.ego(span)
+    position = lift(lambda by: operators.offset(ego, by, span), by)
+    return _position(span, position, _inherited(ego, around, span))
+
+
+def _offset_along(around: SpecifierContext, span: Span, direction: ModelValue, by: ModelValue) -> BoundSpecifier:
+    ego = around.ego(span)
+    position = lift(lambda way, by: operators.along(ego, way, by, span), direction, by)
+    return _position(span, position, _inherited(ego, around, span))
+
+
+def _in_space(word: str, around: SpecifierContext, span: Span, *operands: ModelValue) -> BoundSpecifier:
+    raise fail("unsupported-construct", f"`{word}` is not supported: labels are matched in 2D", span,
+               "a place above or below", ("use `at`, `ahead of`, `left of` or their like",))  # fmt: skip
+
+
+def _using(around: SpecifierContext, span: Span, value: ModelValue) -> BoundSpecifier:
+    raise fail("unsupported-construct", "`using` is not supported", span, "places by a function of its own",
+               ("write the place with the built-in specifiers",))  # fmt: skip
+
+
+_MEANINGS: dict[PhraseRow, Callable[..., BoundSpecifier]] = each_meaning(SPECIFIERS, {
+    "at {position}": _at,
+    "in {region}": _in_region,
+    "on {region}": _on,
+    "contained in {region}": partial(_in_region, contained=True),
+    "offset by {offset}": _offset_by,
+    "offset along {direction} by {offset}": _offset_along,
+    "beyond {target} by {offset} [from {origin}]": _beyond,
+    "visible [from {viewer}]": partial(_visible, False),
+    "not visible [from {viewer}]": partial(_visible, True),
+    "left of {reference} [by {distance}]": partial(_beside, -1, 0),
+    "right of {reference} [by {distance}]": partial(_beside, 1, 0),
+    "ahead of {reference} [by {distance}]": partial(_beside, 0, 1),
+    "behind {reference} [by {distance}]": partial(_beside, 0, -1),
+    "above {reference} [by {distance}]": partial(_in_space, "above"),
+    "below {reference} [by {distance}]": partial(_in_space, "below"),
+    "following {field} [from {origin}] for {distance}": _following,
+    "facing {heading}": _facing,
+    "facing toward {target}": partial(_facing_point, False),
+    "facing away from {target}": partial(_facing_point, True),
+    "facing directly toward {target}": partial(_facing_point, False),
+    "facing directly away from {target}": partial(_facing_point, True),
+    "apparently facing {heading} [from {origin}]": _apparently,
+    "using {value}": _using,
+})  # fmt: skip
