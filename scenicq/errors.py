@@ -237,11 +237,11 @@ class ScenicqError(Exception):
         """Take one or several diagnostics."""
         single = isinstance(diagnostics, Diagnostic)
         self.diagnostics: tuple[Diagnostic, ...] = (diagnostics,) if single else tuple(diagnostics)
-        super().__init__("\n".join(render(diagnostic) for diagnostic in self.diagnostics))
+        super().__init__(self.diagnostics)
 
-    def __reduce__(self) -> tuple[type[ScenicqError], tuple[tuple[Diagnostic, ...]]]:
-        """Rebuild from the diagnostics: errors cross process boundaries."""
-        return type(self), (self.diagnostics,)
+    def __str__(self) -> str:
+        """What is wrong, in words; made when it is asked for, as errors that are caught on the way are many."""
+        return "\n".join(render(diagnostic) for diagnostic in self.diagnostics)
 
 
 class ScenarioError(ScenicqError):

@@ -11,7 +11,7 @@ from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.values import Function, ModelValue, PropertyDefinition, ScenicClass, describe, fail
 from scenicq.errors import Span
 from scenicq.store.classes import is_class
-from scenicq.syntax import ast
+from scenicq.syntax import ast, phrases
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -106,7 +106,7 @@ def _needs(value: ast.Expression) -> frozenset[str]:
         node = stack.pop()
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "self":
             found.add(node.name)
-        if isinstance(node, ast.RelativeTo):
+        if ast.is_phrase(node, phrases.RELATION):
             found.add("position")
         if isinstance(node, tuple):
             stack.extend(cast("tuple[Any, ...]", node))

@@ -10,7 +10,7 @@ No Python is ever executed: every construct is interpreted here, and what is not
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, assert_never, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, plain_unary
@@ -18,13 +18,13 @@ from scenicq.compiler.assignment import assign_around, go_through
 from scenicq.compiler.attributes import attribute
 from scenicq.compiler.choices import each_existing, map_choice, nothing_to_choose
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
-from scenicq.compiler.constructs import construct
 from scenicq.compiler.courses import option_of
 from scenicq.compiler.distributions import interval
 from scenicq.compiler.environment import FIRST_NAMES, Environment
 from scenicq.compiler.items import items_of, length_of, subscript
 from scenicq.compiler.known_properties import as_constant, known_truth
 from scenicq.compiler.logic import condition, connect, invert
+from scenicq.compiler.operations import phrase
 from scenicq.compiler.texts import checked_text, format_string
 from scenicq.compiler.unread import read
 from scenicq.compiler.values import (
@@ -277,8 +277,12 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
             return value
         case ast.SubscriptSlice() | ast.Starred() | ast.UnsupportedExpression():
             raise fail("unsupported-construct", f"`{span.text.split()[0]}` is not supported here", span)
+        case ast.New():
+            return run.make_instance(node, scope)
+        case ast.Phrase():
+            return phrase(run, node, lambda part: evaluate(run, part, scope))
         case _:
-            return construct(run, node, scope, lambda part: evaluate(run, part, scope))
+            assert_never(node)
 
 
 def _attribute(run: Interpreter, value: ModelValue, node: ast.Attribute, scope: Environment) -> ModelValue:

@@ -7,7 +7,6 @@ go up from the package of the file that has them, and a module that is still bei
 from __future__ import annotations
 
 from scenicq.compiler.builtins import language_names
-from scenicq.compiler.constructs import operator_functions
 from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
 from scenicq.compiler.imported_files import ImportedFiles, Loader, absolute, packages
 from scenicq.compiler.interpreter import Interpreter
@@ -20,6 +19,7 @@ from scenicq.compiler.models import (
     plain_module,
     unsupported_module,
 )
+from scenicq.compiler.operations import operator_functions
 from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
 from scenicq.compiler.unread import NoValue

@@ -14,7 +14,7 @@ from scenicq.compiler.temporal import is_temporal
 from scenicq.compiler.values import Delayed, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Node
-from scenicq.syntax import ast
+from scenicq.syntax import ast, phrases
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -45,11 +45,11 @@ def requirement(run: Interpreter, node: ast.Require, scope: Environment) -> Requ
     if run.timed is not None and is_temporal(wanted):
         run.timed.require(lambda expression: defer(run, expression, scope, node.span), wanted, node.span)
         return None
-    if isinstance(wanted, ast.Temporal | ast.UntilOperator):
-        run.dynamic(f"require {wanted.operator if isinstance(wanted, ast.Temporal) else 'until'}", wanted.span)
-        if not (isinstance(wanted, ast.Temporal) and wanted.operator == "always"):
+    if ast.is_phrase(wanted, *phrases.TEMPORAL):
+        run.dynamic(f"require {wanted.row.words[0]}", wanted.span)
+        if wanted.row is not phrases.ALWAYS:
             return None
-        wanted = wanted.operand
+        (wanted,) = wanted.given
     return RequireStatement(defer(run, wanted, scope, node.span), node.span, probability)
 
 

@@ -30,7 +30,7 @@ from scenicq.forest.temporal import (
     Until,
 )
 from scenicq.forest.walk import postorder
-from scenicq.syntax import ast
+from scenicq.syntax import ast, phrases
 from scenicq.syntax.walk import walk
 
 if TYPE_CHECKING:
@@ -41,13 +41,29 @@ __all__ = ["Behaviors", "Deferred", "TimedStatements", "is_temporal"]
 Behaviors = Literal["refuse", "ignore"]
 """What becomes of behaviors: they are refused, or left out."""
 
+
+def _implication(left: Formula, right: Formula) -> Formula:
+    return Or((Not(left), right))
+
+
+_OPERATORS: dict[phrases.PhraseRow, Callable[..., Formula]] = phrases.each_meaning(
+    (*phrases.TEMPORAL, phrases.IMPLICATION),
+    {
+        "always {condition}": Always,
+        "eventually {condition}": Eventually,
+        "next {condition}": Next,
+        "{left} until {right}": Until,
+        "{left} implies {right}": _implication,
+    },
+)
+
 Deferred = Callable[[ast.Expression], Callable[[], Node]]
 """Gives what computes a condition once the whole program has run, over the names that it has now."""
 
 
 def is_temporal(node: ast.Expression) -> bool:
     """Whether an expression has an operator of time."""
-    return any(isinstance(each, ast.Temporal | ast.UntilOperator) for each in walk(node))
+    return any(ast.is_phrase(each, *phrases.TEMPORAL) for each in walk(node))
 
 
 @dataclass(eq=False)
@@ -134,13 +150,8 @@ class TimedStatements:
         if not is_temporal(node):
             return self.atom(deferred(node))
         match node:
-            case ast.Temporal():
-                operator = {"always": Always, "eventually": Eventually, "next": Next}[node.operator]
-                return operator(self._formula(deferred, node.operand))
-            case ast.UntilOperator():
-                return Until(self._formula(deferred, node.left), self._formula(deferred, node.right))
-            case ast.Implies():
-                return Or((Not(self._formula(deferred, node.left)), self._formula(deferred, node.right)))
+            case ast.Phrase() if node.row in _OPERATORS:
+                return _OPERATORS[node.row](*(self._formula(deferred, part) for part in node.given))
             case ast.UnaryOp(operator="not"):
                 return Not(self._formula(deferred, node.operand))
             case ast.BoolOp():

@@ -7,7 +7,7 @@ class that is named from one that is made an instance; their use does.
 from __future__ import annotations
 
 from scenicq.compiler.environment import FIRST_LIBRARIES
-from scenicq.syntax import ast
+from scenicq.syntax import ast, phrases
 from scenicq.syntax.walk import walk
 
 __all__ = ["decide_version"]
@@ -81,7 +81,7 @@ def _has_interval(module: ast.Program) -> bool:
         return _is_pair(node) or (isinstance(node, ast.Name) and node.id in named)
 
     return any(interval(part) for node in walk(*module.body) for part in _number_places(node)) or any(
-        isinstance(node, ast.Tuple) and _is_pair(node) and any(isinstance(item, ast.Deg) for item in node.items)
+        isinstance(node, ast.Tuple) and _is_pair(node) and any(ast.is_phrase(item, phrases.DEG) for item in node.items)
         for node in walk(*module.body)
     )
 
@@ -116,10 +116,6 @@ def _given_pairs(module: ast.Program) -> set[str]:
 def _number_places(node: ast.SyntaxNode) -> tuple[ast.SyntaxNode | None, ...]:
     """The operands of a node that must be numbers."""
     match node:
-        case ast.VectorOperator():
-            return (node.x, node.y)
-        case ast.Deg():
-            return (node.value,)
         case ast.BinaryOp(operator="*" | "/"):
             return (node.left, node.right)
         case ast.UnaryOp(operator="-"):
@@ -130,8 +126,6 @@ def _number_places(node: ast.SyntaxNode) -> tuple[ast.SyntaxNode | None, ...]:
             return (node.value,)
         case ast.Phrase():
             return tuple(node.of_kind("number", "heading"))
-        case ast.Follow():
-            return (node.distance,)
         case ast.PropertyDefault() if node.name in _SCALAR_PROPERTIES:
             return (node.value,)
         case _:

@@ -18,7 +18,6 @@ __all__ = ["lint_text"]
 _FULL_TURN = math.tau * (1 + 1e-9)
 _ANGLE_PROPERTIES = frozenset({"heading", "yaw", "roadDeviation", "viewAngle", "parentOrientation"})
 _MEASURED = frozenset({"speed", "width", "length", "height", "x", "y", "acceleration", "angularSpeed"})
-_ANGLES = (ast.RelativeHeading, ast.ApparentHeading, ast.Angle)
 _ORDERS = frozenset({"<", "<=", ">", ">=", "==", "!="})
 _RANGES = frozenset({"Range", "DiscreteRange", "TruncatedNormal"})
 _POINTS = frozenset({"Point", "OrientedPoint"})
@@ -66,8 +65,8 @@ def _number(node: ast.SyntaxNode) -> float | None:
         case ast.UnaryOp(operator="-" | "+" as sign):
             inner = _number(node.operand)
             return None if inner is None else -inner if sign == "-" else inner
-        case ast.Deg():
-            inner = _number(node.value)
+        case ast.Phrase(row=phrases.DEG):
+            inner = _number(node.given[0])
             return None if inner is None else math.radians(inner)
         case _:
             return None
@@ -82,7 +81,7 @@ def _terms(node: ast.SyntaxNode) -> Iterator[ast.SyntaxNode]:
             yield each
             continue
         match each:
-            case ast.UnaryOp() | ast.RelativeTo() | ast.IfElse() | ast.Tuple():
+            case ast.UnaryOp() | ast.Phrase(row=phrases.RELATION) | ast.IfElse() | ast.Tuple():
                 stack.extend(reversed(tuple(children(each))))
             case ast.BinaryOp(operator="+" | "-"):
                 stack += [each.right, each.left]
@@ -103,7 +102,7 @@ def _is_angle(node: ast.SyntaxNode) -> bool:
         case ast.Call(function=ast.Name(id="abs" | "min" | "max")):
             return any(_is_angle(argument.value) for argument in node.arguments)
         case _:
-            return isinstance(node, _ANGLES)
+            return isinstance(node, ast.Phrase) and node.row.measures == "angle"
 
 
 def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
@@ -125,7 +124,7 @@ def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     for place in places:
         for term in _terms(place):
             value = _number(term)
-            if value is not None and abs(value) > _FULL_TURN and not isinstance(term, ast.Deg):
+            if value is not None and abs(value) > _FULL_TURN and not ast.is_phrase(term, phrases.DEG):
                 text = term.span.text
                 yield _warning(
                     "angle-without-deg", f"`{text}` is an angle of {abs(value) / math.tau:.1f} full turns", term.span,
@@ -164,7 +163,7 @@ def _is_measured(node: ast.SyntaxNode) -> bool:
         case ast.Call(function=ast.Name(id="abs")) if node.arguments:
             return _is_measured(node.arguments[0].value)
         case _:
-            return isinstance(node, (*_ANGLES, ast.DistanceOperator))
+            return isinstance(node, ast.Phrase) and bool(node.row.measures)
 
 
 def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:

@@ -42,32 +42,6 @@ from scenicq.syntax.nodes.expressions import (
     UnsupportedExpression,
     Walrus,
 )
-from scenicq.syntax.nodes.operators import (
-    Altitude,
-    Angle,
-    ApparentHeading,
-    CanSee,
-    Deg,
-    DistanceOperator,
-    DistancePast,
-    FieldAt,
-    Follow,
-    Implies,
-    InitialScenario,
-    IntersectsOperator,
-    New,
-    OffsetAlong,
-    OffsetBy,
-    PartOf,
-    RelativeHeading,
-    RelativePosition,
-    RelativeTo,
-    Temporal,
-    UntilOperator,
-    VectorOperator,
-    Visible,
-    VisibleFrom,
-)
 from scenicq.syntax.nodes.program import (
     DynamicDefinition,
     DynamicStatement,
@@ -81,7 +55,7 @@ from scenicq.syntax.nodes.program import (
     RequireMonitor,
     Simulator,
 )
-from scenicq.syntax.nodes.specifiers import Phrase, WithSpecifier
+from scenicq.syntax.nodes.specifiers import New, Phrase, WithSpecifier, is_phrase
 from scenicq.syntax.nodes.statements import (
     AnnotatedAssign,
     Assert,
@@ -114,10 +88,7 @@ from scenicq.syntax.nodes.statements import (
 )
 
 __all__ = [
-    "Altitude",
-    "Angle",
     "AnnotatedAssign",
-    "ApparentHeading",
     "Argument",
     "Assert",
     "Assign",
@@ -128,40 +99,31 @@ __all__ = [
     "Branch",
     "Break",
     "Call",
-    "CanSee",
     "ClassDef",
     "Clause",
     "ComparisonChain",
     "ComparisonLink",
     "Comprehension",
     "Continue",
-    "Deg",
     "Delete",
     "Dict",
     "DictComprehension",
     "DictItem",
-    "DistanceOperator",
-    "DistancePast",
     "DynamicDefinition",
     "DynamicStatement",
     "Evidence",
     "ExceptHandler",
     "Expression",
     "ExpressionStatement",
-    "FieldAt",
-    "Follow",
     "For",
     "FormattedString",
     "FunctionDef",
     "Global",
     "If",
     "IfElse",
-    "Implies",
     "Import",
     "ImportAlias",
     "ImportFrom",
-    "InitialScenario",
-    "IntersectsOperator",
     "Lambda",
     "List",
     "LiteralValue",
@@ -170,20 +132,14 @@ __all__ = [
     "Name",
     "New",
     "Nonlocal",
-    "OffsetAlong",
-    "OffsetBy",
     "Param",
     "ParamItem",
     "Parameter",
-    "PartOf",
     "Pass",
     "Phrase",
     "Program",
     "PropertyDefault",
     "Raise",
-    "RelativeHeading",
-    "RelativePosition",
-    "RelativeTo",
     "Replacement",
     "Require",
     "RequireMonitor",
@@ -196,21 +152,17 @@ __all__ = [
     "Subscript",
     "SubscriptSlice",
     "SyntaxNode",
-    "Temporal",
     "Try",
     "Tuple",
     "UnaryOp",
     "UnsupportedExpression",
     "UnsupportedStatement",
-    "UntilOperator",
-    "VectorOperator",
-    "Visible",
-    "VisibleFrom",
     "Walrus",
     "While",
     "WithItem",
     "WithSpecifier",
     "WithStatement",
+    "is_phrase",
 ]  # fmt: skip
 
 Specifier: TypeAlias = WithSpecifier | Phrase
@@ -240,29 +192,7 @@ Expression: TypeAlias = (
     | Walrus
     | UnsupportedExpression
     | New
-    | Deg
-    | VectorOperator
-    | FieldAt
-    | RelativeTo
-    | OffsetBy
-    | OffsetAlong
-    | RelativePosition
-    | RelativeHeading
-    | ApparentHeading
-    | DistanceOperator
-    | DistancePast
-    | Angle
-    | Altitude
-    | CanSee
-    | IntersectsOperator
-    | Follow
-    | Visible
-    | VisibleFrom
-    | PartOf
-    | Temporal
-    | UntilOperator
-    | Implies
-    | InitialScenario
+    | Phrase
 )
 """What has a value."""
 

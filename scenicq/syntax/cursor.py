@@ -55,9 +55,7 @@ class Cursor:
 
     def reads(self, index: int, words: tuple[str, ...]) -> bool:
         """Whether the tokens from an index on read like these words."""
-        return all(
-            self.tokens[min(index + ahead, len(self.tokens) - 1)].text == word for ahead, word in enumerate(words)
-        )
+        return all(self.tokens[index + ahead].text == word for ahead, word in enumerate(words))
 
     def accept(self, text: str) -> bool:
         """Go past the next token if it reads so."""

@@ -8,7 +8,8 @@ from typing import Self
 from scenicq.errors import Source
 from scenicq.syntax import ast
 from scenicq.syntax.cursor import Cursor
-from scenicq.syntax.tokens import INFIX_WORDS, Token
+from scenicq.syntax.phrases import INFIX_WORDS
+from scenicq.syntax.tokens import Token
 
 __all__ = ["Grammar"]
 

@@ -4,34 +4,31 @@ from __future__ import annotations
 
 from typing import Literal, cast
 
+from scenicq.errors import Source
 from scenicq.syntax import ast
-from scenicq.syntax.precedence import (
-    ALONG,
-    AND,
-    AT,
-    COMPARISON,
-    DEPENDENT,
-    IMPLIES,
-    LEVELS,
-    NOT,
-    OR,
-    PREFIX,
-    RELATIVE,
-    SIGN,
-    UNION,
-    UNTIL,
-)
-from scenicq.syntax.prefixes import PrefixParser
-from scenicq.syntax.tokens import CLOSERS
+from scenicq.syntax.phrases import INFIX_NAMES, INFIXES_AT, PREFIXES_AT, PhraseRow
+from scenicq.syntax.precedence import AND, COMPARISON, IMPLIES, NOT, OR, POWER, PREFIX, PYTHON, SIGN, UNION, UNTIL
+from scenicq.syntax.specifiers import InstanceParser
+from scenicq.syntax.tokens import CLOSERS, Token
 
 __all__ = ["OperatorParser"]
 
-_TEMPORAL = ("always", "eventually", "next")
 _SIGNS = ("-", "+", "~")
+_AFTER_VISIBLE = INFIX_NAMES | {"(", "[", "{", *_SIGNS}
+"""With these an operand starts after `visible`, which is then no name."""
 
 
-class OperatorParser(PrefixParser):
-    """Reads expressions with operators."""
+class OperatorParser(InstanceParser):
+    """Reads expressions with operators.
+
+    Attributes:
+        prefixes: What was read at a place, and the place after it: no operator that starts with words is read twice.
+    """
+
+    def __init__(self, source: Source, tokens: list[Token]) -> None:
+        """Start at the first token."""
+        super().__init__(source, tokens)
+        self.prefixes: dict[int, tuple[ast.Phrase, int]] = {}
 
     def expression(self) -> ast.Expression:
         """Read one expression: no tuple without brackets, no `:=`, no star."""
@@ -73,32 +70,40 @@ class OperatorParser(PrefixParser):
         self.depth -= 1
         return node
 
+    def infix_here(self) -> PhraseRow | None:
+        """Scenic's operator that stands here after a left operand."""
+        for row in INFIXES_AT.get(self.text, ()):
+            if self.reads(self.index, row.words):
+                return row
+        return None
+
+    def python_level_here(self) -> int:
+        """How tight Python's operator is that stands here; 0 for none."""
+        level = PYTHON.get(self.text, 0)
+        return 0 if self.text == "not" and self.peek().text != "in" else level
+
     def level_here(self) -> int:
         """How tight the operator is that stands here; 0 for none."""
-        text = self.text
-        level = LEVELS.get(text, 0)
-        if level and text in DEPENDENT:
-            following = self.peek().text
-            if following not in DEPENDENT[text]:
-                return 0
-            if text == "not" and following == "visible":
-                return UNION if self.peek(2).text == "from" else 0
-            if text == "offset" and following == "along":
-                return ALONG
-        return level
+        row = self.infix_here()
+        return self.python_level_here() if row is None else row.level
 
     def climb(self, start: int, left: ast.Expression, level: int) -> ast.Expression:
         """Read the operators after a left operand, as long as they are tight enough."""
         while True:
-            here = self.level_here()
+            row = self.infix_here()
+            here = self.python_level_here() if row is None else row.level
             if not here or here < level:
                 return left
-            if here == COMPARISON:
+            if row is not None:
+                left = self.phrase(start, row, left)
+                if here == IMPLIES and self.text == "implies":
+                    raise self.fail("`implies` twice in a row needs parentheses")
+            elif here == COMPARISON:
                 left = self.comparison(start, left)
             elif here in (OR, AND):
                 left = self.boolean(start, left, here)
             else:
-                left = self.infix(start, left, here)
+                left = self.arithmetic(start, left, here)
 
     def boolean(self, start: int, first: ast.Expression, level: int) -> ast.Expression:
         """Read the rest of a chain of `and` or of `or`."""
@@ -123,92 +128,34 @@ class OperatorParser(PrefixParser):
             comparisons.append(ast.ComparisonLink(self.span(place), words, right))
         return ast.ComparisonChain(self.span(start), left, tuple(comparisons))
 
-    def infix(self, start: int, left: ast.Expression, level: int) -> ast.Expression:
-        """Read one operator and its right operand."""
-        word = self.advance().text
-        match word:
-            case "deg":
-                return ast.Deg(self.span(start), left)
-            case "@":
-                right = self.binary(SIGN)
-                return ast.VectorOperator(self.span(start), left, right)
-            case "at":
-                right = self.binary(PREFIX)
-                return ast.FieldAt(self.span(start), left, right)
-            case "relative":
-                self.advance()
-                right = self.binary(AT)
-                return ast.RelativeTo(self.span(start), left, right)
-            case "offset":
-                return self.offset_operator(start, left)
-            case "can":
-                self.advance()
-                right = self.binary(ALONG)
-                return ast.CanSee(self.span(start), left, right)
-            case "intersects":
-                right = self.binary(ALONG)
-                return ast.IntersectsOperator(self.span(start), left, right)
-            case "visible" | "not":
-                if word == "not":
-                    self.advance()
-                self.advance()
-                right = self.binary(ALONG)
-                return ast.VisibleFrom(self.span(start), left, right, word == "not")
-            case "until":
-                right = self.binary(IMPLIES)
-                return ast.UntilOperator(self.span(start), left, right)
-            case "implies":
-                right = self.binary(OR)
-                if self.text == "implies":
-                    raise self.fail("`implies` twice in a row needs parentheses")
-                return ast.Implies(self.span(start), left, right)
-            case "**":
-                right = self.binary(SIGN)
-            case _:
-                right = self.binary(level + 1)
-        symbol = cast('Literal["+", "-", "*", "/", "//", "%", "**", "<<", ">>", "&", "|", "^"]', word)
+    def arithmetic(self, start: int, left: ast.Expression, level: int) -> ast.Expression:
+        """Read one of Python's operators and its right operand."""
+        operator = self.advance().text
+        right = self.binary(SIGN if level == POWER else level + 1)
+        symbol = cast('Literal["+", "-", "*", "/", "//", "%", "**", "<<", ">>", "&", "|", "^"]', operator)
         return ast.BinaryOp(self.span(start), symbol, left, right)
-
-    def offset_operator(self, start: int, left: ast.Expression) -> ast.Expression:
-        """Read what follows `offset`."""
-        if self.accept("by"):
-            offset = self.binary(AT)
-            return ast.OffsetBy(self.span(start), left, offset)
-        self.advance()
-        direction = self.binary(ALONG)
-        self.expect("by", "after the direction", "write `offset along direction by vector`")
-        offset = self.binary(RELATIVE)
-        return ast.OffsetAlong(self.span(start), left, direction, offset)
 
     def operand(self, level: int) -> ast.Expression:
         """Read what stands before, between or after operators; a class with specifiers is an instance."""
         token = self.token
         text = token.text
-        if token.kind == "name":
-            if self.is_prefix():
-                return self.prefix_at(level)
-            if text in _TEMPORAL and self.is_temporal(level):
-                return self.temporal_operator()
-            if text == "new" and self.peek().kind == "name" and self.names_class(self.index + 1):
-                return self.new()
-            if text == "initial" and self.peek().text == "scenario":
-                self.advance()
-                self.advance()
-                return ast.InitialScenario(self.span(token.start))
-        elif text == "not":
-            if self.peek().text == "visible" and self.starts_operand(self.index + 2):
-                return self.prefix_at(level)
+        row = self.prefix_here(level)
+        if row is not None:
+            return self.prefix(row, level)
+        if text == "new" and self.peek().kind == "name" and self.names_class(self.index + 1):
+            return self.new()
+        if text == "not":
             if level > NOT:
                 raise self.fail("`not` needs parentheses here", hint="put `not` and its operand in parentheses")
             self.advance()
             value = self.binary(NOT)
             return ast.UnaryOp(self.span(token.start), "not", value)
-        elif text in _SIGNS:
+        if text in _SIGNS:
             self.advance()
             value = self.binary(SIGN)
             symbol: Literal["-", "+", "~"] = "-" if text == "-" else "+" if text == "+" else "~"
             return ast.UnaryOp(self.span(token.start), symbol, value)
-        elif text in ("await", "yield"):
+        if text in ("await", "yield"):
             return self.unsupported()
         node = self.postfix(token.start, self.atom())
         is_name = token.kind == "name" and isinstance(node, ast.Name | ast.Attribute)
@@ -216,30 +163,54 @@ class OperatorParser(PrefixParser):
             return self.instance(token.start, node, keyword=False)
         return node
 
-    def prefix_at(self, level: int) -> ast.Expression:
-        """Read an operator that starts with words, where the operators around it are not too tight for it."""
-        if level > PREFIX:
+    def prefix_here(self, level: int = UNTIL) -> PhraseRow | None:
+        """The operator that starts here with words, such as `distance to`.
+
+        Args:
+            level: How tight the operators around it are.
+        """
+        for row in PREFIXES_AT.get(self.text, ()):
+            if self.reads(self.index, row.words) and self.is_operator(level):
+                return row
+        return None
+
+    def is_operator(self, level: int) -> bool:
+        """Whether a word that starts an operator is one here, and no name of the program's."""
+        following = self.peek()
+        is_name = following.text == "relative" and self.peek(2).text == "to"
+        match self.text:
+            case "not":
+                return self.starts_operand(self.index + 2)
+            case "follow":
+                if following.text == "(":
+                    after = min(self.closing(self.index + 1) + 1, len(self.tokens) - 1)
+                    return self.tokens[after].text in ("from", "for", ".", "[", "(")
+                return not is_name and following.kind == "name" and self.starts_operand(self.index + 1)
+            case "visible":
+                if following.text == "not":
+                    return self.peek(2).text == "visible" and self.peek(3).text != "from"
+                if following.text in _AFTER_VISIBLE:
+                    return True
+                return not is_name and following.kind == "name" and self.starts_operand(self.index + 1)
+            case "always" | "eventually" | "next":
+                # before a bracket or a sign only where a requirement may have one: `always -x < 3`, not `y > always(x)`
+                if following.text in CLOSERS or following.text in _SIGNS:
+                    return self.temporal and level <= NOT
+                return not is_name and self.starts_operand(self.index + 1) and following.text != "*"
+            case _:
+                return True
+
+    def prefix(self, row: PhraseRow, level: int) -> ast.Expression:
+        """Read an operator that starts with words; each place is read only once."""
+        if level > PREFIX == row.level:
             hint = "put the operator and its operands in parentheses"
             raise self.fail(f"the operator that starts with `{self.text}` needs parentheses here", hint=hint)
-        return self.prefix()
-
-    def is_temporal(self, level: int) -> bool:
-        """Whether `always`, `eventually` or `next` is an operator here, and not a function or a variable.
-
-        Before a bracket or a sign it is one where a requirement may have one: `always -x < 3`, but not `y > always(x)`.
-        """
-        following = self.peek()
-        if following.text in CLOSERS or following.text in _SIGNS:
-            return self.temporal and level <= NOT
-        if following.text == "relative" and self.peek(2).text == "to":
-            return False
-        return self.starts_operand(self.index + 1) and following.text != "*"
-
-    def temporal_operator(self) -> ast.Expression:
-        """Read `always x`, `eventually x` or `next x`."""
-        token = self.advance()
-        operand = self.binary(IMPLIES)
-        word: Literal["always", "eventually", "next"] = (
-            "always" if token.text == "always" else "next" if token.text == "next" else "eventually"
-        )
-        return ast.Temporal(self.span(token.start), word, operand)
+        index = self.index
+        known = self.prefixes.get(index)
+        if known is None:
+            self.enter()
+            node = self.phrase(self.token.start, row)
+            self.depth -= 1
+            self.prefixes[index] = known = node, self.index
+        self.move(known[1])
+        return known[0]

@@ -9,9 +9,9 @@ from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 from scenicq.syntax.jumps import check_jumps
 from scenicq.syntax.lexer import tokenize
-from scenicq.syntax.phrases import VERSIONS
+from scenicq.syntax.phrases import INFIX_WORDS, VERSIONS
 from scenicq.syntax.scenic_statements import ProgramParser
-from scenicq.syntax.tokens import INFIX_WORDS, Token
+from scenicq.syntax.tokens import Token
 from scenicq.syntax.versions import choose_version, find_evidence
 from scenicq.syntax.walk import check_height
 

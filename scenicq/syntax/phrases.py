@@ -13,13 +13,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from scenicq.syntax.precedence import POWER
+from scenicq.syntax.precedence import ALONG, AT, IMPLIES, POWER, PREFIX, PRODUCT, RELATIVE, UNION, UNTIL
 
-__all__ = ["FACING", "SPECIFIERS", "SPECIFIERS_AT", "VERSIONS", "Operand", "PhraseRow", "each_meaning"]
+__all__ = [
+    "ALWAYS", "BOX_PARTS", "DEG", "FACING", "IMPLICATION", "INFIXES_AT", "INFIX_NAMES", "INFIX_WORDS", "OPERATORS",
+    "PREFIXES_AT", "RELATION", "SPECIFIERS", "SPECIFIERS_AT", "TEMPORAL", "VECTOR", "VERSIONS", "Operand", "PhraseRow",
+    "each_meaning",
+]  # fmt: skip
 
 Meaning = TypeVar("Meaning")
 
 VERSIONS = frozenset((1, 2, 3))
+_RECENT = frozenset((2, 3))
 _NEW = frozenset((3,))
 
 
@@ -48,41 +53,70 @@ class PhraseRow:
 
     Attributes:
         text: How it is written, without kinds: its name.
-        words: The words that it starts with.
+        level: How tight it binds, for an operator.
+        words: The words that it starts with, or that stand after its left operand.
         rest: What follows them: operands and words.
+        operands: All operands, in the order of the text.
         versions: The versions of Scenic that have it.
         construct: What those are told who mix versions.
         after: What stands before a word that is missing.
         example: What to write then.
+        measures: `angle` or `length`, where it is one that labels tell.
     """
 
     text: str
+    level: int
     words: tuple[str, ...]
     rest: tuple[Operand | str, ...]
+    operands: tuple[Operand, ...]
     versions: frozenset[int]
     construct: str
     after: str
     example: str
-
-    @property
-    def operands(self) -> tuple[Operand, ...]:
-        """The operands, in the order of the text."""
-        return tuple(part for part in self.rest if isinstance(part, Operand))
+    measures: str
 
 
-_PART = re.compile(r"(\[(?P<word>\w+) )?\{(?P<name>\w+)(:(?P<kind>\w+))?(?P<ego>=ego)?\}\]?|(?P<plain>\w+)")
+_PART = re.compile(r"(\[(?P<word>\w+) )?\{(?P<name>\w+)(:(?P<kind>\w+))?(?P<ego>=ego)?\}\]?|(?P<plain>[\w@]+)")
 _KIND = re.compile(r":\w+|=ego")
 
 
-def _specifier(text: str, *, since_3: str = "", level: int = 0, after: str = "", example: str = "") -> PhraseRow:
-    parts: list[Operand | str] = []
-    for found in _PART.finditer(text):
-        name, kind, word = found["name"], found["kind"] or "", found["word"] or ""
-        parts.append(Operand(name, kind, word, bool(found["ego"]), level) if name else found["plain"])
-    count = next((number for number, part in enumerate(parts) if isinstance(part, Operand)), len(parts))
-    words = tuple(part for part in parts[:count] if isinstance(part, str))
-    versions = _NEW if since_3 else VERSIONS
-    return PhraseRow(_KIND.sub("", text), words, tuple(parts[count:]), versions, since_3, after, example)
+def _row(
+    text: str, level: int = 0, *, versions: frozenset[int] = VERSIONS, construct: str = "", after: str = "",
+    example: str = "", measures: str = "",
+) -> PhraseRow:  # fmt: skip
+    """A row from its text.
+
+    The last operand of an operator is as tight as the operator, or tighter where it stands after another; before
+    a further word that must be there any expression can stand, but for operators that are tight on the left, too.
+    """
+    parts = list(_PART.finditer(text))
+    is_infix = text.startswith("{")
+    last_word = max((number for number, part in enumerate(parts) if part["plain"]), default=0)
+    found: list[Operand | str] = []
+    for number, part in enumerate(parts):
+        tight = (level if number < last_word else level + 1) if is_infix else level if number > last_word else 0
+        name, kind, word = part["name"], part["kind"] or "", part["word"] or ""
+        found.append(Operand(name, kind, word, bool(part["ego"]), tight) if name else part["plain"])
+    rest = found[1:] if is_infix else found
+    words: list[str] = []
+    for part in rest:
+        if isinstance(part, Operand):
+            break
+        words.append(part)
+    operands = tuple(part for part in found if isinstance(part, Operand))
+    return PhraseRow(
+        _KIND.sub("", text), level, tuple(words), tuple(rest[len(words) :]), operands, versions, construct, after,
+        example, measures,
+    )  # fmt: skip
+
+
+def _new(text: str, level: int = 0, construct: str = "", measures: str = "") -> PhraseRow:
+    """A row that only Scenic 3 has."""
+    return _row(text, level, versions=_NEW, construct=construct, measures=measures)
+
+
+def _temporal(text: str, level: int = IMPLIES) -> PhraseRow:
+    return _row(text, level, versions=_RECENT, construct="a temporal operator")
 
 
 def _by_word(rows: Iterable[PhraseRow]) -> dict[str, list[PhraseRow]]:
@@ -93,40 +127,99 @@ def _by_word(rows: Iterable[PhraseRow]) -> dict[str, list[PhraseRow]]:
     return found
 
 
+_ALONG = "offset along direction by vector"
 _DIRECTLY = "`facing directly`"
 
 SPECIFIERS: tuple[PhraseRow, ...] = (
-    _specifier("at {position}"),
-    _specifier("in {region}"),
-    _specifier("on {region}"),
-    _specifier("contained in {region}", since_3="`contained in`"),
-    _specifier("offset by {offset}"),
-    _specifier("offset along {direction:heading} by {offset}",
-               after="the direction", example="offset along direction by vector"),
-    _specifier("beyond {target} by {offset} [from {origin=ego}]",
-               after="the position to be beyond", example="beyond position by offset"),
-    _specifier("visible [from {viewer=ego}]"),
-    _specifier("not visible [from {viewer=ego}]"),
-    _specifier("left of {reference} [by {distance}]"),
-    _specifier("right of {reference} [by {distance}]"),
-    _specifier("ahead of {reference} [by {distance}]"),
-    _specifier("behind {reference} [by {distance}]"),
-    _specifier("above {reference} [by {distance}]", since_3="`above`"),
-    _specifier("below {reference} [by {distance}]", since_3="`below`"),
-    _specifier("following {field} [from {origin=ego}] for {distance:number}",
-               after="the field to follow", example="following field for distance"),
-    _specifier("facing {heading:heading}"),
-    _specifier("facing toward {target}"),
-    _specifier("facing away from {target}"),
-    _specifier("facing directly toward {target}", since_3=_DIRECTLY),
-    _specifier("facing directly away from {target}", since_3=_DIRECTLY),
-    _specifier("apparently facing {heading:heading} [from {origin=ego}]"),
-    _specifier("using {value}", level=POWER + 1),
+    _row("at {position}"),
+    _row("in {region}"),
+    _row("on {region}"),
+    _new("contained in {region}", construct="`contained in`"),
+    _row("offset by {offset}"),
+    _row("offset along {direction:heading} by {offset}",
+         after="the direction", example=_ALONG),
+    _row("beyond {target} by {offset} [from {origin=ego}]",
+         after="the position to be beyond", example="beyond position by offset"),
+    _row("visible [from {viewer=ego}]"),
+    _row("not visible [from {viewer=ego}]"),
+    _row("left of {reference} [by {distance}]"),
+    _row("right of {reference} [by {distance}]"),
+    _row("ahead of {reference} [by {distance}]"),
+    _row("behind {reference} [by {distance}]"),
+    _new("above {reference} [by {distance}]", construct="`above`"),
+    _new("below {reference} [by {distance}]", construct="`below`"),
+    _row("following {field} [from {origin=ego}] for {distance:number}",
+         after="the field to follow", example="following field for distance"),
+    _row("facing {heading:heading}"),
+    _row("facing toward {target}"),
+    _row("facing away from {target}"),
+    _new("facing directly toward {target}", construct=_DIRECTLY),
+    _new("facing directly away from {target}", construct=_DIRECTLY),
+    _row("apparently facing {heading:heading} [from {origin=ego}]"),
+    _row("using {value}", level=POWER + 1),
 )  # fmt: skip
 """What can follow the class of an instance, besides `with property value`."""
 
+_CORNERS = ("front left", "front right", "back left", "back right")
+BOX_PARTS = (
+    "front", "back", "left", "right", *_CORNERS, "top", "bottom",
+    *(f"{side} {corner}" for side in ("top", "bottom") for corner in _CORNERS),
+)  # fmt: skip
+
+OPERATORS: tuple[PhraseRow, ...] = (
+    _temporal("{left} until {right}", UNTIL),
+    _temporal("{left} implies {right}"),
+    _temporal("always {condition}"),
+    _temporal("eventually {condition}"),
+    _temporal("next {condition}"),
+    _row("{region} visible from {viewer}", UNION),
+    _row("{region} not visible from {viewer}", UNION),
+    _row("{viewer} can see {target}", UNION),
+    _new("{left} intersects {right}", UNION, "`intersects`"),
+    _row("{origin} offset along {direction:heading} by {offset}", ALONG, after="the direction", example=_ALONG),
+    _row("{origin} offset by {offset}", RELATIVE),
+    _row("{left} relative to {right}", RELATIVE),
+    _row("{field} at {position}", AT),
+    _row("relative position of {target} [from {origin=ego}]", PREFIX),
+    _row("relative heading of {target} [from {origin=ego}]", PREFIX, measures="angle"),
+    _row("apparent heading of {target} [from {origin=ego}]", PREFIX, measures="angle"),
+    _row("distance to {target} [from {origin=ego}]", PREFIX, measures="length"),
+    _row("distance from {origin} [to {target=ego}]", PREFIX, measures="length"),
+    _row("distance past {target} [of {origin=ego}]", PREFIX, measures="length"),
+    _row("angle to {target} [from {origin=ego}]", PREFIX, measures="angle"),
+    _row("angle from {origin} [to {target=ego}]", PREFIX, measures="angle"),
+    _row("azimuth to {target} [from {origin=ego}]", PREFIX, measures="angle"),
+    _row("azimuth from {origin} [to {target=ego}]", PREFIX, measures="angle"),
+    _new("altitude to {target} [from {origin=ego}]", PREFIX, "`altitude`"),
+    _new("altitude from {origin} [to {target=ego}]", PREFIX, "`altitude`"),
+    _row("follow {field} [from {origin=ego}] for {distance:number}", PREFIX,
+         after="the field to follow", example="follow field from position for distance"),
+    _row("visible {region}", PREFIX),
+    _row("not visible {region}", PREFIX),
+    *(
+        _new(f"{part} of {{target}}", PREFIX, f"`{part} of`") if part.startswith(("top", "bottom"))
+        else _row(f"{part} of {{target}}", PREFIX) for part in BOX_PARTS
+    ),
+    _row("{x:number} @ {y:number}", PRODUCT),
+    _row("{value:number} deg", PRODUCT),
+    _row("initial scenario", POWER),
+)  # fmt: skip
+"""Operators that Python does not have."""
+
+_ROWS = {row.text: row for row in (*SPECIFIERS, *OPERATORS)}
+FACING, DEG, VECTOR = _ROWS["facing {heading}"], _ROWS["{value} deg"], _ROWS["{x} @ {y}"]
+RELATION, IMPLICATION = _ROWS["{left} relative to {right}"], _ROWS["{left} implies {right}"]
+ALWAYS = _ROWS["always {condition}"]
+TEMPORAL = tuple(row for row in OPERATORS if row.versions is _RECENT and row is not IMPLICATION)
+
 SPECIFIERS_AT = _by_word(SPECIFIERS)
-FACING = next(row for row in SPECIFIERS if row.text == "facing {heading}")
+INFIXES_AT = _by_word(row for row in OPERATORS if row.text.startswith("{"))
+PREFIXES_AT = _by_word(row for row in OPERATORS if not row.text.startswith("{"))
+_BETWEEN = {part if isinstance(part, str) else part.word for row in _ROWS.values() for part in row.rest} - {""}
+INFIX_WORDS = frozenset("and as else for if in is or".split()) | _BETWEEN | (INFIXES_AT.keys() - PREFIXES_AT.keys())
+"""Words that continue or end an expression, so that none starts there."""
+INFIX_NAMES = frozenset(("can", "deg", "implies", "intersects", "offset"))
+"""Those of them that a program may use as names, also where a word before them asks for an operand."""
 
 
 def each_meaning(rows: Iterable[PhraseRow], meanings: Mapping[str, Meaning]) -> dict[PhraseRow, Meaning]:

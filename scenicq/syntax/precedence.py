@@ -9,19 +9,15 @@ with words takes a sum as its last operand, so that `distance to x < 10` compare
 from __future__ import annotations
 
 __all__ = [
-    "ALONG", "AND", "AT", "COMPARISON", "DEPENDENT", "IMPLIES", "LEVELS", "NOT", "OR", "POWER", "PREFIX", "PRODUCT",
-    "RELATIVE", "SIGN", "SUM", "UNION", "UNTIL",
+    "ALONG", "AND", "AT", "COMPARISON", "IMPLIES", "NOT", "OR", "POWER", "PREFIX", "PRODUCT", "PYTHON", "RELATIVE",
+    "SIGN", "UNION", "UNTIL",
 ]  # fmt: skip
 
 UNTIL, IMPLIES, OR, AND, NOT, COMPARISON, UNION, ALONG, RELATIVE, AT, PREFIX, SUM, PRODUCT, SIGN, POWER = range(1, 16)
 
-LEVELS: dict[str, int] = {
-    "until": UNTIL, "implies": IMPLIES, "or": OR, "and": AND, "==": COMPARISON, "!=": COMPARISON, "<": COMPARISON,
-    "<=": COMPARISON, ">": COMPARISON, ">=": COMPARISON, "in": COMPARISON, "is": COMPARISON, "not": COMPARISON,
-    "|": UNION, "visible": UNION, "can": UNION, "intersects": UNION, "^": ALONG, "offset": RELATIVE, "&": RELATIVE,
-    "relative": RELATIVE, "<<": AT, ">>": AT, "at": AT, "+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT, "//": PRODUCT,
-    "%": PRODUCT, "@": PRODUCT, "deg": PRODUCT, "**": POWER,
+PYTHON: dict[str, int] = {
+    "or": OR, "and": AND, "==": COMPARISON, "!=": COMPARISON, "<": COMPARISON, "<=": COMPARISON, ">": COMPARISON,
+    ">=": COMPARISON, "in": COMPARISON, "is": COMPARISON, "not": COMPARISON, "|": UNION, "^": ALONG, "&": RELATIVE,
+    "<<": AT, ">>": AT, "+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT, "//": PRODUCT, "%": PRODUCT, "**": POWER,
 }  # fmt: skip
-DEPENDENT: dict[str, tuple[str, ...]] = {
-    "not": ("in", "visible"), "visible": ("from",), "can": ("see",), "offset": ("by", "along"), "relative": ("to",),
-}  # fmt: skip
+"""The levels of Python's operators; those of Scenic's stand in `phrases`."""

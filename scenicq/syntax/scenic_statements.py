@@ -7,9 +7,10 @@ from typing import Self
 from scenicq.errors import Span
 from scenicq.syntax import ast
 from scenicq.syntax.literals import decode, string_parts
+from scenicq.syntax.phrases import INFIX_WORDS
 from scenicq.syntax.precedence import POWER
 from scenicq.syntax.statements import StatementParser
-from scenicq.syntax.tokens import CLOSERS, INFIX_WORDS, Token
+from scenicq.syntax.tokens import CLOSERS, Token
 
 __all__ = ["ProgramParser"]
 

@@ -6,9 +6,9 @@ from abc import abstractmethod
 
 from scenicq.errors import ScenarioError, Source, similar
 from scenicq.syntax import ast
-from scenicq.syntax.atoms import AtomParser
-from scenicq.syntax.phrases import SPECIFIERS, SPECIFIERS_AT, PhraseRow
-from scenicq.syntax.tokens import INFIX_NAMES, Token
+from scenicq.syntax.phrase_parser import PhraseParser
+from scenicq.syntax.phrases import INFIX_NAMES, SPECIFIERS, SPECIFIERS_AT, PhraseRow
+from scenicq.syntax.tokens import Token
 
 __all__ = ["InstanceParser"]
 
@@ -25,7 +25,7 @@ _SAID = {
 """What people try to place objects with, and how Scenic says it."""
 
 
-class InstanceParser(AtomParser):
+class InstanceParser(PhraseParser):
     """Reads instances.
 
     Attributes:
@@ -42,12 +42,8 @@ class InstanceParser(AtomParser):
         self.has_new = False
 
     @abstractmethod
-    def binary(self, level: int) -> ast.Expression:
-        """Read an expression of operators at least as tight as the level."""
-
-    @abstractmethod
-    def level_here(self) -> int:
-        """How tight the operator is that stands here; 0 for none."""
+    def prefix_here(self) -> PhraseRow | None:
+        """The operator that starts here with words, such as `distance to`."""
 
     def looks_like_class(self, node: ast.Expression) -> bool:
         """Whether a name is one of a class: defined as such, or in capitals as classes are."""
@@ -144,12 +140,10 @@ class InstanceParser(AtomParser):
         if self.token.kind != "name" or not self.starts_operand(self.index) or self.text[:1].isupper():
             return False
         if following.kind == "name":
-            return self.starts_operand(self.index + 1) and bool(similar(self.text, _NAMES)) and not self.is_prefix()
+            return (
+                self.starts_operand(self.index + 1) and bool(similar(self.text, _NAMES)) and self.prefix_here() is None
+            )
         return following.kind in ("number", "string")
-
-    @abstractmethod
-    def is_prefix(self) -> bool:
-        """Whether an operator of several words starts here, such as `distance to`."""
 
     def unknown(self) -> ScenarioError:
         """The error for a word that starts no specifier."""
@@ -171,18 +165,4 @@ class InstanceParser(AtomParser):
         row = self.specifier_at(self.index)
         if row is None:
             raise self.unknown()
-        return self.phrase(row)
-
-    def phrase(self, row: PhraseRow) -> ast.Phrase:
-        """Read a phrase whose first words stand here."""
-        start = self.token.start
-        self.move(self.index + len(row.words))
-        operands: list[ast.Expression | None] = []
-        for part in row.rest:
-            if isinstance(part, str):
-                self.expect(part, f"after {row.after}", f"write `{row.example}`")
-            elif part.word and not self.accept(part.word):
-                operands.append(None)
-            else:
-                operands.append(self.binary(part.level) if part.level else self.expression())
-        return ast.Phrase(self.span(start), row, tuple(operands))
+        return self.phrase(start, row)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple, TypeAlias
 
-__all__ = ["CLOSERS", "INFIX_NAMES", "INFIX_WORDS", "KEYWORDS", "Token", "TokenKind"]
+__all__ = ["CLOSERS", "KEYWORDS", "Token", "TokenKind"]
 
 TokenKind: TypeAlias = Literal["name", "keyword", "number", "string", "operator", "newline", "indent", "dedent", "end"]
 
@@ -66,34 +66,6 @@ KEYWORDS: frozenset[str] = frozenset(
     ]
 )
 """Words that can never be names: Python's in every version of Scenic, and `of`."""
-
-INFIX_WORDS: frozenset[str] = frozenset(
-    [
-        "and",
-        "as",
-        "at",
-        "by",
-        "can",
-        "deg",
-        "else",
-        "for",
-        "from",
-        "if",
-        "implies",
-        "in",
-        "intersects",
-        "is",
-        "of",
-        "offset",
-        "or",
-        "to",
-        "until",
-    ]
-)
-"""Words that continue or end an expression, so that none starts there."""
-
-INFIX_NAMES: frozenset[str] = frozenset(["can", "deg", "implies", "intersects", "offset"])
-"""Those of them that a program may use as names, also where a word before them asks for an operand."""
 
 CLOSERS: dict[str, str] = {"(": ")", "[": "]", "{": "}"}
 """Opening brackets with their closing ones."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
-from scenicq.syntax import ast
+from scenicq.syntax import ast, phrases
 from scenicq.syntax.hints import condition_hint
 from scenicq.syntax.phrases import VERSIONS
 from scenicq.syntax.walk import walk
@@ -14,7 +14,6 @@ _OLD = frozenset((1, 2))
 _RECENT = frozenset((2, 3))
 _NEW = frozenset((3,))
 _FIRST = frozenset((1,))
-_SCENIC_3_PARTS = ("top", "bottom")
 
 
 def find_evidence(source: Source, body: tuple[ast.Statement, ...], defined: set[str]) -> tuple[ast.Evidence, ...]:
@@ -37,28 +36,18 @@ def _evidence(source: Source, node: ast.SyntaxNode, defined: set[str]) -> ast.Ev
             return ast.Evidence(node.cls.span, "an instance without `new`", _OLD)
         case ast.Call(function=ast.Name(id="Range" | "DiscreteRange" as name)) if name not in defined:
             return ast.Evidence(node.function.span, f"`{name}`", _RECENT)
-        case (
-            ast.Deg(value=ast.Tuple(items=(_, _)))
-            | ast.VectorOperator(x=ast.Tuple(items=(_, _)))
-            | ast.VectorOperator(y=ast.Tuple(items=(_, _)))
+        case ast.Phrase(row=phrases.DEG | phrases.VECTOR) if any(
+            isinstance(each, ast.Tuple) and len(each.items) == 2 for each in node.operands
         ):
             return ast.Evidence(node.span, "a pair of numbers as an interval", _FIRST)
         case ast.Model():
             return ast.Evidence(node.span, "`model`", _RECENT)
         case ast.DynamicStatement() | ast.DynamicDefinition():
             return ast.Evidence(node.span, f"`{node.kind}`", _RECENT)
-        case ast.IntersectsOperator():
-            return ast.Evidence(node.span, "`intersects`", _NEW)
-        case ast.Altitude():
-            return ast.Evidence(node.span, "`altitude`", _NEW)
         case ast.Phrase(row=row) if row.construct:
             return ast.Evidence(node.span, row.construct, row.versions)
-        case ast.PartOf() if node.part.startswith(_SCENIC_3_PARTS):
-            return ast.Evidence(node.span, f"`{node.part} of`", _NEW)
         case ast.RequireMonitor():
             return ast.Evidence(node.span, "`require monitor`", _NEW)
-        case ast.Temporal() | ast.UntilOperator() | ast.Implies():
-            return ast.Evidence(node.span, "a temporal operator", _RECENT)
         case ast.PropertyDefault() if node.modifiers:
             return ast.Evidence(node.name_span, "a property with modifiers", _RECENT)
         case _:

@@ -56,7 +56,7 @@ FORMATTED = {
     "f'{a != b}'": "FormattedString([Replacement((a != b))])",
     "f'{ {1: 2}[1] }'": "FormattedString([Replacement(Subscript(Dict([DictItem(1, 2)]), 1))])",
     "f'{a, b}'": "FormattedString([Replacement(Tuple([a, b]))])",
-    "f'{1 deg}'": "FormattedString([Replacement(Deg(1))])",
+    "f'{1 deg}'": "FormattedString([Replacement(<1 deg>)])",
     "'x' f'{a}' 'y'": "FormattedString(['x', Replacement(a), 'y'])",
     "rf'\\d{a}'": "FormattedString(['\\\\d', Replacement(a)])",
     "f'\\N{BULLET}{a}'": "FormattedString(['\u2022', Replacement(a)])",

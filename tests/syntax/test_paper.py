@@ -41,9 +41,9 @@ def test_badly_parked_car() -> None:
     body = module(PROGRAMS["badly parked car"][0]).body
     assert [shape(node) for node in body] == [
         "Assign([ego], Car)",
-        "Assign([spot], New(OrientedPoint, [<on Visible(curb, False)>], False))",
-        "Assign([badAngle], Deg((* Uniform(1.0, (- 1.0)) Tuple([10, 20]))))",
-        "New(Car, [<left of spot by 0.5>, <facing RelativeTo(badAngle, roadDirection)>], False)",
+        "Assign([spot], New(OrientedPoint, [<on <visible curb>>], False))",
+        "Assign([badAngle], <(* Uniform(1.0, (- 1.0)) Tuple([10, 20])) deg>)",
+        "New(Car, [<left of spot by 0.5>, <facing <badAngle relative to roadDirection>>], False)",
     ]
 
 
@@ -53,10 +53,10 @@ def test_platoon_function() -> None:
     (_, loop) = function.body
     assert isinstance(loop, ast.For)
     assert [shape(node) for node in loop.body] == [
-        "Assign([center], Follow(roadDirection, PartOf(front, lastCar), resample(dist)))",
+        "Assign([center], <follow roadDirection from <front of lastCar> for resample(dist)>)",
         (
             "Assign([pos], New(OrientedPoint, [<right of center by shift>, "
-            "<facing RelativeTo(resample(wiggle), roadDirection)>], False))"
+            "<facing <resample(wiggle) relative to roadDirection>>], False))"
         ),
         (
             "Assign([lastCar], New(Car, [<ahead of pos>, "

@@ -8,7 +8,7 @@ from itertools import product
 import pytest
 
 from scenicq.syntax import ast
-from scenicq.syntax.phrases import SPECIFIERS, PhraseRow, each_meaning
+from scenicq.syntax.phrases import OPERATORS, SPECIFIERS, PhraseRow, each_meaning
 from scenicq.syntax.walk import walk
 
 from .shape import error, module
@@ -28,15 +28,24 @@ def written(row: PhraseRow) -> list[tuple[str, tuple[str | None, ...]]]:
     return found
 
 
-@pytest.mark.parametrize("row", SPECIFIERS, ids=lambda row: row.text)
-def test_each_specifier_is_read_as_it_is_written(row: PhraseRow) -> None:
+def check(row: PhraseRow, *programs: str) -> None:
+    """Each text of the row is a phrase of it wherever it stands, with these operands."""
     for text, names in written(row):
-        for program in (f"x = new Car {text}", f"x = f(new Car with b 1, {text}, with a 1)"):
-            (phrase,) = [
-                each for each in walk(*module(program).body) if isinstance(each, ast.Phrase) and each.row is row
-            ]
+        for program in programs:
+            body = module(program.format(text)).body
+            (phrase,) = [each for each in walk(*body) if ast.is_phrase(each, row)]
             assert phrase.span.text == text
             assert tuple(each and each.span.text for each in phrase.operands) == names
+
+
+@pytest.mark.parametrize("row", SPECIFIERS, ids=lambda row: row.text)
+def test_each_specifier_is_read_as_it_is_written(row: PhraseRow) -> None:
+    check(row, "x = new Car {}", "x = f(new Car with b 1, {}, with a 1)")
+
+
+@pytest.mark.parametrize("row", OPERATORS, ids=lambda row: row.text)
+def test_each_operator_is_read_as_it_is_written(row: PhraseRow) -> None:
+    check(row, "require {}", "require ({}) and not ({{y: ()}})", "require ({}) < 2 or z")
 
 
 def test_each_row_has_exactly_one_meaning() -> None:

@@ -122,7 +122,7 @@ CLASSES = {
         "Assign([Subscript(x, 0)], 3)])"
     ),
     "class C:\n  heading: (roadDirection at self.position) \\\n    + self.roadDeviation\n  behavior: None\n": (
-        "ClassDef(C, [PropertyDefault(heading, (+ FieldAt(roadDirection, self.position) self.roadDeviation)), "
+        "ClassDef(C, [PropertyDefault(heading, (+ <roadDirection at self.position> self.roadDeviation)), "
         "PropertyDefault(behavior, None)])"
     ),
     "constructor Car(Vehicle):\n  a: 1\n": "ClassDef(Car, [Vehicle], [PropertyDefault(a, 1)])",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenicq.syntax import ast
+from scenicq.syntax import ast, phrases
 from scenicq.syntax.walk import children, walk
 
 from .shape import expression, module, shape
@@ -22,5 +22,5 @@ def test_walk_visits_a_node_before_what_it_holds() -> None:
 def test_walk_needs_no_stack() -> None:
     node: ast.Expression = expression("x")
     for _ in range(5000):
-        node = ast.Deg(node.span, node)
+        node = ast.Phrase(node.span, phrases.DEG, (node,))
     assert sum(1 for _ in walk(node)) == 5001
