@@ -175,6 +175,10 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     options = query_options({**given, "model": model})
     if chosen == "ids" and not (report or export or rank or sample or shard or engine or resume or options.all_matches):
         options = replace(options, proofs=False)
+    told = summary or (sys.stderr.isatty() and not quiet)
+    if not (told or explain or report or near or shard or engine or resume):
+        # of frames, advice reads it, too
+        options = replace(options, interval_reasons=False, reasons=advised or not quiet)
     if deadline is not None:
         options = replace(options, until=time.monotonic() + deadline)
     query = Query(open_checked(str(target)), source, options)

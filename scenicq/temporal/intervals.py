@@ -151,16 +151,10 @@ class IntervalMatcher:
     options: IntervalOptions
     solver: Solver | None = None
     outcomes: tuple[Outcome, ...] = field(init=False)
-    _programs: dict[int, _Program] = field(init=False, default_factory=dict["int", _Program])
 
     def __post_init__(self) -> None:
         """Split off the choices."""
         self.outcomes = outcomes_of(self.scenario)
-
-    def _program(self, outcome: int) -> _Program:
-        if outcome not in self._programs:
-            self._programs[outcome] = _Program(self.outcomes[outcome].scenario)
-        return self._programs[outcome]
 
     def intervals(self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True) -> Reported:
         """What became of each binding: the intervals to report, or else the one that came furthest.
@@ -175,7 +169,8 @@ class IntervalMatcher:
         parts: list[_Found] = []
         for outcome in cast("list[int]", np.unique(table.outcomes).tolist()):
             which = np.flatnonzero(table.outcomes == outcome)
-            own, program = table.chosen(which), self._program(outcome)
+            # a machine has met nothing before, so that what becomes of a block hangs on no other one
+            own, program = table.chosen(which), _Program(self.outcomes[outcome].scenario)
 
             def remembered(number: int, which: NDArray[np.int64] = which) -> Remembered:
                 return remember(int(order[which[number]]))

@@ -19,7 +19,14 @@ COMPLETIONS = 6
 
 
 def found_by_query(folder: Path, program: Program, **options):
-    """(recording, roles, verdict) and (i, j), of every result; none where no run satisfies the program."""
+    """(recording, roles, verdict) and (i, j), of every result, whether or not somebody reads what others fail at."""
+    told, untold = (_found(folder, program, interval_reasons=each, **options) for each in (True, False))
+    assert told == untold, program.text()
+    return told
+
+
+def _found(folder: Path, program: Program, **options):
+    """The results of a query; none where no run satisfies the program."""
     query = Query(open_dataset(folder), Source("p.scenic", program.text()), QueryOptions(**options))
     try:
         return [

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.decision import decided_frames
-from scenicq.query.prefilter.executor import Block, names, run_prefilter
+from scenicq.query.prefilter.executor import Block, keep_players, names, run_players, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows, candidate_rows, candidates
 from scenicq.store.dataset import Dataset
@@ -33,7 +33,7 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
 
     from scenicq.match.matcher import Matcher
     from scenicq.match.problem.candidates import Candidates
-    from scenicq.query.execution.recording_matcher import DecidedRecordings
+    from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
 
 _FIRST_BATCH, _BATCH = 16, 2048
 """Labels whose places are looked up together: few until it is known what matters."""
@@ -60,11 +60,16 @@ class CompiledMap:
 
     @classmethod
     def of(
-        cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool, proofs: bool = True
-    ) -> CompiledMap:
-        """With its prefilter, which without proofs says what surely matches, too, or with one that excludes nothing."""
-        empty = Plan(network.name, (), "", (), None)
-        plan = make_plan(scenario, network, options, deciding=not proofs) if prefilter else empty
+        cls, scenario: Scenario, network: Network, options: MatchOptions, *, prefilter: bool, proofs: bool = True,
+        reasons: bool = True,
+    ) -> CompiledMap:  # fmt: skip
+        """With its prefilter, or with one that excludes nothing.
+
+        Without proofs the prefilter says what surely matches, too; without reasons it blames any step.
+        """
+        plan = Plan(network.name, (), "", (), None)
+        if prefilter:
+            plan = make_plan(scenario, network, options, deciding=not proofs, counting=reasons)
         observed = frozenset[str]().union(*relevant_properties(scenario, options))
         return cls(scenario, network, plan, not MOTION.isdisjoint(observed), observed)
 
@@ -115,6 +120,7 @@ class Decider:
     until: float | None = None
     _compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
     _matchers: dict[str, Matcher] = field(default_factory=dict["str", "Matcher"])
+    _over_time: dict[str, RecordingMatcher] = field(default_factory=dict["str", "RecordingMatcher"])
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
     _solver: LazySolver | None = None
@@ -181,24 +187,28 @@ class Decider:
     def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
         # takes long to load
-        from scenicq.query.execution.recording_matcher import RecordingMatcher, Survivors  # noqa: PLC0415
-        from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
+        from scenicq.query.execution.recording_matcher import Survivors  # noqa: PLC0415
 
-        intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver)
-        recordings = RecordingMatcher(self.dataset, self._matcher(compiled), intervals, self.every, self.proofs)
+        recordings = self._recording_matcher(compiled)
         connection, plan = self.connection, compiled.plan
         rows: CandidateRows | None = None
+        # recordings are of one map
+        every = np.concatenate([np.arange(*run) for run in block.runs])
         if not plan.stages:
-            # recordings are of one map
-            every = np.concatenate([np.arange(*run) for run in block.runs])
             missed = np.full(len(every), -1, np.int16)
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
                 labels = self.dataset.labels_in(block.part, wanted, motion=compiled.motion)
                 return (Candidate(label, None) for label in labels)
+        elif plan.players:
+            missed, players = self._players(plan, block, every)
+            rows = CandidateRows.of(players, len(plan.roles or ()))
+
+            def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
+                keep_players(self.dataset, connection, plan, block, players)
+                return candidates(connection, plan, motion=compiled.motion, among=wanted)
         else:
             missed = run_prefilter(self.dataset, connection, plan, block)
-            every = np.concatenate([np.arange(*run) for run in block.runs])
             if plan.roles and (missed < 0).any():
                 rows = candidate_rows(connection, plan)
 
@@ -207,6 +217,33 @@ class Decider:
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))
+
+    def _players(
+        self, plan: Plan, block: Block, frames: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int16], Mapping[str, NDArray[Any]]]:
+        """Which of the frames of a block a plan without stages excludes, and who may play which role in the others."""
+        found = run_players(self.dataset, self.connection, plan, block)
+        place = np.searchsorted(frames, found["f"])
+        roles = [
+            np.bincount(place[found[f"r{number}"]], minlength=len(frames)) for number in range(len(plan.roles or ()))
+        ]
+        left = np.logical_and.reduce(
+            [np.bincount(place, minlength=len(frames)) >= len(roles), *(each > 0 for each in roles)]
+        )
+        missed = np.where(left, -1, 0).astype(np.int16)
+        return missed, {name: each[left[place]] for name, each in found.items()}
+
+    def _recording_matcher(self, compiled: CompiledMap) -> RecordingMatcher:
+        name = compiled.network.name
+        if name not in self._over_time:
+            # take long to load
+            from scenicq.query.execution.recording_matcher import RecordingMatcher  # noqa: PLC0415
+            from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
+
+            intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver)
+            matcher = self._matcher(compiled)
+            self._over_time[name] = RecordingMatcher(self.dataset, matcher, intervals, self.every, self.proofs)
+        return self._over_time[name]
 
     def _matcher(self, compiled: CompiledMap) -> Matcher:
         """The matcher of a map, where SQL has not decided everything."""

@@ -35,16 +35,20 @@ def _excluded(plan: Plan, block: Decided, start: int, end: int) -> Iterator[Resu
         yield Result(frame, recording, time, NoMatch(Cause(step.what, step.detail, step.span)))
 
 
-def _count_excluded(plan: Plan, missed: NDArray[np.int16], funnel: Funnel) -> None:
-    """Count frames by the step of the plan that excludes them, where one does."""
+def _count_excluded(plan: Plan, missed: NDArray[np.int16], funnel: Funnel, *, reasons: bool) -> None:
+    """Count frames that the plan excludes, by the step that does if somebody reads that."""
+    if not reasons:
+        funnel.frames += int((missed >= 0).sum())
+        return
     for step, count in enumerate(np.bincount(missed[missed >= 0], minlength=len(plan.steps)).tolist()):
         if count:
             funnel.exclude(plan.steps[step].what, count)
 
 
 def merge_frames(
-    plan: Plan, decided: Iterable[Decided], funnel: Funnel, progress: Callable[[int], None], *, every: bool
-) -> Generator[Result]:
+    plan: Plan, decided: Iterable[Decided], funnel: Funnel, progress: Callable[[int], None], *, every: bool,
+    reasons: bool,
+) -> Generator[Result]:  # fmt: skip
     """The results of blocks in their order, counted as far as they are taken.
 
     Args:
@@ -53,6 +57,7 @@ def merge_frames(
         funnel: Where frames are counted.
         progress: Called with the number of frames decided since the last call.
         every: Whether frames that do not match are results too.
+        reasons: Whether somebody reads what frames fail at.
     """
     for block in until_deadline(decided, funnel):
         found = iter(block.found)
@@ -82,21 +87,23 @@ def merge_frames(
             start = len(block.missed)
         finally:
             # as far as results were taken
-            _count_excluded(plan, block.missed[:start], funnel)
+            _count_excluded(plan, block.missed[:start], funnel, reasons=reasons)
 
 
 def merge_intervals(
-    plan: Plan, decided: Iterable[Decided], funnel: Funnel, progress: Callable[[int], None], *, every: bool
-) -> Generator[Result]:
+    plan: Plan, decided: Iterable[Decided], funnel: Funnel, progress: Callable[[int], None], *, every: bool,
+    reasons: bool,
+) -> Generator[Result]:  # fmt: skip
     """The intervals of blocks of whole recordings; arguments as of `merge_frames`."""
     for block in until_deadline(decided, funnel):
         assert block.recordings is not None
-        _count_excluded(plan, block.missed, funnel)
+        _count_excluded(plan, block.missed, funnel, reasons=reasons)
         funnel.frames += int((block.missed < 0).sum())
         funnel.candidates += int((block.missed < 0).sum())
-        funnel.excluded.update(block.recordings.failed)
         funnel.over_time.update(block.recordings.counts)
-        funnel.broken.update(block.recordings.broken)
+        if reasons:
+            funnel.excluded.update(block.recordings.failed)
+            funnel.broken.update(block.recordings.broken)
         for result in block.recordings.results:
             funnel.count_interval(result.verdict)
             if every or isinstance(result.verdict, Match | Unknown):

@@ -160,7 +160,8 @@ class RecordingMatcher:
         found = DecidedRecordings(counts=Counter(recordings=len(rows.runs)))
         if not len(left.labels):
             return found
-        with TrackBlock(self.dataset, rows.part, rows.runs) as block:
+        candidates = None if left.rows is None else left.rows.rows
+        with TrackBlock(self.dataset, rows.part, rows.runs, candidates) as block:
             labels = left.labels - block.first_label
             asked = _Asked(block, labels, self._candidates(block, labels, left), left.read)
             starts = self._starts(asked, self._search, 0, found)

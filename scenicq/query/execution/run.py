@@ -69,6 +69,10 @@ class QueryOptions:
         model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
         proofs: Whether somebody reads how frames match; if not, a match that SQL decides names nobody and nothing.
+        reasons: Whether somebody reads what frames fail at first; if not, the funnel does not say it of those that the
+            prefilter excludes.
+        interval_reasons: Whether somebody reads what frames and bindings fail at in a query over time; if not, the
+            funnel does not say it, and counts of starts and bindings only those that the prefilter leaves.
         until: When the time is over, as of `time.monotonic`; None for never. What is decided by then are the results.
     """
 
@@ -86,6 +90,8 @@ class QueryOptions:
     model: str | None = None
     strict: bool = False
     proofs: bool = True
+    reasons: bool = True
+    interval_reasons: bool = True
     until: float | None = None
 
 
@@ -180,8 +186,9 @@ class Query:
         compiled = self._known.compiled
         if map_name not in compiled:
             options = self.options
-            how = {"prefilter": options.prefilter, "proofs": options.proofs}
-            compiled[map_name] = CompiledMap.of(*self.compile(map_name), options.match, **how)
+            scenario, network = self.compile(map_name)
+            how = {"prefilter": options.prefilter, "proofs": options.proofs, "reasons": self._reasons(scenario)}
+            compiled[map_name] = CompiledMap.of(scenario, network, options.match, **how)
         return compiled[map_name]
 
     def _compiled_maps(self) -> dict[str, CompiledMap | Diagnostic]:
@@ -329,9 +336,14 @@ class Query:
             until=options.until,
         )
 
-    def over_time(self, compiled: CompiledMap) -> bool:
+    def over_time(self, scenario: Scenario) -> bool:
         """Whether intervals are looked for, and not frames."""
-        return compiled.scenario.dynamics is not None or self.options.time.min_duration_s is not None
+        return scenario.dynamics is not None or self.options.time.min_duration_s is not None
+
+    def _reasons(self, scenario: Scenario) -> bool:
+        """Whether somebody reads what frames and bindings fail at."""
+        options = self.options
+        return options.every or (options.interval_reasons if self.over_time(scenario) else options.reasons)
 
     def is_over_time(self) -> bool:
         """Whether the results are intervals, and not frames; the program is compiled for the first map that it fits.
@@ -340,7 +352,7 @@ class Query:
             ScenarioError: The program is wrong.
         """
         compiled = next(self.fitting(), None)
-        return compiled is not None and self.over_time(compiled)
+        return compiled is not None and self.over_time(compiled.scenario)
 
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.
@@ -367,10 +379,11 @@ class Query:
                     yield from self._lacking(name, there, ahead.taken)
                     continue
                 cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1, decider.connection)
-                merge = partial(merge_frames, every=self.options.every)
-                if self.over_time(there):
+                every, reasons = self.options.every, self._reasons(there.scenario)
+                merge = partial(merge_frames, every=every, reasons=reasons)
+                if self.over_time(there.scenario):
                     cut = whole_recordings(self.dataset, decider.connection, cut)
-                    merge = partial(merge_intervals, every=self.options.every)
+                    merge = partial(merge_intervals, every=every, reasons=reasons)
                 with closing(merge(there.plan, hands.decide(cut, ahead.told), self.funnel, ahead.taken)) as merged:
                     for result in merged:
                         yield result

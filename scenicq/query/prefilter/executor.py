@@ -32,8 +32,10 @@ __all__ = [
     "extents",
     "hold",
     "join_first",
+    "keep_players",
     "names",
     "run_plan",
+    "run_players",
     "run_prefilter",
     "whole_recordings",
 ]
@@ -276,6 +278,38 @@ def run_prefilter(
         For each frame in order the number of the step that excludes it, -1 for candidates.
     """
     return run_plan(connection, plan, _rows_of(dataset, connection, block))
+
+
+def run_players(
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, plan: Plan, block: Block
+) -> Mapping[str, NDArray[Any]]:
+    """Run the one query of a plan that needs no stages on a block.
+
+    Args:
+        dataset: The dataset.
+        connection: To it.
+        plan: The plan; with `players`.
+        block: The block.
+
+    Returns:
+        The columns `f`, `row`, `r0` ..., in the order of the rows.
+    """
+    views = ", ".join(f"{view} AS ({sql})" for view, sql in _rows_of(dataset, connection, block))
+    found: Any = connection.execute(f"WITH {views} {plan.players}").fetchnumpy()
+    order = np.argsort(found["row"], kind="stable")
+    return {name: np.asarray(each)[order] for name, each in found.items()}
+
+
+def keep_players(
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, plan: Plan, block: Block,
+    found: Mapping[str, NDArray[Any]],
+) -> None:  # fmt: skip
+    """Leave to `candidates` what `run_plan` would, given the players of the frames that are left."""
+    _open(connection, _rows_of(dataset, connection, block))
+    connection.register(PASSED, pa.table(dict(found)))
+    connection.execute(f"CREATE OR REPLACE TEMP TABLE roles AS SELECT * FROM {PASSED}")
+    last = plan.stages[-1].table
+    connection.execute(f"CREATE OR REPLACE TEMP TABLE {last} AS SELECT DISTINCT f, NULL AS missed FROM roles")
 
 
 def run_plan(

@@ -52,6 +52,9 @@ class Plan:
             may play them; none where there is nobody but the ego. None if every object of a frame must be looked at.
         decision: SQL that makes the table `decided` of frames that surely match, of those that all stages have left;
             none where SQL decides nothing, or was not asked to.
+        players: Where nobody reads what frames fail at, and no condition is about two objects or memberships: a query
+            for what all stages together leave, the number `f` of a frame, the `row` of an object and the roles that it
+            may play.
     """
 
     map: str
@@ -60,6 +63,7 @@ class Plan:
     stages: tuple[Stage, ...]
     roles: tuple[int, ...] | None
     decision: tuple[str, ...] = ()
+    players: str = ""
 
     @property
     def left(self) -> str:
@@ -70,7 +74,7 @@ class Plan:
     def statements(self) -> list[str]:
         """All statements, for people."""
         staged = [statement for stage in self.stages for statement in stage.statements]
-        return [self.columns, *staged, *self.decision] if staged else []
+        return [self.players] if self.players else [self.columns, *staged, *self.decision] if staged else []
 
     @property
     def sql(self) -> str:
@@ -111,7 +115,9 @@ def _any_of(names: Iterable[str]) -> str:
     return f"a.class IN ({listed})" if listed else "false"
 
 
-def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, deciding: bool = False) -> Plan:
+def make_plan(
+    scenario: Scenario, network: Network, options: MatchOptions, *, deciding: bool = False, counting: bool = True
+) -> Plan:
     """The prefilter of a scenario, compiled against the map, under the options.
 
     Every step is necessary: a frame that matches misses none of them, and keeps every object that plays a role in some
@@ -122,6 +128,7 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
         network: The map it was compiled against.
         options: Tolerances, classes, radius.
         deciding: Whether SQL is to say, too, which frames surely match.
+        counting: Whether somebody reads which step a frame misses first; if not, it is any one.
     """
     scenario, own_ego = ready(scenario), options.ego == "label"
     relations = MapRelations(RegionNames(network), scenario.ego)
@@ -136,10 +143,10 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
             key = (classes, *(each.sql or each.region for each in (*plain, *placed)))
             roles.append(_Role(owner, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
     pairs = _pairs(found)
-    draft = Draft()
-    _frames(draft, [each for each in found if not each.objects], param_conditions(scenario, options), roles, pairs)
+    draft, params = Draft(), list(param_conditions(scenario, options))
+    _frames(draft, [each for each in found if not each.objects], params, roles, pairs)
     if roles:
-        _objects(draft, roles, pairs, options)
+        _objects(draft, roles, pairs, options, counting=counting)
     proofs = sufficient_conditions(scenario, network, options, relations) if deciding else None
     wanted = list(dict.fromkeys(near for each in proofs or () for _, near in each.places))
     flags = {near: f"s{place}" for place, near in enumerate(wanted) if any(each.region for each in found)}
@@ -151,6 +158,9 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
         for objects, tied in list(pairs.items())[: LIMITS.joined_pairs]:
             _pair(draft, roles, objects, tied)
     played = tuple(role.owner.index for role in roles)
+    alone = all(len(each.objects) < 2 and not each.region for each in found)
+    apart = bool(roles) and own_ego and not options.exact and not counting and alone
+    own = [*params, *(each for each in found if not each.objects)]
     left = f"(SELECT f FROM {draft.last} WHERE missed IS NULL)"
     return Plan(
         network.name,
@@ -159,6 +169,7 @@ def make_plan(scenario: Scenario, network: Network, options: MatchOptions, *, de
         tuple(draft.stages),
         played if own_ego and not options.exact else None,
         () if proofs is None else decision(proofs, played, flags, options, tables=(LABELS, OBJECTS), left=left),
+        _players(roles, own, options) if apart else "",
     )
 
 
@@ -199,10 +210,41 @@ def _reached(role: _Role, classes: Sequence[str]) -> str:
     return _level(plain, 1) if len(classes) == 1 else _level([role.classes, *plain])
 
 
+def _some_role(roles: Iterable[_Role]) -> str:
+    """That an object meets the conditions of some role that need no column of the frame."""
+    alone = [[each.sql for each in role.plain if not columns_of(EGO, [each.sql])] for role in roles]
+    met = ["(" + " AND ".join(["true", *map(_possible, mine)]) + ")" for mine in alone]
+    return f"({' OR '.join(dict.fromkeys(met))})"
+
+
+def _possible(sql: str) -> str:
+    """That a condition holds where a label tells."""
+    return f"coalesce({sql}, true)"
+
+
+def _near(options: MatchOptions) -> str:
+    """That an object is within the radius."""
+    return "true" if options.radius is None else f"a.ego_distance <= {number(options.radius + SLACK)}"
+
+
+def _players(roles: Sequence[_Role], own: Sequence[NecessaryCondition], options: MatchOptions) -> str:
+    """All conditions in one query; see `Plan.players`."""
+    may = [" AND ".join([role.classes, *(_possible(each.sql) for each in role.plain)]) for role in roles]
+    columns = ", ".join(f"({each}) AS r{place}" for place, each in enumerate(may))
+    frames = " AND ".join(["true", *(_possible(each.sql) for each in own)])
+    some = " OR ".join(f"({each})" for each in dict.fromkeys(may))
+    return (
+        f"SELECT {EGO}.number AS f, a.number AS row, {columns} FROM {OBJECTS} a JOIN {LABELS} {EGO} "
+        f"ON a.frame = {EGO}.frame WHERE {frames} AND {_near(options)} AND {_some_role(roles)} "
+        f"AND ({some})"
+    )
+
+
 def _objects(
-    draft: Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[NecessaryCondition]], options: MatchOptions
-) -> None:
-    """One pass over the objects: how far each comes in each role."""
+    draft: Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[NecessaryCondition]], options: MatchOptions,
+    *, counting: bool,
+) -> None:  # fmt: skip
+    """One pass over the objects: how far each comes in each role; without counts only those that may play one."""
     own_ego = options.ego == "label"
     tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
     kept = [f"a.{name}" for name in sorted({*columns_of("a", tied), *columns_of("b", tied)})]
@@ -211,10 +253,12 @@ def _objects(
     distinct = {role.column: role for role in roles}
     classes = tuple(dict.fromkeys(role.classes for role in roles))
     levels = [f"{_reached(role, classes)} AS {role.column}" for role in distinct.values()]
-    near = f" AND a.ego_distance <= {number(options.radius + SLACK)}" if own_ego and options.radius is not None else ""
+    near = _near(options) if own_ego else "true"
+    some = "true" if counting else _some_role(distinct.values())
     narrow = (
         f"SELECT {EGO}.f, a.number AS row, {', '.join([*kept, *levels])} FROM {OBJECTS} a "
-        f"JOIN stage0 {EGO} ON a.frame = {EGO}.frame WHERE {EGO}.missed IS NULL AND ({' OR '.join(classes)}){near}"
+        f"JOIN stage0 {EGO} ON a.frame = {EGO}.frame WHERE {EGO}.missed IS NULL AND ({' OR '.join(classes)}) "
+        f"AND {near} AND {some}"
     )
     pools: dict[str, int] = {}
     blamed: list[tuple[str, int]] = []

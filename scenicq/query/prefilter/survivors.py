@@ -53,6 +53,12 @@ class CandidateRows:
     rows: NDArray[np.int64]
     may: NDArray[np.bool_]
 
+    @classmethod
+    def of(cls, found: Mapping[str, NDArray[Any]], roles: int) -> CandidateRows:
+        """Those that a query with the columns `row`, `r0` ... gives, in the order of the rows."""
+        may = [np.asarray(found[f"r{place}"], dtype=np.bool_) for place in range(roles)]
+        return cls(np.asarray(found["row"], dtype=np.int64), np.column_stack(may))
+
 
 def candidate_rows(connection: duckdb.DuckDBPyConnection, plan: Plan) -> CandidateRows:
     """Who may play the roles of a plan in the block on which the prefilter was run last.
@@ -65,8 +71,7 @@ def candidate_rows(connection: duckdb.DuckDBPyConnection, plan: Plan) -> Candida
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
     roles = ", ".join(f"r{place}" for place in range(len(plan.roles)))
     found: Any = connection.execute(f"SELECT row, {roles} FROM roles WHERE f IN {left} ORDER BY row").fetchnumpy()
-    may = [np.asarray(found[f"r{place}"], dtype=np.bool_) for place in range(len(plan.roles))]
-    return CandidateRows(np.asarray(found["row"], dtype=np.int64), np.column_stack(may))
+    return CandidateRows.of(found, len(plan.roles))
 
 
 def candidates(

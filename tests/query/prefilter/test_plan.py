@@ -57,10 +57,11 @@ def tied(tmp_path_factory) -> Dataset:
     return dataset_of(TIED | RANDOM, tmp_path_factory.mktemp("tied"))
 
 
-def found(dataset: Dataset, text: str, options: MatchOptions, *, prefilter: bool) -> tuple[dict, Query]:
-    query = Query(
-        dataset, Source("test.scenic", HEADER + text), QueryOptions(options, solver="portable", prefilter=prefilter)
-    )
+def found(
+    dataset: Dataset, text: str, options: MatchOptions, *, prefilter: bool, reasons: bool = True
+) -> tuple[dict, Query]:
+    how = QueryOptions(options, solver="portable", prefilter=prefilter, reasons=reasons)
+    query = Query(dataset, Source("test.scenic", HEADER + text), how)
     return {
         r.frame: (type(r.verdict), r.verdict.correspondence)
         for r in query.results()
@@ -99,6 +100,7 @@ def test_the_prefilter_loses_nothing(dataset, name, options):
     with_it, query = found(dataset, text, OPTIONS[options], prefilter=True)
     without, _ = found(dataset, text, OPTIONS[options], prefilter=False)
     assert with_it == without
+    assert with_it == found(dataset, text, OPTIONS[options], prefilter=True, reasons=False)[0]
     assert query.funnel.frames == dataset.manifest.total.frames
     assert query.funnel.candidates >= len(with_it)
 
@@ -117,6 +119,7 @@ def test_nothing_is_lost_between_objects_and_in_unions(tied, name, options):
     text = (TIED | RANDOM)[name]
     with_it, query = found(tied, text, OPTIONS[options], prefilter=True)
     assert with_it == found(tied, text, OPTIONS[options], prefilter=False)[0]
+    assert with_it == found(tied, text, OPTIONS[options], prefilter=True, reasons=False)[0]
     assert query.funnel.frames == tied.manifest.total.frames
 
 
