@@ -11,8 +11,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
-from itertools import accumulate
-from operator import add
+from itertools import accumulate, groupby, pairwise
+from operator import add, sub
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +37,9 @@ __all__ = ["Job", "RecordingTask", "SegmentPlace", "World", "fingerprint", "maps
 
 _MOST_MESSAGES = 10_000
 """Messages of the recordings of a segment that are kept for later ingests; what has more is read anew then."""
+
+_COPIED = 65_536
+"""Rows of a table that are copied at a time, but for those of one recording."""
 
 OnRecording = Callable[[str, int], None]
 """Called with a recording and its number of frames when it is written."""
@@ -193,16 +196,18 @@ def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecordin
     try:
         with without_collector(), closing(_OldRows()) as old:
             writer.open()
-            for share in job.shares:
-                if share.old is not None:
-                    piece = _copy(share, share.old, old, writer, on_recording)
+            for place, shares in groupby(job.shares, lambda share: share.old):
+                together = list(shares)
+                if place is None:
+                    found = (_read(world, job, share, writer, indexes, on_recording) for share in together)
                 else:
-                    piece = _read(world, job, share, writer, indexes, on_recording)
-                if messages.total() > _MOST_MESSAGES:
-                    few = tuple(each for each in piece.told if messages[each.what, each.code] < MOST_TOLD)
-                    piece = replace(piece, fingerprint="", told=few)
-                messages.update((each.what, each.code) for each in piece.told)
-                pieces[share.name] = piece
+                    found = _copy([share.name for share in together], place, old, writer, on_recording)
+                for share, piece in zip(together, found, strict=True):
+                    pieces[share.name] = piece
+                    if messages.total() > _MOST_MESSAGES:
+                        few = tuple(each for each in piece.told if messages[each.what, each.code] < MOST_TOLD)
+                        pieces[share.name] = replace(piece, fingerprint="", told=few)
+                    messages.update((each.what, each.code) for each in pieces[share.name].told)
             return writer.finish(job.fingerprint, pieces)
     finally:
         writer.abandon()
@@ -222,14 +227,15 @@ def _read(
 
 
 def _copy(
-    share: RecordingTask, place: SegmentPlace, old: _OldRows, writer: SegmentWriter, on_recording: OnRecording
-) -> SourceRecording:
-    """Take a recording from a segment that has it."""
+    names: Sequence[str], place: SegmentPlace, old: _OldRows, writer: SegmentWriter, on_recording: OnRecording
+) -> Iterator[SourceRecording]:
+    """Take recordings from a segment that has them, or has found that nothing comes of them."""
     segment = place.segment
-    if share.name in segment.recordings:
-        writer.copy(share.name, old.of(place, share.name))
-        on_recording(share.name, segment.recordings[share.name].frames)
-    return segment.pieces[share.name]
+    for recordings, rows in old.runs(place, [name for name in names if name in segment.recordings]):
+        writer.copy(recordings, rows)
+        for name in recordings:
+            on_recording(name, segment.recordings[name].frames)
+    yield from (segment.pieces[name] for name in names)
 
 
 class _OldRows:
@@ -240,8 +246,15 @@ class _OldRows:
         self._first: dict[tuple[Path, int], dict[str, list[int]]] = {}
         self._files = ExitStack()
 
-    def of(self, place: SegmentPlace, name: str) -> dict[str, ArrowTable]:
-        """The rows of a recording in each table; recordings of a segment come in order."""
+    def runs(
+        self, place: SegmentPlace, names: Sequence[str]
+    ) -> Iterator[tuple[dict[str, Sequence[int]], dict[str, ArrowTable]]]:
+        """Recordings that lie one after the other, with the number of their rows in each table, and the rows.
+
+        Args:
+            place: A segment.
+            names: Recordings of it, in order, behind those of earlier calls.
+        """
         key, rows = (place.folder, place.number), place.segment.rows
         if key not in self._open:
             files = {table: place.segment.part(table, place.number).path for table in SEGMENT_TABLES}
@@ -253,8 +266,19 @@ class _OldRows:
                 rows.values(), lambda first, counts: [*map(add, first, counts)], initial=[0] * len(tables)
             )
             self._first[key] = dict(zip(rows, map(list, firsts), strict=False))
-        taken = zip(self._open[key].items(), self._first[key][name], rows[name], strict=True)
-        return {table: there.take(first, count) for (table, there), first, count in taken}
+        first = self._first[key]
+        run: list[str] = []
+        for name, following in pairwise([*names, None]):
+            assert name is not None
+            run.append(name)
+            begin, end = first[run[0]], [*map(add, first[name], rows[name])]
+            if following is None or first[following] != end or max(map(sub, end, begin)) > _COPIED:
+                tables = zip(self._open[key].items(), begin, map(sub, end, begin), strict=True)
+                yield (
+                    {each: rows[each] for each in run},
+                    {table: there.take(start, count) for (table, there), start, count in tables},
+                )
+                run = []
 
     def close(self) -> None:
         """Close all files."""

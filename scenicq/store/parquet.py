@@ -20,6 +20,8 @@ from scenicq.store.schema import GEO_METADATA, SCHEMA_VERSION, SCHEMAS, ArrowTab
 __all__ = ["TableWriter", "part_path"]
 
 _ROW_GROUP = 122_880
+_PIECES = 256
+"""Tables that wait side by side before they are put together: one of a few rows takes a hundred times its values."""
 _DISTINCT = ("id", "properties")
 """Columns of texts that hardly repeat: a dictionary of them would only cost."""
 
@@ -51,6 +53,7 @@ class TableWriter:
         self._folder, self._table, self._number = folder, table, number
         self._temporary = folder / table / f"part-{number:05}.{os.getpid()}.tmp"
         self._temporary.parent.mkdir(exist_ok=True)
+        self._few: list[ArrowTable] = []
         self._pending: list[ArrowTable] = []
         self._pending_rows = 0
         self._rows = 0
@@ -67,7 +70,10 @@ class TableWriter:
 
     def add(self, rows: ArrowTable) -> None:
         """Append rows of the table's schema."""
-        self._pending.append(rows)
+        self._few.append(rows)
+        if len(self._few) == _PIECES:
+            self._pending.append(pa.concat_tables(self._few).combine_chunks())
+            self._few = []
         self._pending_rows += len(rows)
         self._rows += len(rows)
         if self._pending_rows >= _ROW_GROUP:
@@ -98,8 +104,8 @@ class TableWriter:
         self._temporary.unlink(missing_ok=True)
 
     def _flush(self, rows: int) -> None:
-        table = pa.concat_tables(self._pending).combine_chunks()
+        table = pa.concat_tables([*self._pending, *self._few]).combine_chunks()
         self._writer.write_table(table.slice(0, rows), row_group_size=_ROW_GROUP)
         rest = table.slice(rows)
-        self._pending = [rest] if len(rest) else []
+        self._pending, self._few = [rest] if len(rest) else [], []
         self._pending_rows = len(rest)

@@ -214,46 +214,49 @@ class SegmentWriter:
         tally = _Tally(
             Counter(objects.category), Counter(objects.source_class), len({*objects.track} - {None}), columns.times_us
         )
-        self._append(columns.name, recording_rows(columns, index, **first), tally)
+        rows = recording_rows(columns, index, **first)
+        self._append({columns.name: [len(rows[table]) for table in SEGMENT_TABLES]}, rows, tally)
 
-    def copy(self, name: str, rows: Mapping[str, ArrowTable]) -> None:
-        """Append a recording that another segment has.
+    def copy(self, recordings: Mapping[str, Sequence[int]], rows: Mapping[str, ArrowTable]) -> None:
+        """Append recordings that lie one after the other in another segment.
 
         Args:
-            name: The recording's name; recordings come in order of their names.
-            rows: Its rows in each of `SEGMENT_TABLES`.
+            recordings: How many rows each has in each of `SEGMENT_TABLES`; recordings come in order of their names.
+            rows: The rows of all in each of `SEGMENT_TABLES`.
 
         Raises:
             OSError: The folder cannot be written.
         """
         import pyarrow.compute as pc  # noqa: PLC0415 - takes longer to load than a small ingest does
 
-        labels = rows["labels"]
+        labels, objects = rows["labels"], rows["objects"]
         for column, table in (("first_object", "objects"), ("first_sensor", "sensors")):
             place = labels.schema.get_field_index(column)
-            moved = pc.add(
-                pc.subtract(labels[column], labels[column][0]), pa.scalar(self._tables[table].rows, pa.int32())
-            )
+            first = labels[column][0] if len(labels) else 0
+            moved = pc.add(pc.subtract(labels[column], first), pa.scalar(self._tables[table].rows, pa.int32()))
             labels = labels.set_column(place, labels.schema.field(place), moved)
-        objects = rows["objects"]
         classes, source_classes = (
             Counter({each["values"]: each["counts"] for each in objects[column].value_counts().to_pylist()})
             for column in ("class", "source_class")
         )
-        tracks = pc.count_distinct(objects["track"], mode="only_valid").as_py()
-        tally = _Tally(classes, source_classes, tracks, labels["timestamp_us"].to_pylist())
-        self._append(name, {**rows, "labels": labels}, tally)
+        tracks = objects.select(["recording", "track"]).filter(pc.field("track").is_valid())
+        distinct = len(tracks.group_by(["recording", "track"], use_threads=False).aggregate([]))
+        tally = _Tally(classes, source_classes, distinct, labels["timestamp_us"].to_pylist())
+        self._append(recordings, {**rows, "labels": labels}, tally)
 
-    def _append(self, name: str, rows: Mapping[str, ArrowTable], tally: _Tally) -> None:
+    def _append(self, recordings: Mapping[str, Sequence[int]], rows: Mapping[str, ArrowTable], tally: _Tally) -> None:
         for table in SEGMENT_TABLES:
             self._tables[table].add(rows[table])
-        labels, objects = rows["labels"], rows["objects"]
-        counts = Counts(len(labels), len(objects))
-        self._recordings[name] = counts
-        self._rows[name] = [len(rows[table]) for table in SEGMENT_TABLES]
-        map_name = labels["map"][0].as_py() if len(labels) else ""
-        before = self._by_map.get(map_name, Counts())
-        self._by_map[map_name] = Counts(before.frames + counts.frames, before.objects + counts.objects)
+        labels, first = rows["labels"], 0
+        for name, sizes in recordings.items():
+            by_table = dict(zip(SEGMENT_TABLES, sizes, strict=True))
+            counts = Counts(by_table["labels"], by_table["objects"])
+            self._recordings[name] = counts
+            self._rows[name] = list(sizes)
+            map_name = labels["map"][first].as_py() if counts.frames else ""
+            before = self._by_map.get(map_name, Counts())
+            self._by_map[map_name] = Counts(before.frames + counts.frames, before.objects + counts.objects)
+            first += counts.frames
         self._by_class += tally.classes
         self._by_source_class += tally.source_classes
         self._tracks += tally.tracks

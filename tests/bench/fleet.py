@@ -82,16 +82,18 @@ class Fleet:
         frames: How many in all.
         seed: Of the traffic.
         needle: Whether the frame in the middle is the needle.
+        length: Frames of a recording.
     """
 
     frames: int
     seed: int
     needle: bool
+    length: int = FRAMES
 
     def sizes(self) -> list[tuple[str, int]]:
         """Name and number of frames of each recording."""
-        whole, rest = divmod(self.frames, FRAMES)
-        return [(f"fleet-{n:06}", FRAMES) for n in range(whole)] + ([(f"fleet-{whole:06}", rest)] if rest else [])
+        whole, rest = divmod(self.frames, self.length)
+        return [(f"fleet-{n:06}", self.length) for n in range(whole)] + ([(f"fleet-{whole:06}", rest)] if rest else [])
 
     def recording(self, number: int) -> RecordingColumns:
         """A recording: everybody goes straight on at a constant speed, or stands."""
@@ -110,7 +112,7 @@ class Fleet:
         sizes = np.array([KINDS[k][3] for k in kind])
         labels = [f"{name}/{frame:02}" for frame in range(frames)]
         ego_headings = np.repeat(ego_heading, frames)
-        if self.needle and number == self.frames // FRAMES // 2:
+        if self.needle and number == self.frames // self.length // 2:
             at = frames // 2
             labels[at] = "needle"
             truck = int(np.flatnonzero(kind == 1)[0]) if (kind == 1).any() else 0
@@ -128,7 +130,7 @@ class Fleet:
             name=name,
             map=MAP,
             frames=labels,
-            times_us=(START_US + (number * FRAMES + np.arange(frames)) * round(STEP_S * 1e6)).tolist(),
+            times_us=(START_US + (number * self.length + np.arange(frames)) * round(STEP_S * 1e6)).tolist(),
             params=['{"weather":"clear"}'] * frames,
             egos=_columns(
                 ["ego"] * frames,
@@ -157,7 +159,7 @@ class Fleet:
         )
 
     def _length(self, number: int) -> int:
-        return min(FRAMES, self.frames - number * FRAMES)
+        return min(self.length, self.frames - number * self.length)
 
 
 def _straight(

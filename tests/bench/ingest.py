@@ -33,7 +33,9 @@ LEAST_RATE, MOST_GROWTH = 50_000, 1.25
 SHORT_S, ROUNDS = 2.0, 10
 GENERATED, IMPORTING = "fleet-", "importing"
 WHOLE_FROM = 1_000_000
-MOST_OF_WHOLE, MOST_VERIFY_GROWTH = 0.4, 1.6
+RECORDINGS, SHORT = 10_000, 4
+"""Recordings, and frames of each, of a source of many short recordings."""
+MOST_OF_WHOLE, MOST_VERIFY_GROWTH = 0.15, 1.6
 """CPU seconds of an update by one recording, of those of a whole ingest (it writes one segment again), and how many
 times as much memory ten times as many frames may take to verify."""
 BARS_FROM = 10_000
@@ -90,8 +92,8 @@ def measure(source: Path, jobs: int, folder: Path) -> Measured:
     return one
 
 
-def one_more(source: Path, folder: Path) -> tuple[float, float, float]:
-    """CPU seconds of an ingest and of an update by one recording more, and the peak memory of `info --verify`, MiB."""
+def one_more(source: Path, folder: Path) -> tuple[Used, Used, Used]:
+    """What an ingest, an update by one recording more, and `info --verify` take."""
     target, grown = folder / "updated", folder / "grown"
     folder.mkdir()
     whole = command(source, target, 1)
@@ -100,18 +102,28 @@ def one_more(source: Path, folder: Path) -> tuple[float, float, float]:
     with (grown / "labels.jsonl").open("a") as labels:
         labels.writelines(line.replace(f"{GENERATED}000001", f"{GENERATED}000001x") + "\n" for line in last)
     update = run([COMMAND, "ingest", str(grown), str(target), "--update", "--quiet", "--jobs", "1"])
-    return whole.cpu_s, update.cpu_s, run([COMMAND, "info", str(target), "--verify"]).peak_mib
+    return whole, update, run([COMMAND, "info", str(target), "--verify"])
 
 
 def update_bars(sources: list[Path], folder: Path) -> Iterator[tuple[str, bool]]:
-    """The same of two sizes, as ratios."""
-    found = [one_more(source, folder / f"of-{source.name}") for source in (sources[0], sources[-1])]
-    whole_s, update_s, _ = found[-1]
-    told = f"{update_s:.1f} of {whole_s:.1f} CPU s, {update_s / whole_s:.2f}, at most {MOST_OF_WHOLE}"
-    yield f"{sources[-1].name}: one recording more by --update takes {told}", update_s / whole_s <= MOST_OF_WHOLE
-    growth = found[1][2] / found[0][2]
-    told = f"{growth:.2f} times the memory ({found[1][2]:.0f} MiB)"
-    yield f"info --verify of {sources[-1].name} takes {told} of {sources[0].name}", growth < MOST_VERIFY_GROWTH
+    """The same of two sizes and of many short recordings, as ratios."""
+    many = folder / f"{GENERATED}many"
+    write_interchange(Fleet(RECORDINGS * SHORT, 0, needle=False, length=SHORT), many)
+    asked = {"small": sources[0], "large": sources[-1], "many": many}
+    found = {name: one_more(source, folder / f"of-{name}") for name, source in asked.items()}
+    for name in ("large", "many"):
+        whole, update, _ = found[name]
+        share = update.cpu_s / whole.cpu_s
+        told = f"{update.cpu_s:.1f} of {whole.cpu_s:.1f} CPU s, {share:.2f}, at most {MOST_OF_WHOLE}"
+        yield f"{asked[name].name}: one recording more by --update takes {told}", share <= MOST_OF_WHOLE
+        told = f"{update.peak_mib:.0f} MiB, the ingest {whole.peak_mib:.0f}"
+        yield f"{asked[name].name}: one recording more by --update takes {told}", update.peak_mib <= whole.peak_mib
+    sizes = [found[name][2].peak_mib for name in ("small", "large")]
+    told = f"{sizes[1] / sizes[0]:.2f} times the memory ({sizes[1]:.0f} MiB)"
+    yield (
+        f"info --verify of {asked['large'].name} takes {told} of {asked['small'].name}",
+        (sizes[1] / sizes[0] < MOST_VERIFY_GROWTH),
+    )
 
 
 def is_whole(one: Measured) -> bool:

@@ -6,18 +6,21 @@ import json
 import multiprocessing
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partialmethod
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from scenicq.errors import DataError
+from scenicq.importers import segments
 from scenicq.importers.base import Labels
 from scenicq.importers.ingest import Progress, ingest
 from scenicq.importers.interchange import LineReader
@@ -28,6 +31,7 @@ from scenicq.store.columns import RecordingColumns
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Recording
 from scenicq.store.manifest import MANIFEST
+from scenicq.store.segment import SegmentWriter
 from scenicq.store.verification import verify_computed
 
 ROOT = Path(__file__).parents[2]
@@ -60,11 +64,11 @@ def line(recording: str, number: int, seed: int = 0) -> str:
     return json.dumps(label) + "\n"
 
 
-def write_source(folder: Path, names: list[str], seeds: dict[str, int] | None = None) -> Path:
+def write_source(folder: Path, names: list[str], seeds: dict[str, int] | None = None, frames: int = FRAMES) -> Path:
     shutil.copytree(ROOT / "sample_data" / "crossroads" / "maps", folder / "maps", dirs_exist_ok=True)
     header = {"name": "many", "interchange": 1, "angle": "heading", "classes": "scenic"}
     (folder / "dataset.json").write_text(json.dumps(header))
-    lines = [line(name, number, (seeds or {}).get(name, 0)) for name in names for number in range(FRAMES)]
+    lines = [line(name, number, (seeds or {}).get(name, 0)) for name in names for number in range(frames)]
     (folder / "labels.jsonl").write_text("".join(lines))
     return folder
 
@@ -275,6 +279,56 @@ def test_an_update_reads_recordings_of_a_segment_that_are_new_or_have_changed(
     assert summary.reused == 4
     assert {"record-invalid", "not-read"} <= {each.code for each in summary.left_out}
     verify_computed(open_dataset(tmp_path / "d"))
+
+
+@pytest.mark.parametrize("largest", [15, 60, 10_000])
+def test_any_row_of_updates_gives_what_a_fresh_ingest_gives(
+    largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rounds: Callable[[int], int]
+) -> None:
+    """Recordings come, go and change anywhere; some are empty, or use each other's frames; some updates are killed."""
+    chance = random.Random(largest)
+    there = {f"r{chance.randrange(1000):03}": 0 for _ in range(8)}
+    copied: list[int] = []
+    original = SegmentWriter.copy
+
+    def copy(self: SegmentWriter, recordings: Mapping[str, Sequence[int]], rows: Mapping[str, Any]) -> None:
+        copied.append(len(recordings))
+        original(self, recordings, rows)
+
+    monkeypatch.setattr(SegmentWriter, "copy", copy)
+    for number in range(rounds(16)):
+        monkeypatch.setattr(segments, "_COPIED", chance.choice([1, 25, 1000]))
+        for _ in range(chance.randrange(3) if number else 0):
+            there[f"r{chance.randrange(1000):03}"] = 0
+            del there[chance.choice(sorted(there))]
+            there[chance.choice(sorted(there))] = number
+        source = write_source(tmp_path / "source", sorted(there), there, frames=3)
+        with (source / "labels.jsonl").open("a") as labels:
+            for name in chance.sample(sorted(there), 2):
+                other = chance.choice(sorted(there))
+                unsound = json.dumps({"recording": f"{name}x", "id": "odd"}) + "\n"
+                labels.write(chance.choice(["", unsound, line(name, 7).replace(f"{name}/07", f"{other}/01")]))
+        if number and chance.random() < 0.3:
+            update_and_kill(source, tmp_path / "d", chance.randrange(3 * len(there)), largest)
+        ingest(source, tmp_path / "d", update=bool(number), segment_objects=largest)
+        ingest(source, tmp_path / "fresh", force=True, segment_objects=largest)
+        assert without_lines(contents(tmp_path / "d")) == without_lines(contents(tmp_path / "fresh"))
+        verify_computed(open_dataset(tmp_path / "d"))
+    assert max(copied) > (largest > 15)
+
+
+def without_lines(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Messages about what is not read again name lines as they were."""
+    return {name: re.sub(rb"(labels\.jsonl):\d+", rb"\1", content) for name, content in files.items()}
+
+
+def update_and_kill(source: Path, target: Path, after: int, largest: int) -> None:
+    """An update that is killed after some frames, or is done before."""
+    killing = f"update=True, progress=lambda p: p.frames < {after} or os.kill(os.getpid(), 9), jobs="
+    arguments = [sys.executable, "-c", "import os" + PROGRAM.replace("jobs=", killing)]
+    arguments += [str(source), str(target), "1", str(largest)]
+    run = subprocess.run(arguments, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False)
+    assert run.returncode in (0, -9)
 
 
 def test_an_update_copies_nothing_of_a_file_that_has_changed(tmp_path: Path) -> None:
