@@ -15,7 +15,7 @@ from scenicq.geometry.regions import SLACK
 from scenicq.geometry.shapes import XY
 from scenicq.geometry.terms import Term
 
-__all__ = ["closest_point"]
+__all__ = ["closest_point", "nearest_on_circles"]
 
 
 def closest_point(term: Term, x: float, y: float) -> XY | None:
@@ -31,7 +31,7 @@ def closest_point(term: Term, x: float, y: float) -> XY | None:
     on_clip = np.concatenate(
         [edges[:, :2], _projections(edges, np.vstack([query, circles[:, :2]])), _cuts(edges, circles)]
     )
-    free = np.concatenate([query[None], _nearest_on(query, circles), _crossings(circles)])
+    free = np.concatenate([query[None], nearest_on_circles(query, circles), _crossings(circles)])
     free = free[_allowed(free, term, circles)]
     free = free[shapes.distances(shapes.points(free), term.clip) <= SLACK]
     found = np.concatenate([on_clip[_allowed(on_clip, term, circles)], free])
@@ -71,8 +71,8 @@ def _cuts(edges: NDArray[np.float64], circles: NDArray[np.float64]) -> NDArray[n
     return (start + places[..., None] * unit)[on_edge]
 
 
-def _nearest_on(query: NDArray[np.float64], circles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The point of each circle that is nearest to the query."""
+def nearest_on_circles(query: NDArray[np.float64], circles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The points of circles, rows of x, y and radius, that are nearest to a query, or to many; shapes are broadcast."""
     offset = query - circles[:, :2]
     length = np.hypot(offset[:, 0], offset[:, 1])
     unit = np.where(length[:, None] > 0, offset / np.where(length > 0, length, 1.0)[:, None], (1.0, 0.0))

@@ -67,6 +67,8 @@ def outline(region: Region, within: Bounds, side: Side = "outer") -> list[Shape]
             return [shapes.box(*within)]
         case Nowhere():
             return []
+        case (Disc() | Sector()) as empty if empty.radius < 0:
+            return []
         case Disc():
             return clip([disc_outline(*region.center, region.radius, side)], within)
         case Sector():

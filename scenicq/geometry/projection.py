@@ -11,9 +11,10 @@ from shapely import STRtree
 
 from scenicq.budget import look
 from scenicq.geometry import shapes
+from scenicq.geometry.closest import nearest_on_circles
 from scenicq.geometry.membership import bounds, contains_many, nearest_point
 from scenicq.geometry.outlines import outline
-from scenicq.geometry.regions import Everywhere, PointSet, PolygonSet, PolylineSet, Region, UnionOf
+from scenicq.geometry.regions import Disc, Everywhere, PointSet, PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.geometry.shapes import Bounds, Coordinates
 from scenicq.geometry.terms import UndecidedError, overlap
 
@@ -45,6 +46,8 @@ def nearest_points(region: Region, xy: Coordinates, near: Bounds) -> Coordinates
                 continue
             case Everywhere():
                 return xy
+            case Disc():
+                found = _of_disc(part, xy)
             case _:
                 found = _of_outline(part, xy, near)
         _take_nearer(xy, found, best, least)
@@ -76,6 +79,13 @@ def _of_pieces(tree: STRtree, pieces: NDArray[Any], xy: Coordinates) -> Coordina
         owner, piece, _ = shapes.tree_nearest(tree, points)
         found[owner] = shapes.nearest_of(pieces[piece], points[owner])
     return found
+
+
+def _of_disc(disc: Disc, xy: Coordinates) -> Coordinates:
+    if disc.radius < 0:
+        return np.full(xy.shape, np.nan)
+    edge = nearest_on_circles(xy, np.array([[*disc.center, disc.radius]]))
+    return np.where(contains_many(disc, xy)[:, None], xy, edge)
 
 
 @lru_cache(maxsize=64)
