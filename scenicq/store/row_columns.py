@@ -42,6 +42,10 @@ class RowColumns:
         """Close the file."""
         self._file.close()
 
+    def __contains__(self, name: str) -> bool:
+        """Whether the file has a column."""
+        return name in self._leaf
+
     def numbers(self, name: str, rows: NDArray[np.int64]) -> NDArray[np.float64]:
         """Real numbers; nan for null."""
         return self._values(name, rows, np.empty(len(rows)))

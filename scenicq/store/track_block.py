@@ -128,6 +128,10 @@ class TrackBlock:
         """Whether a member is the ego of its label."""
         return member >= self._m
 
+    def are_egos(self, members: Integers) -> bool:
+        """Whether members are egos of their labels, or nobody."""
+        return bool(((members >= self._m) | (members < 0)).all())
+
     def members(self, rows: Integers) -> Integers:
         """The label objects that are in some rows of their part."""
         return np.searchsorted(self._rows, rows)
@@ -135,8 +139,9 @@ class TrackBlock:
     def numbers(self, name: str) -> Numbers:
         """A column of `objects` and that of the egos, by member; nan where there is no value."""
         if name not in self._numbers:
-            objects = self._objects.numbers(name, self._rows)
-            egos = self._labels.numbers(f"ego_{name}", self._label_rows)
+            objects, own = self._objects.numbers(name, self._rows), f"ego_{name}"
+            there = own in self._labels
+            egos = self._labels.numbers(own, self._label_rows) if there else np.full(len(self), np.nan)
             self._numbers[name] = np.concatenate((objects, egos, [np.nan]))
         return self._numbers[name]
 

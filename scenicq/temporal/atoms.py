@@ -14,10 +14,12 @@ from typing import TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.forest.clear_columns import QuickColumns, quick_form
 from scenicq.forest.column_domain import ColumnDomain
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, column_of, constant_column, truth_of
 from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.condition import expand
+from scenicq.forest.ego_frame import DISTANCE, PLACE
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
 from scenicq.forest.nodes import DirectionAt, Feature, Identity, Leaf, Node, Value
 from scenicq.forest.scenario import Scenario
@@ -25,7 +27,7 @@ from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.limits import LIMITS
-from scenicq.temporal.samples import FIXED, MOVING, Observed
+from scenicq.temporal.samples import FIXED, MOVING, BoundSamples, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["AtomColumns", "UnclearVariable", "reads_start"]
@@ -215,10 +217,30 @@ class AtomColumns:
         return self.scenario.objects[feature.object].properties[feature.property].value
 
     def _truth(self, condition: Node, chosen: Mapping[int, int], counts: dict[int, NDArray[np.intp]]) -> Truth:
-        data, status = self._evaluate(condition, chosen, counts)
-        held = np.where(truth_of(data), TRUE, FALSE)
-        found = np.where(status == DEFINED, held, np.where(status == UNDEFINED, FALSE, UNKNOWN))
-        return np.broadcast_to(found, len(self.samples)).copy()
+        found = self._quickly(condition)
+        if found is None:
+            return _as_truth(self._evaluate(condition, chosen, counts), len(self.samples))
+        open_ = np.flatnonzero(found == UNKNOWN)
+        if len(open_):
+            domain = ColumnDomain(lambda node: self._observed_at(node, open_), self._assigned, _any_direction)
+            with np.errstate(all="ignore"):
+                found[open_] = _as_truth(interpret(steps_of(condition), domain)[id(condition)], len(open_))
+        return found
+
+    def _quickly(self, condition: Node) -> Truth | None:
+        """The value of a condition at each sample, unknown where rounding may decide; None if that saves nothing."""
+        samples = self.samples
+        if self.given or not isinstance(samples, BoundSamples):
+            return None
+        ego = self.scenario.ego
+        if not samples.block.are_egos(samples.members[ego]):
+            return None
+        quick = quick_form(condition, ego)
+        if quick is None:
+            return None
+        domain = QuickColumns(self._observed, self._assigned, _any_direction)
+        with np.errstate(all="ignore"):
+            return _as_truth(interpret(steps_of(quick), domain)[id(quick)], len(samples))
 
     def _evaluate(self, root: Node, chosen: Mapping[int, int], counts: dict[int, NDArray[np.intp]]) -> Column:
         """The values of an expression.
@@ -273,17 +295,28 @@ class AtomColumns:
             raise UnclearVariable("a hidden random variable over time")
         return constant_column(self.assignment[leaf.identity])
 
+    def _observed_at(self, node: Feature, samples: NDArray[np.int64]) -> Column:
+        """What is observed of a feature at some samples."""
+        found = self._observed(node)
+        return found if len(found.status) != len(self.samples) else _as_at(samples, found)
+
     def _observed(self, node: Feature) -> Column:
         found = self._feature(node)
         if found is None:
             return Column(np.full(1, np.nan), np.full(1, UNOBSERVED))
         return found if node.current or self.start is None else _as_at(self.start, found)
 
+    def _seen(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
+        if name in (PLACE, DISTANCE):
+            assert isinstance(self.samples, BoundSamples)
+            return self.samples.seen(self.scenario.ego, index, name)
+        return self.samples.observed(index, name)
+
     def _feature(self, node: Feature) -> Column | None:
         """What is observed of a feature; None if no sample has it."""
         key = node.object, node.property
         if key not in self._features:
-            seen = self.samples.observed(*key)
+            seen = self._seen(*key)
             if seen is None:
                 self._features[key] = None
             elif isinstance(seen, list):
@@ -292,6 +325,17 @@ class AtomColumns:
                 status = np.where(np.isnan(seen[0]), UNOBSERVED, DEFINED)
                 self._features[key] = Column((seen[0], seen[1]) if len(seen) == 2 else seen[0], status)
         return self._features[key]
+
+
+def _as_truth(found: Column, count: int) -> Truth:
+    """A column of truth values as so many."""
+    held = np.where(truth_of(found.data), TRUE, FALSE)
+    truth = np.where(found.status == DEFINED, held, np.where(found.status == UNDEFINED, FALSE, UNKNOWN))
+    return np.broadcast_to(truth, count).copy()
+
+
+def _any_direction(_node: DirectionAt, _allowed: NDArray[np.intp]) -> NDArray[np.intp]:
+    return np.zeros(1, np.intp)
 
 
 def _as_at(samples: NDArray[np.int64], column: Column) -> Column:

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.forest.ego_frame import PLACE
 from scenicq.forest.nodes import Value
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
@@ -78,6 +79,18 @@ class BoundSamples:
             return [values[code] for code in codes[mine].tolist()]
 
         return _observed(name, lambda column: self.block.numbers(column)[mine], said)
+
+    def seen(self, ego: int, index: int, name: str) -> tuple[Numbers, ...]:
+        """`PLACE` or `DISTANCE` of an object, nan where it is not known.
+
+        Args:
+            ego: The object that is the labels' own ego.
+            index: The other object.
+            name: Which of both.
+        """
+        there = self.members[ego] >= 0
+        columns = ("ego_right", "ego_ahead") if name == PLACE else ("ego_distance",)
+        return tuple(np.where(there, self.block.numbers(column)[self.members[index]], np.nan) for column in columns)
 
     def at(self, chosen: NDArray[Any]) -> BoundSamples:
         """Some of the places, by their numbers or a truth value for each."""

@@ -13,13 +13,13 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.forest.clear_columns import ClearColumns
 from scenicq.forest.columns import DEFINED, Column, constant_column, truth_of
 from scenicq.forest.groups import PARAMS, Condition, Constraint, Group
 from scenicq.forest.interpret import Steps, interpret, steps_of
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Node, PointIn, Select, Value
 from scenicq.forest.walk import children, leaves, postorder
-from scenicq.match.decide.clear_columns import ClearColumns
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.closed_numbers import heading, number, text
 from scenicq.match.decide.closed_positions import known_vector, offset, point_in

@@ -22,6 +22,9 @@ from scenicq.match.tolerance import SLACK, Margin
 
 __all__ = ["known_vector", "offset", "point_in"]
 
+_CLOSE = 1e-12
+"""How close a length is to a bound, beside its size, where rounding may decide."""
+
 
 def point_in(item: Comparison, node: PointIn, ego: int, chosen: Mapping[Identity, float]) -> ClosedForm | None:
     """A point of a region that is known once the label is.
@@ -74,8 +77,22 @@ def known_vector(item: Comparison) -> ClosedForm | None:
 
 def _close(dx: float, dy: float, margin: Margin) -> tuple[bool, bool]:
     """Whether a position that is off by a vector is surely within tolerance, or surely not; of columns, each."""
-    off = math.hypot(dx, dy) if isinstance(dx, float) else _length(dx, dy)
-    return off <= margin.sure, (off > margin.reach + SLACK) & (off < math.inf)
+    bounds = margin.sure, margin.reach + SLACK
+    if isinstance(dx, float):
+        off = math.hypot(dx, dy)
+    else:
+        off = cast(float, _lengths(cast(FloatColumn, dx), cast(FloatColumn, dy), bounds))
+    return off <= bounds[0], (off > bounds[1]) & (off < math.inf)
+
+
+def _lengths(dx: FloatColumn, dy: FloatColumn, bounds: tuple[float, ...]) -> FloatColumn:
+    """The lengths of vectors; NumPy rounds otherwise than `math`, which is only a matter next to a bound."""
+    found = np.hypot(dx, dy)
+    for bound in bounds:
+        close = np.flatnonzero(np.abs(found - bound) <= _CLOSE * (1 + bound))
+        pairs = zip(dx[close].tolist(), dy[close].tolist(), strict=True)
+        found[close] = [math.hypot(*pair) for pair in pairs]
+    return found
 
 
 def _apart(middle: XY, half: XY, turn: XY, margin: Margin) -> bool:
@@ -102,14 +119,6 @@ def _composed(turns: Sequence[XY]) -> XY:
     for c, s in turns:
         turn = turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s
     return turn
-
-
-def _length(x: float, y: float) -> float:
-    """The length of a vector; of columns, a column of the same numbers to the last bit."""
-    if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
-        pairs = zip(cast(FloatColumn, x).tolist(), cast(FloatColumn, y).tolist(), strict=True)
-        return cast(float, np.array([math.hypot(*pair) for pair in pairs]))
-    return math.hypot(x, y)
 
 
 def offset(item: Comparison) -> ClosedForm | None:

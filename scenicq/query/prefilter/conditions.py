@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scenicq.errors import Span
+from scenicq.forest.ego_frame import DISTANCE, PLACE, in_ego_frame
 from scenicq.forest.interval_values import Interval
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -37,7 +38,6 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
-from scenicq.query.prefilter.ego_frame import DISTANCE, PLACE, in_ego_frame
 from scenicq.query.prefilter.map_relations import MapRelations, shared_look_ups
 from scenicq.query.prefilter.regions import RegionNames, near_region
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds

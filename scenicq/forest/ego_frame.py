@@ -1,4 +1,4 @@
-"""Expressions over columns that say where objects are as seen from the ego, so that SQL computes no angles.
+"""Expressions over columns that say where objects are as seen from the ego, so that no angles are computed.
 
 A length times the sine or cosine of its own bearing is a coordinate of the turned vector; a difference of places turned
 by the ego's heading is a column of the store, and its length another. Both hold but for rounding, which only
@@ -42,15 +42,16 @@ def in_ego_frame(root: Node, ego: int) -> Node:
             case Arithmetic(op=ArithmeticOp.MUL, args=(one, other)):
                 return _as_coordinate(one, other) or _as_coordinate(other, one) or node
             case Norm() if (seen := _seen_from(node.vector, ego)) is not None:
-                return Feature(seen, DISTANCE, "scalar", span=node.span)
+                return Feature(seen.object, DISTANCE, "scalar", seen.current, span=node.span)
             case _:
                 return node
 
     def turned(node: Node) -> Node:
         match node:
-            case Rotate(angle=Arithmetic(op=ArithmeticOp.NEG, args=(angle,))) if _is(angle, ego, "heading"):
-                seen = _seen_from(node.vector, ego)
-                return node if seen is None else Feature(seen, PLACE, "vector", span=node.span)
+            case Rotate(angle=Arithmetic(op=ArithmeticOp.NEG, args=(angle,))) if (
+                seen := _seen_from(node.vector, ego)
+            ) is not None and _is(angle, ego, "heading", seen.current):
+                return Feature(seen.object, PLACE, "vector", seen.current, span=node.span)
             case _:
                 return node
 
@@ -59,17 +60,17 @@ def in_ego_frame(root: Node, ego: int) -> Node:
     return transform(products, lambda node: turned(step(node)))
 
 
-def _is(node: Node, index: int, name: str) -> bool:
-    return isinstance(node, Feature) and (node.object, node.property) == (index, name)
+def _is(node: Node, index: int, name: str, current: bool) -> bool:
+    return isinstance(node, Feature) and (node.object, node.property, node.current) == (index, name, current)
 
 
-def _seen_from(vector: Node, ego: int) -> int | None:
-    """The object whose place less the ego's a vector is."""
+def _seen_from(vector: Node, ego: int) -> Feature | None:
+    """The place of an object, if a vector is that less the ego's at the same time."""
     match vector:
         case VectorSum(
             left=Feature(property="position") as seen, right=Scale(vector=place, factor=Constant(value=factor))
-        ) if factor == -1.0 and _is(place, ego, "position") and seen.object != ego:
-            return seen.object
+        ) if factor == -1.0 and _is(place, ego, "position", seen.current) and seen.object != ego:
+            return seen
         case _:
             return None
 
