@@ -29,16 +29,19 @@ def lane_direction(features: Iterable[MapFeature]) -> RoadDirection:
     return RoadDirection(_directed(features, "lane"))
 
 
-def road_direction(features: Iterable[MapFeature]) -> RoadDirection:
+def road_direction(features: Iterable[MapFeature], ahead: Iterable[str] = ()) -> RoadDirection:
     """The direction of traffic: that of the lanes, and of shoulders off roads and intersections, if these have one.
 
     Args:
         features: Of those with the same id the first counts.
+        ahead: The ids of lanes that come before the others, in this order.
     """
     features = tuple(features)
     beside = _directed(features, "shoulder")
     taken = tuple(each.shape for each in features if each.kind in ("intersection", "road"))
-    return RoadDirection(_directed(features, "lane"), beside=beside, taken=taken if beside else ())
+    ranks = {id_: rank for rank, id_ in enumerate(dict.fromkeys(ahead))}
+    ordered = sorted(features, key=lambda each: ranks.get(each.id, len(ranks)))
+    return RoadDirection(_directed(ordered, "lane"), beside=beside, taken=taken if beside else ())
 
 
 def _directed(features: Iterable[MapFeature], kind: str) -> tuple[DirectedLane, ...]:

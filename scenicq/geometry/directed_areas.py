@@ -112,7 +112,7 @@ class DirectedAreas:
             return None
         own = slice(starts[found[0]], starts[found[0] + 1])
         away = segment_distances(np.array((x, y)), segments[own])
-        return tuple(sorted({*headings[own][away <= away.min() + TIE].tolist()}))
+        return tuple(dict.fromkeys(headings[own][away <= away.min() + TIE].tolist()))
 
     def within(self, xy: Coordinates, reach: NDArray[np.float64]) -> AreaPairs:
         """Pairs (point, area) that are within reach of each other; shapes (n, 2) and (n,)."""

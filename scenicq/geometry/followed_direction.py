@@ -55,7 +55,7 @@ class FollowedDirection(RoadDirection):
         found = self.base.values_many(xy)
         off: list[int] = self._partly_off(np.concatenate([xy, xy], axis=1)).tolist()
         for index in off:
-            found[index] = tuple(sorted({*found[index], OFF_ROAD}))
+            found[index] = tuple(dict.fromkeys((OFF_ROAD, *found[index])))
         return found
 
     def headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:

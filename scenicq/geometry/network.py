@@ -75,8 +75,9 @@ class Network:
 
     @cached_property
     def roadDirection(self) -> RoadDirection:
-        """The direction of traffic."""
-        return road_direction(self.features)
+        """The direction of traffic, where lanes overlap that of ways through intersections first, as Scenic has it."""
+        ways = (each.connectingLane for crossing in self.intersections for each in crossing.maneuvers)
+        return road_direction(self.features, [lane.id for lane in ways if lane is not None])
 
     # --- elements
 

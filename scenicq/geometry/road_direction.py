@@ -65,7 +65,7 @@ class RoadDirection:
         return None if len(self._elsewhere) else ([area for area, _ in self._lanes.directed], self.farthest)
 
     def values(self, x: float, y: float) -> tuple[float, ...]:
-        """The headings allowed at a point, in (-pi, pi]; none where the field is undefined."""
+        """The headings allowed at a point, in (-pi, pi], Scenic's first; none where the field is undefined."""
         # most places, one at a time: a third of the time
         alone = self._lanes.alone(x, y)
         return self._values(np.array([(x, y)], dtype=float))[0] if alone is None else alone
@@ -135,10 +135,11 @@ class RoadDirection:
         return float(heading[0]) if len(heading) else None
 
     def _values(self, xy: Coordinates) -> list[tuple[float, ...]]:
-        owner, heading = distinct_pairs(*self._pairs(xy))
-        values: list[float] = heading.tolist()
-        ends: list[int] = np.searchsorted(owner, np.arange(len(xy) + 1)).tolist()
-        return [tuple(values[first:end]) for first, end in pairwise(ends)]
+        owner, heading = self._pairs(xy)
+        order = np.argsort(owner, kind="stable")
+        values: list[float] = heading[order].tolist()
+        ends: list[int] = np.searchsorted(owner[order], np.arange(len(xy) + 1)).tolist()
+        return [tuple(dict.fromkeys(values[first:end])) for first, end in pairwise(ends)]
 
     def _pairs(self, xy: Coordinates) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Pairs (point, heading), for each point in the order of areas and their segments."""

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Point
 
 from scenicq.compiler.attributes import attribute
 from scenicq.compiler.interpreter import Interpreter
@@ -167,3 +167,20 @@ def test_a_reference_to_what_is_not_there_is_told() -> None:
     assert [message for _, message in dangling([*street(more=[stray]).features])] == [
         "`successor` of road_section `stray`: `x` is not in the map"
     ]
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_where_ways_overlap_the_direction_of_the_first_comes_first(told: bool) -> None:
+    network = star(told=told)
+    (crossing,) = network.intersections
+    met = 0
+    for number in range(400):
+        x, y = number % 20 - 9.7, number // 20 - 9.7
+        ways = [each.connectingLane for each in crossing.maneuvers if each.connectingLane is not None]
+        ways = [way for way in ways if way.polygon.covers(Point(x, y))]
+        met += len(ways) > 1
+        if ways:
+            (start, end) = ways[0].centerline.lines[0].coords
+            heading = math.atan2(start[0] - end[0], end[1] - start[1])
+            assert network.roadDirection.values(x, y)[0] == pytest.approx(heading)
+    assert met > 30
